@@ -1,0 +1,156 @@
+"""Files the tool writes: schema, version, hashes of the inputs and the parent; written whole or not at all."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml import YAML, YAMLError
+
+from fieldsid._version import __version__
+from fieldsid.errors import ArtifactError
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes as 64 hex digits; a folder's is that of its files in name order."""
+    digest = hashlib.sha256()
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    for file in files:
+        with file.open("rb") as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+    return digest.hexdigest()
+
+
+@contextmanager
+def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
+    """Yield a temporary path beside `path` and move it into place when the block ends without an error.
+
+    Raises ArtifactError when `path` exists and `force` is false, or when it cannot be written; then nothing
+    is left behind and an existing file is as it was.
+    """
+    if path.exists() and not force:
+        raise ArtifactError(
+            f"`{path}` exists", found=f"{path.stat().st_size} bytes", hint="add `--force`, or name another output"
+        )
+    temporary: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+        os.close(handle)
+        temporary = Path(name)
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    except OSError as error:
+        raise ArtifactError(
+            f"`{path}` cannot be written: {error.strerror or error}",
+            found=f"folder `{path.parent}`",
+            hint="choose a folder that can be written, with `-o DIR`",
+        ) from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str, *, force: bool = False) -> Path:
+    """Write a text file whole or not at all; raises ArtifactError."""
+    with replacing(path, force=force) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
+def save_record(
+    path: Path,
+    schema: str,
+    body: Mapping[str, Any],
+    *,
+    inputs: Sequence[Path] = (),
+    parent: Path | None = None,
+    force: bool = False,
+) -> Path:
+    """Write a record as YAML under a head of schema, version, input hashes and parent; raises ArtifactError."""
+    head: dict[str, Any] = {
+        "schema": schema,
+        "tool": f"fieldsid {__version__}",
+        "inputs": [{"path": str(p), "sha256": sha256_of(p)} for p in inputs],
+        "parent": None if parent is None else {"path": str(parent), "sha256": sha256_of(parent)},
+    }
+    return write_text(path, to_yaml({**head, **body}), force=force)
+
+
+def load_record(path: Path, kind: str) -> dict[str, Any]:
+    """Read a record back and check that it is one of `kind` (`fieldsid/model` for `fieldsid/model/1`).
+
+    Raises ArtifactError when the file cannot be read, is not YAML, or is another kind of record.
+    """
+    body = read_yaml(path)
+    schema = body.get("schema")
+    if not isinstance(schema, str) or not schema.startswith(f"{kind}/"):
+        raise ArtifactError(
+            f"`{path}` is not a {kind} file", found=f"schema: {schema!r}", hint=f"give a file whose first line is `schema: {kind}/1`"
+        )
+    if schema != f"{kind}/1":
+        raise ArtifactError(f"`{path}` has a newer schema than this version reads", found=schema, hint="update fieldsid")
+    return body
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read a YAML mapping; raises ArtifactError when it cannot be read or is not a mapping."""
+    try:
+        body = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ArtifactError(
+            f"`{path}` cannot be read: {error.strerror}", found=str(path), hint="check the path and its permissions"
+        ) from error
+    except (YAMLError, UnicodeDecodeError) as error:
+        place = str(getattr(error, "problem_mark", "") or error).strip()
+        raise ArtifactError(f"`{path}` is not valid YAML", found=place, hint="mend the line named above") from error
+    if not isinstance(body, dict):
+        raise ArtifactError(
+            f"`{path}` does not hold a mapping", found=type(body).__name__, hint="the file must have `key: value` lines"
+        )
+    return body
+
+
+def to_yaml(body: Mapping[str, Any]) -> str:
+    """Return a mapping as block YAML in its own order, numbers as plain YAML numbers."""
+    yaml = YAML()
+    yaml.default_flow_style = False
+    yaml.width = 120
+    stream = io.StringIO()
+    yaml.dump(plain(body), stream)
+    return stream.getvalue()
+
+
+def plain(value: Any) -> Any:
+    """Return a value as nested dict, list and plain numbers; numbers that are not finite become None."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if value is None:
+        return None
+    return str(value)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

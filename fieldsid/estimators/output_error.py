@@ -1,0 +1,81 @@
+"""Output error: free-run simulation, least squares on angle and rate weighted by their own residual noise.
+
+Standard errors are those of the residuals' own colour (fitting/uncertainty.py), so that a disturbance or a
+missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2006, chapter 6.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.fitting.colour import chosen_noise
+from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations
+from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.start import start_vector
+from fieldsid.fitting.uncertainty import middle
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.model import Noise
+
+REWEIGHTINGS = 2
+
+
+def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
+    """Return the residual standard deviation of both channels, corrected for the parameters estimated."""
+    squares, counts = np.zeros(2), np.zeros(2)
+    for run, record in enumerate(problem.records):
+        residual, _ = problem.residual(x, run)
+        squares += (residual**2).sum(axis=1)
+        counts += (record.angle_ok.sum(), record.rate_ok.sum())
+    lost = parameters * counts / max(float(counts.sum()), 1.0)
+    sigma = np.sqrt(squares / np.maximum(counts - lost, 1.0))
+    floor = floor_of(problem.records)
+    return Noise(
+        float(sigma[0]) if sigma[0] > 0 else floor.angle,
+        float(sigma[1]) if sigma[1] > 0 else floor.rate,
+    )
+
+
+def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent, Noise]:
+    """Return the output-error minimum from a start, with weights from its own residuals."""
+    found = descend(problem, start, noise)
+    for _ in range(REWEIGHTINGS):
+        new = residual_noise(problem, found.x, len(found.free))
+        found = descend(problem, found.x, new)
+        change = abs(np.log(new.angle / noise.angle)) + abs(np.log(new.rate / noise.rate))
+        noise = new
+        if change < 0.02:
+            break
+    return found, noise
+
+
+def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
+    """Return the covariance (F, F) of an output-error estimate under a noise model of any colour."""
+    _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
+    sigma = np.array([weights.angle, weights.rate])
+    place = {slot: i for i, slot in enumerate(found.free)}
+    centre = np.zeros_like(normal)
+    for record, result in zip(problem.records, results, strict=True):
+        ok = np.stack([record.angle_ok, record.rate_ok])
+        weighted = np.where(ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
+        index = np.array([place[s] for s in result.slots])
+        centre[np.ix_(index, index)] += middle(record, noise, result.base.damping, result.base.stiffness, weighted)
+    inverse = covariance(normal)
+    return np.asarray(inverse @ centre @ inverse)
+
+
+def solve(problem: Problem, _options: Options) -> Solution:
+    """Return the output-error solution of a joint problem."""
+    found, weights = minimise(problem, start_vector(problem.records, problem.layout), floor_of(problem.records))
+    noise, notes = chosen_noise(problem, found.x, weights)
+    full = coloured_covariance(problem, found, weights, noise)
+    return Solution(found.x, shared_covariance(problem, full, found.free), noise, ESTIMATOR.name, notes)
+
+
+ESTIMATOR = Estimator(
+    name="output_error",
+    says="simulate from the fin, least squares on angle and rate; errors corrected for coloured residuals",
+    source="Ljung 1999, section 7.2",
+    solve=solve,
+)

@@ -1,0 +1,133 @@
+"""Levenberg-Marquardt on whitened free-run residuals, within bounds, over the free slots of a joint fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.problem import Problem, RunResult
+from fieldsid.fitting.whitening import whiten
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.model import Noise
+
+TOLERANCE = 1e-8
+ROUNDS = 40
+DAMPING_START = 1e-4
+DAMPING_LIMIT = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """Where a descent ended: vector (N,), weighted sum of squares, its normal matrix (F, F) over `free`."""
+
+    x: FloatArray
+    cost: float
+    normal: FloatArray
+    gradient: FloatArray
+    free: tuple[int, ...]
+    rounds: int
+    converged: bool
+
+
+def cost_of(problem: Problem, x: FloatArray, noise: Noise) -> float:
+    """Return the whitened sum of squares at x, infinite where the motion diverges."""
+    total = 0.0
+    for run, record in enumerate(problem.records):
+        residual, base = problem.residual(x, run)
+        if not np.isfinite(residual).all():
+            return float("inf")
+        white, _ = whiten(record, noise, base.damping, base.stiffness, residual[None])
+        total += float(np.vdot(white, white))
+    return total
+
+
+def normal_equations(
+    problem: Problem, x: FloatArray, noise: Noise, free: Sequence[int]
+) -> tuple[float, FloatArray, FloatArray, list[RunResult]]:
+    """Return whitened cost, normal matrix (F, F), gradient (F,) and each run's linearisation."""
+    place = {slot: i for i, slot in enumerate(free)}
+    normal, gradient = np.zeros((len(free), len(free))), np.zeros(len(free))
+    total, results = 0.0, []
+    for run, record in enumerate(problem.records):
+        result = problem.linearise(x, run, free)
+        results.append(result)
+        stack = np.concatenate([result.residual[None], result.sensitivity])
+        if not np.isfinite(stack).all():
+            return float("inf"), normal, gradient, results
+        white, _ = whiten(record, noise, result.base.damping, result.base.stiffness, stack)
+        flat = white.reshape(white.shape[0], -1)
+        product = flat @ flat.T
+        index = np.array([place[s] for s in result.slots], dtype=int)
+        normal[np.ix_(index, index)] += product[1:, 1:]
+        gradient[index] += product[1:, 0]
+        total += float(product[0, 0])
+    return total, normal, gradient, results
+
+
+def descend(
+    problem: Problem, x: FloatArray, noise: Noise, *, free: Sequence[int] | None = None, rounds: int = ROUNDS,
+    tolerance: float = TOLERANCE,
+) -> Descent:  # fmt: skip
+    """Return the minimum of the whitened sum of squares that a start x leads to.
+
+    A slot at its bound whose gradient points outward is held there for the step. Source: Levenberg-Marquardt
+    with Marquardt's scaling and projected bounds (Nocedal and Wright 2006, section 10.3).
+    """
+    slots = tuple(range(len(x)) if free is None else free)
+    low, high = problem.layout.low[list(slots)], problem.layout.high[list(slots)]
+    x = x.copy()
+    x[list(slots)] = np.clip(x[list(slots)], low, high)
+    damping = DAMPING_START
+    cost, normal, gradient, _ = normal_equations(problem, x, noise, slots)
+    done, count = False, 0
+    while count < rounds and not done and np.isfinite(cost):
+        count += 1
+        step = _step(normal, gradient, damping, x[list(slots)], low, high)
+        trial = x.copy()
+        trial[list(slots)] = np.clip(x[list(slots)] + step, low, high)
+        moved = trial[list(slots)] - x[list(slots)]
+        expected = float(2 * gradient @ moved - moved @ normal @ moved)
+        new = cost_of(problem, trial, noise)
+        if new < cost:
+            done = cost - new <= tolerance * cost or expected <= tolerance * cost
+            x = trial
+            damping = max(damping * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)
+            if done and damping <= DAMPING_START and cost - new <= 1e-3 * tolerance * cost:
+                cost = new
+                break
+            cost, normal, gradient, _ = normal_equations(problem, x, noise, slots)
+        else:
+            done = abs(expected) <= tolerance * cost
+            damping = max(damping, 1e-7) * 10.0
+            done = done or damping > DAMPING_LIMIT
+    return Descent(x, cost, normal, gradient, slots, count, done)
+
+
+def _step(
+    normal: FloatArray, gradient: FloatArray, damping: float, x: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    blocked = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)) | (np.diag(normal) < 1e-24)
+    open_ = np.flatnonzero(~blocked)
+    step = np.zeros_like(x)
+    if open_.size == 0:
+        return step
+    n = normal[np.ix_(open_, open_)] / np.outer(scale[open_], scale[open_])
+    n[np.diag_indices_from(n)] += damping
+    try:
+        solved = np.linalg.solve(n, gradient[open_] / scale[open_])
+    except np.linalg.LinAlgError:
+        solved = np.linalg.lstsq(n, gradient[open_] / scale[open_], rcond=None)[0]
+    step[open_] = solved / scale[open_]
+    return step
+
+
+def covariance(normal: FloatArray) -> FloatArray:
+    """Return the inverse of a normal matrix, computed in its own scale; a direction without information is infinite."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    floor = 1e-13 * max(float(values[-1]), 1e-300)
+    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
+    return np.asarray(inverse / np.outer(scale, scale))

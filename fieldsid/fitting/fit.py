@@ -1,0 +1,255 @@
+"""A fit: records in, a Model with honest errors out, with each run's free run beside its measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.errors import DataError, UsageError
+from fieldsid.fitting.colour import whiteness
+from fieldsid.fitting.layout import Layout, layout_of
+from fieldsid.fitting.method import Estimator, History, Options, Solution
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.predict import Prediction, refit_own
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.remarks import remarks
+from fieldsid.logs.run import FloatArray, Note
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect, effect_named
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record
+from fieldsid.models.signal_path import fin_path
+from fieldsid.registry import members, pick
+
+SHORTEST = 40
+AUTO = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A fitted model with what it was fitted to: predictions of every run, noise floor, remarks, RLS history."""
+
+    model: Model
+    predictions: tuple[Prediction, ...]
+    floor: Noise
+    correlation: FloatArray
+    notes: tuple[Note, ...]
+    history: History | None = None
+
+    def interval95(self, name: str) -> tuple[float, float]:
+        """Return the 95 % interval of a parameter; for a derived fin offset by propagation."""
+        value, error = self.model.values[name], self.model.std_error(name)
+        return value - 1.96 * error, value + 1.96 * error
+
+
+def estimators() -> Mapping[str, Estimator]:
+    """Return the registered estimators by name."""
+    return members("fieldsid.estimators", "ESTIMATOR")
+
+
+def fit(
+    records: Sequence[Record],
+    axis: Axis,
+    *,
+    method: str = AUTO,
+    effects: Sequence[str] = (),
+    options: Options | None = None,
+) -> Fit:
+    """Return the joint fit of records on one axis.
+
+    method "auto" is output error, and the prediction-error method where the residuals are coloured by a
+    disturbance that does not follow the fin (a missing effect does). Raises DataError for records too short or
+    without fin movement, UsageError for a method that cannot take the effects or several runs.
+    """
+    check(records, axis)
+    parts = tuple(effect_named(name) for name in effects)
+    missing = [f"{e.name} needs {role} ({r.name})" for e in parts for r in records for role in e.needs if role not in r.signals]
+    if missing:
+        raise DataError(
+            "an effect needs a signal the log lacks", found="; ".join(missing), hint="map the signal on import, or leave the effect out"
+        )
+    problem = Problem(tuple(records), layout_of(records, axis, parts))
+    solution = _solve(problem, method, options or Options())
+    return fitted(problem, solution)
+
+
+def _solve(problem: Problem, method: str, options: Options) -> Solution:
+    chosen: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "output_error" if method == AUTO else method)
+    if problem.layout.effects and not chosen.takes_effects:
+        raise UsageError(
+            f"`{chosen.name}` cannot estimate effects",
+            found=", ".join(e.name for e in problem.layout.effects),
+            hint="use `--method output_error`",
+        )
+    if len(problem.records) > 1 and not chosen.joint:
+        raise UsageError(f"`{chosen.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out")
+    solution = chosen.solve(problem, options)
+    if method == AUTO and is_disturbed(problem, solution):
+        refined: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
+        solution = refined.solve(problem, options)
+    if not solution.own_done:
+        x = solution.x
+        for run, record in enumerate(problem.records):
+            x = refit_own(problem, x, run, floor_of([record]))
+        solution = Solution(
+            x, solution.covariance, solution.noise, solution.method, solution.notes, own_done=True, history=solution.history
+        )
+    return solution
+
+
+def is_disturbed(problem: Problem, solution: Solution) -> bool:
+    """Whether the residuals are coloured by a disturbance that does not follow the fin.
+
+    The share of the smoothed rate residual that the fin, its history and the simulated motion explain is small
+    under a disturbance and large under a missing effect, where plain output error keeps the better free run.
+    """
+    if solution.noise.disturbance <= 0.0:
+        return False
+    return follows_fin(problem, solution.x) < 0.5
+
+
+def follows_fin(problem: Problem, x: FloatArray) -> float:
+    """Return the share (0..1) of the low-frequency residual that a 2 s history of the fin explains, over all runs."""
+    explained, total = 0.0, 0.0
+    for run, record in enumerate(problem.records):
+        residual, _ = problem.residual(x, run)
+        channel = 1 if record.rate_ok.any() else 0
+        e = _block_means(residual[channel], record)
+        fin = _block_means(record.fin - record.fin.mean(), record)
+        lags = np.stack([np.concatenate([np.zeros(k), fin[: fin.size - k]]) for k in range(8)])
+        columns = np.concatenate([lags, lags * np.abs(lags), np.ones((1, fin.size))]).T
+        if e.size <= 2 * columns.shape[1]:
+            return 1.0
+        centred = e - e.mean()
+        left = e - columns @ np.linalg.lstsq(columns, e, rcond=1e-9)[0]
+        freedom = (e.size - 1) / (e.size - columns.shape[1])
+        total += float(centred @ centred)
+        explained += float(centred @ centred) - float(left @ left) * freedom
+    return max(explained / total, 0.0) if total > 0 else 1.0
+
+
+def _block_means(values: FloatArray, record: Record) -> FloatArray:
+    """Return means over quarter-second blocks: white sensor noise falls, colour stays."""
+    width = max(1, round(0.25 / float(np.median(record.steps))))
+    count = values.size // width
+    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
+
+
+def check(records: Sequence[Record], axis: Axis) -> None:
+    """Refuse records that no estimator can use; raises DataError."""
+    if not records:
+        raise DataError("there is no run to fit", hint="give at least one log file")
+    for r in records:
+        measured = int(max(r.angle_ok.sum(), r.rate_ok.sum()))
+        if measured < SHORTEST:
+            raise DataError(
+                f"run {r.name!r} is too short to identify {axis.value}",
+                found=f"{measured} measured samples, at least {SHORTEST} are needed",
+                hint="fly at least two pulses of 2 s each, and widen `--from` and `--to`",
+            )
+        if float(np.ptp(r.fin)) == 0.0:
+            raise DataError(
+                f"run {r.name!r} does not excite {axis.value}: the fin never moves",
+                found=f"`{NAMES[axis].fin}` = {r.fin[0]:.4g} rad throughout",
+                hint="fly an excitation: `sysid plan --axis " + axis.value + "`",
+            )
+        measurement = r.rate[r.rate_ok] if r.rate_ok.any() else r.angle[r.angle_ok]
+        if float(np.ptp(measurement)) == 0.0:
+            raise DataError(
+                f"run {r.name!r}: the {axis.value} sensor is constant",
+                found=f"{measurement.size} samples of {measurement[0]:.4g}",
+                hint="check the mapping: `sysid inspect LOG`",
+            )
+
+
+def fitted(problem: Problem, solution: Solution) -> Fit:
+    """Return the fit record of a solution."""
+    floor = floor_of(problem.records)
+    names = problem.layout.names
+    notes = (*solution.notes, *remarks(problem, solution, floor))
+    model = model_of(problem, solution)
+    predictions = tuple(prediction_of(problem, solution.x, run) for run in range(len(problem.records)))
+    sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
+    correlation = solution.covariance / np.outer(sigma, sigma)
+    order = [names.index(n) for n in model.free]
+    return Fit(model, predictions, floor, correlation[np.ix_(order, order)], notes, solution.history)
+
+
+def prediction_of(problem: Problem, x: FloatArray, run: int) -> Prediction:
+    """Return a run's free run at a solution."""
+    motion, _ = problem.simulate(x, run)
+    values = problem.values_of(x, run)
+    fin = fin_path(problem.records[run], problem.layout.effects, values)
+    nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
+    state = (values["angle0"], values["rate0"], values.get("cross0", 0.0))
+    return Prediction(problem.records[run], motion.angle, motion.rate, np.append(fin.start, fin.end[-1]), state, nuisance)
+
+
+def model_of(problem: Problem, solution: Solution) -> Model:
+    """Return the model of a solution, its values at the law's reference speed."""
+    layout, names = problem.layout, NAMES[problem.layout.axis]
+    values = dict(zip(layout.names, solution.x[: layout.shared].tolist(), strict=True))
+    units = {s.name: s.unit for s in layout.slots[: layout.shared]}
+    law = layout.law(values)
+    aside = {n for n in values if n == "damping_exponent" or n.startswith(f"{names.authority}@")}
+    free = tuple(n for n in values if n not in aside)
+    order = [layout.names.index(n) for n in free]
+    p = whiteness(problem, solution.x, solution.noise)
+    sigma = dict(zip(layout.names, np.sqrt(np.maximum(np.diag(solution.covariance), 0.0)).tolist(), strict=True))
+    return Model(
+        axis=layout.axis,
+        effects=tuple(e.name for e in layout.effects),
+        values={n: values[n] for n in free},
+        units={n: units[n] for n in free},
+        free=free,
+        covariance=solution.covariance[np.ix_(order, order)],
+        law=law,
+        noise=solution.noise,
+        trained=trained(problem),
+        method=solution.method,
+        runs=tuple(r.name for r in problem.records),
+        info={"whiteness_p": p, "law_parameters": {n: {"value": values[n], "std_error": sigma[n]} for n in sorted(aside)}},
+    )
+
+
+def trained(problem: Problem) -> dict[str, float]:
+    """Return what the data reached: speeds, largest fin and rate, seconds, longest held fin."""
+    records = problem.records
+    speeds = [r.speed for r in records if np.isfinite(r.speed)]
+    rates = [float(np.max(np.abs(r.rate[r.rate_ok]))) for r in records if r.rate_ok.any()]
+    known = {
+        "speed_low": min(speeds) if speeds else float("nan"),
+        "speed_high": max(speeds) if speeds else float("nan"),
+        "fin_max": max(float(np.max(np.abs(r.fin))) for r in records),
+        "rate_max": max(rates) if rates else float("nan"),
+        "seconds": float(sum(r.time[-1] - r.time[0] for r in records)),
+        "held_s": max(longest_hold(r) for r in records),
+    }
+    roles = {role for r in records for role in r.signals}
+    return known | {f"{role}_mean": float(np.mean([r.signals[role].mean() for r in records if role in r.signals])) for role in sorted(roles)}
+
+
+def longest_hold(record: Record) -> float:
+    """Return the longest time the fin stayed within a tenth of its range while well off its median, in s."""
+    span = float(np.ptp(record.fin))
+    if span == 0.0:
+        return 0.0
+    off = np.abs(record.fin - np.median(record.fin)) > 0.25 * span
+    still = np.abs(np.diff(record.fin, prepend=record.fin[0])) < 0.1 * span
+    edges = np.flatnonzero(~(off & still))
+    edges = np.concatenate([[-1], edges, [len(record)]])
+    longest = int(np.argmax(np.diff(edges)))
+    first, last = edges[longest] + 1, min(edges[longest + 1], len(record)) - 1
+    return float(record.time[last] - record.time[first]) if last > first else 0.0
+
+
+def effects_named(names: Sequence[str]) -> tuple[Effect, ...]:
+    """Return effects by name; raises UsageError for one that is not known."""
+    return tuple(effect_named(n) for n in names)
+
+
+def layout_for(records: Sequence[Record], axis: Axis, effects: Sequence[str]) -> Layout:
+    """Return the layout of a joint fit by effect names."""
+    return layout_of(records, axis, effects_named(effects))

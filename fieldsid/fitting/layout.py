@@ -1,0 +1,133 @@
+"""Which numbers a fit estimates: base and effect parameters shared by runs, and each run's own start and nuisances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect
+from fieldsid.models.record import Record
+from fieldsid.models.speed_law import SpeedLaw
+
+GROUP_WIDTH = 0.06
+"""Runs whose speeds differ by less than this share form one speed group."""
+BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One estimated number: name, unit, bounds, start, and the run it belongs to (-1 when shared)."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    run: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Groups:
+    """Speed groups: mean speed of each, and the group of each run; `reference` is the group the law refers to."""
+
+    speeds: tuple[float, ...]
+    of_run: tuple[int, ...]
+    reference: int
+
+
+def speed_groups(records: Sequence[Record]) -> Groups:
+    """Return the runs' speed groups by single linkage in log speed; one group when any speed is not known."""
+    speeds = np.array([r.speed for r in records])
+    if not np.isfinite(speeds).all() or (speeds <= 0).any():
+        known = speeds[np.isfinite(speeds)]
+        return Groups((float(known.mean()) if known.size else float("nan"),), (0,) * len(records), 0)
+    order = np.argsort(speeds)
+    labels = np.zeros(len(records), dtype=int)
+    for previous, index in zip(order[:-1], order[1:], strict=True):
+        labels[index] = labels[previous] + int(np.log(speeds[index] / speeds[previous]) > GROUP_WIDTH)
+    means = tuple(float(speeds[labels == g].mean()) for g in range(labels.max() + 1))
+    reference = int(np.argmin(np.abs(np.log(np.array(means) / np.median(speeds)))))
+    return Groups(means, tuple(int(g) for g in labels), reference)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The slots of a fit in their order, and where the parts of the vector are."""
+
+    axis: Axis
+    effects: tuple[Effect, ...]
+    groups: Groups
+    slots: tuple[Slot, ...]
+    shared: int
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the shared slots."""
+        return [s.name for s in self.slots[: self.shared]]
+
+    @property
+    def low(self) -> FloatArray:
+        """Lower bounds, (N,)."""
+        return np.array([s.low for s in self.slots])
+
+    @property
+    def high(self) -> FloatArray:
+        """Upper bounds, (N,)."""
+        return np.array([s.high for s in self.slots])
+
+    def of_run(self, run: int) -> list[int]:
+        """Return the positions of a run's own slots."""
+        return [i for i, s in enumerate(self.slots) if s.run == run]
+
+    def law(self, values: dict[str, float]) -> SpeedLaw:
+        """Return the speed law of a vector of shared values."""
+        names = NAMES[self.axis]
+        g = self.groups
+        reference = g.speeds[g.reference]
+        if len(g.speeds) == 1:
+            return SpeedLaw(reference)
+        points = tuple((u, values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
+        return SpeedLaw(reference, values["damping_exponent"], 2.0, points)
+
+
+def group_name(authority: str, groups: Groups, index: int) -> str:
+    """Return the name of a group's authority; the reference group's is the plain name."""
+    return authority if index == groups.reference else f"{authority}@{groups.speeds[index]:.3g}"
+
+
+def layout_of(records: Sequence[Record], axis: Axis, effects: Sequence[Effect]) -> Layout:
+    """Return the slots of a joint fit of records with effects."""
+    names, groups = NAMES[axis], speed_groups(records)
+    slots = [Slot(names.damping, "1/s", *BASE_BOUNDS["damping"], 1.0)]
+    if names.stiffness is not None:
+        slots.append(Slot(names.stiffness, "1/s^2", *BASE_BOUNDS["stiffness"], 0.1))
+    slots += [
+        Slot(group_name(names.authority, groups, i), "1/s^2", *BASE_BOUNDS["authority"], 0.0) for i in range(len(groups.speeds))
+    ]
+    slots.append(Slot(names.trim, "rad/s^2", *BASE_BOUNDS["trim"], 0.0))
+    if len(groups.speeds) > 1:
+        slots.append(Slot("damping_exponent", "1", -1.0, 3.0, 1.0))
+    slots += [Slot(c.name, c.unit, c.low, c.high, c.start) for e in effects for c in e.shared]
+    shared = len(slots)
+    for i, record in enumerate(records):
+        slots += _own_slots(i, record, effects)
+    return Layout(axis, tuple(effects), groups, tuple(slots), shared)
+
+
+def _own_slots(run: int, record: Record, effects: Sequence[Effect]) -> list[Slot]:
+    angle = _first(record.angle, record.angle_ok)
+    rate = _first(record.rate, record.rate_ok)
+    slots = [Slot("angle0", "rad", -1e4, 1e4, angle, run), Slot("rate0", "rad/s", -10.0, 10.0, rate, run)]
+    if any(e.extra_states for e in effects):
+        slots.append(Slot("cross0", "rad/s^2", -10.0, 10.0, 0.0, run))
+    return slots + [Slot(c.name, c.unit, c.low, c.high, c.start, run) for e in effects for c in e.nuisance]
+
+
+def _first(values: FloatArray, ok: FloatArray) -> float:
+    """Return the mean of the first few measured samples."""
+    index = np.flatnonzero(ok)[:5]
+    return float(values[index].mean()) if index.size else 0.0

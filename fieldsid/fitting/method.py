@@ -1,0 +1,71 @@
+"""The contract of an estimator: a name, a sentence, and a function from a problem to a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fieldsid.fitting.problem import Problem
+from fieldsid.logs.run import FloatArray, Note
+from fieldsid.models.model import Noise
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Parameters over time of a recursive estimator: time (m,) s, values and std_errors (m, p), settle time of each."""
+
+    time: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+    std_errors: FloatArray
+    settled_s: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """What an estimator found: vector (N,) of the layout, covariance (S, S) of its shared slots, noise, remarks.
+
+    A shared slot that was not estimated has zero variance. `own_done` is false where the runs' initial states
+    are still at their start values.
+    """
+
+    x: FloatArray
+    covariance: FloatArray
+    noise: Noise
+    method: str
+    notes: tuple[Note, ...] = ()
+    own_done: bool = True
+    history: History | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a user may set: filter bandwidth lambda (rad/s), forgetting factor of the recursive method."""
+
+    bandwidth: float = 4.0
+    forgetting: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Estimator:
+    """One method; `takes_effects` tells whether it can estimate effects, `joint` whether several runs at once."""
+
+    name: str
+    says: str
+    source: str
+    solve: Callable[[Problem, Options], Solution]
+    takes_effects: bool = True
+    joint: bool = True
+    info: Mapping[str, str] = field(default_factory=dict)
+
+
+def shared_covariance(problem: Problem, full: FloatArray, free: tuple[int, ...]) -> FloatArray:
+    """Return the block (S, S) of a covariance (F, F) over free slots that belongs to the shared slots."""
+    count = problem.layout.shared
+    out = np.zeros((count, count))
+    keep = [i for i, slot in enumerate(free) if slot < count]
+    where = [free[i] for i in keep]
+    out[np.ix_(where, where)] = full[np.ix_(keep, keep)]
+    return out

@@ -1,0 +1,139 @@
+"""Noise estimated from data: the white floor by high-order differences, and the full noise model by likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import comb
+
+import numpy as np
+from scipy.optimize import minimize
+
+from fieldsid.fitting.whitening import NOISE_FIELDS, innovations
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+ORDER = 3
+SMALLEST_ANGLE = 1e-7
+SMALLEST_RATE = 1e-7
+
+
+def white_floor(values: FloatArray, ok: FloatArray) -> float:
+    """Return the white-noise standard deviation of a smooth signal from its third differences.
+
+    A polynomial of degree 2 leaves nothing in them, white noise leaves binom(6, 3) times its variance; a
+    trimmed mean keeps the kinks at fin steps out. Returns NaN with fewer than 20 samples in a row.
+    """
+    d = np.diff(values, ORDER)
+    whole = np.lib.stride_tricks.sliding_window_view(ok, ORDER + 1).all(axis=1)
+    d = d[whole]
+    if d.size < 20:
+        return float("nan")
+    square = np.sort(d * d)
+    keep = square[: int(0.9 * square.size)]
+    # E[x^2 | x^2 < q90] of a standard normal is 0.5849: the trimmed mean made unbiased
+    full, trimmed = float(square.mean()), float(keep.mean()) / 0.5849
+    return float(np.sqrt(max(min(full, trimmed), 0.0) / comb(2 * ORDER, ORDER)))
+
+
+def floor_of(records: Sequence[Record]) -> Noise:
+    """Return the white sensor noise of both channels, pooled over runs."""
+    angle = _pooled([white_floor(r.angle, r.angle_ok) for r in records])
+    rate = _pooled([white_floor(r.rate, r.rate_ok) for r in records])
+    return Noise(max(angle, SMALLEST_ANGLE), max(rate, SMALLEST_RATE))
+
+
+def _pooled(values: list[float]) -> float:
+    known = [v for v in values if np.isfinite(v)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known else 0.0
+
+
+FAMILIES: dict[str, tuple[str, ...]] = {
+    "white": ("angle", "rate"),
+    "disturbance": ("angle", "rate", "disturbance", "disturbance_time"),
+    "coloured": ("angle", "rate", "coloured_angle", "coloured_rate", "coloured_time"),
+    "both": NOISE_FIELDS,
+}
+LOW = {
+    "angle": SMALLEST_ANGLE, "rate": SMALLEST_RATE, "disturbance": 1e-7, "disturbance_time": 0.1,
+    "coloured_angle": 1e-7, "coloured_rate": 1e-7, "coloured_time": 0.05,
+}  # fmt: skip
+HIGH = {
+    "angle": 1.0, "rate": 1.0, "disturbance": 10.0, "disturbance_time": 30.0,
+    "coloured_angle": 1.0, "coloured_rate": 1.0, "coloured_time": 30.0,
+}  # fmt: skip
+
+
+def log_likelihood(
+    records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: FloatArray
+) -> float:
+    """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise vector (7,)."""
+    total = 0.0
+    for record, (a, k), e in zip(records, dynamics, residuals, strict=True):
+        out = np.empty((1, *e.shape))
+        logs = innovations(record.steps, record.angle_ok, record.rate_ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
+        total -= 0.5 * (logs + float(np.vdot(out, out)))
+    return total
+
+
+def estimate_noise(
+    records: Sequence[Record],
+    dynamics: Sequence[tuple[float, float]],
+    residuals: Sequence[FloatArray],
+    family: str,
+    start: Noise,
+) -> tuple[Noise, float]:
+    """Return the noise of a family with the highest likelihood, and that log likelihood.
+
+    dynamics are (damping, stiffness) of each run's base model; start gives where the search begins.
+    """
+    names = FAMILIES[family]
+    floor = floor_of(records)
+    rough = _rough_start(records, dynamics, residuals, floor, start)
+    off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
+    low = np.log([LOW[n] for n in names])
+    high = np.log([HIGH[n] for n in names])
+
+    def vector(x: FloatArray) -> FloatArray:
+        known = off | dict(zip(names, np.exp(x), strict=True))
+        return np.array([known[n] for n in NOISE_FIELDS])
+
+    def cost(x: FloatArray) -> float:
+        value = -log_likelihood(records, dynamics, residuals, vector(x))
+        return value if np.isfinite(value) else 1e15
+
+    x0 = np.clip(np.log([rough[n] for n in names]), low, high)
+    best = minimize(
+        cost, x0, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
+        options={"maxiter": 40, "eps": 1e-4, "ftol": 1e-9},
+    )  # fmt: skip
+    known = off | dict(zip(names, np.exp(best.x), strict=True))
+    return Noise(**{n: float(known[n]) for n in NOISE_FIELDS}), float(-best.fun)
+
+
+def _rough_start(
+    records: Sequence[Record],
+    dynamics: Sequence[tuple[float, float]],
+    residuals: Sequence[FloatArray],
+    floor: Noise,
+    start: Noise,
+) -> dict[str, float]:
+    rms_angle = _rms([e[0][r.angle_ok] for e, r in zip(residuals, records, strict=True)])
+    rms_rate = _rms([e[1][r.rate_ok] for e, r in zip(residuals, records, strict=True)])
+    extra = max(float(np.sqrt(max(rms_rate**2 - floor.rate**2, 0.0))), 0.1 * floor.rate)
+    a = max(float(np.mean([max(d[0], 0.1) for d in dynamics])), 0.1)
+    spare = max(float(np.sqrt(max(rms_angle**2 - floor.angle**2, 0.0))), 0.1 * floor.angle)
+    return {
+        "angle": floor.angle,
+        "rate": floor.rate,
+        "disturbance": start.disturbance if start.disturbance > 0 else a * extra + 1e-6,
+        "disturbance_time": start.disturbance_time,
+        "coloured_angle": start.coloured_angle if start.coloured_angle > 0 else 0.5 * spare,
+        "coloured_rate": start.coloured_rate if start.coloured_rate > 0 else 0.5 * extra,
+        "coloured_time": start.coloured_time,
+    }
+
+
+def _rms(parts: list[FloatArray]) -> float:
+    values = np.concatenate(parts) if parts else np.zeros(0)
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -1,0 +1,125 @@
+"""A model's free run on a record, its initial state and per-run nuisances refitted, its parameters not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from fieldsid.errors import ModelError
+from fieldsid.fitting.descent import cost_of, descend
+from fieldsid.fitting.layout import Groups, Layout, Slot, layout_of
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record
+from fieldsid.models.signal_path import fin_path
+from fieldsid.models.simulate import effects_of
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances."""
+
+    record: Record
+    angle: FloatArray
+    rate: FloatArray
+    fin: FloatArray
+    state: tuple[float, float, float]
+    nuisance: Mapping[str, float]
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus simulated, (2, n), zero where nothing was measured."""
+        r = self.record
+        return np.stack([np.where(r.angle_ok, r.angle - self.angle, 0.0), np.where(r.rate_ok, r.rate - self.rate, 0.0)])
+
+
+def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
+    """Return a model's free run on a record; raises ModelError when it grows without bound."""
+    problem, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
+    x = refit_own(problem, x, 0, floor_of([record]))
+    motion, _ = problem.simulate(x, 0)
+    if not np.isfinite(motion.rate).all():
+        at = float(record.time[np.argmin(np.isfinite(motion.rate))])
+        raise ModelError(
+            f"the model grows without bound on run {record.name!r}",
+            found=f"diverged at t = {at:.2f} s",
+            hint="the model is unstable there: identify again, or add quadratic damping: `--effects quadratic_damping`",
+        )
+    values = problem.values_of(x, 0)
+    fin = fin_path(record, problem.layout.effects, values)
+    nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
+    state = (values["angle0"], values["rate0"], values.get("cross0", 0.0))
+    return Prediction(record, motion.angle, motion.rate, np.append(fin.start, fin.end[-1]), state, nuisance)
+
+
+def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
+    """Return a problem of one record whose shared slots hold the model's values at the record's speed."""
+    names = NAMES[model.axis]
+    layout = layout_of([record], model.axis, effects)
+    reference = model.law.reference
+    layout = Layout(layout.axis, layout.effects, Groups((reference,), (0,), 0), layout.slots, layout.shared)
+    at_speed = model.at_speed(record.speed)
+    scale = model.law.scale(record.speed)
+    # the frozen layout scales damping by s and authority by s^2: divide that out of the law's own values
+    values = dict(model.values) | at_speed
+    values[names.damping] /= scale
+    values[names.authority] /= scale**2
+    x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
+    return Problem((record,), layout), x
+
+
+def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatArray:
+    """Return x with a run's own slots (initial state, phases, event times) at their best, the rest untouched."""
+    own = problem.layout.of_run(run)
+    alone = Problem((problem.records[run],), _layout_of_one(problem.layout, run))
+    keep = [*range(problem.layout.shared), *own]
+    best: FloatArray | None = None
+    lowest = float("inf")
+    for start in scanned_starts(alone, x[keep]):
+        found = descend(alone, start, noise, free=range(problem.layout.shared, len(keep)), rounds=15)
+        if found.cost < lowest:
+            best, lowest = found.x, found.cost
+    out = x.copy()
+    if best is not None:
+        out[keep] = best
+    return out
+
+
+def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    """Return starts with every per-run nuisance at the best point of its scan grid, and x itself."""
+    layout = problem.layout
+    grids = {
+        i: c.scan
+        for i, s in enumerate(layout.slots)
+        if s.run >= 0
+        for e in layout.effects
+        for c in e.nuisance
+        if c.name == s.name and c.scan
+    }
+    if not grids:
+        return [x]
+    noise = floor_of(problem.records)
+    scored = []
+    for point in product(*grids.values()):
+        trial = x.copy()
+        trial[list(grids)] = point
+        scored.append((cost_of(problem, trial, noise), tuple(point), trial))
+    scored.sort(key=lambda item: item[:2])
+    return [x, *[trial for _, _, trial in scored[:2]]]
+
+
+def _layout_of_one(layout: Layout, run: int) -> Layout:
+    slots = [*layout.slots[: layout.shared], *[_moved(layout.slots[i]) for i in layout.of_run(run)]]
+    groups = Groups(layout.groups.speeds, (layout.groups.of_run[run],), layout.groups.reference)
+    return Layout(layout.axis, layout.effects, groups, tuple(slots), layout.shared)
+
+
+def _moved(slot: Slot) -> Slot:
+    return Slot(slot.name, slot.unit, slot.low, slot.high, slot.start, 0)

@@ -1,0 +1,257 @@
+"""A joint fit as a function: parameters in, free-run residuals and exact sensitivities of every run out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.layout import Layout, group_name
+from fieldsid.logs.run import FloatArray
+from fieldsid.models import kernels
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Coefficient, Motion
+from fieldsid.models.record import Record
+from fieldsid.models.signal_path import Assembled, Base, assemble, lift, measured, run_core, with_moments
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """One run's free run: measured-like angle and rate (n,), residual (2, n), sensitivities (P, 2, n) of `slots`."""
+
+    angle: FloatArray
+    rate: FloatArray
+    residual: FloatArray
+    slots: tuple[int, ...]
+    sensitivity: FloatArray
+    base: Base
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Records and the layout of what is estimated from them."""
+
+    records: tuple[Record, ...]
+    layout: Layout
+
+    def base_of(self, x: FloatArray, run: int) -> Base:
+        """Return a run's base parameters."""
+        names, layout = NAMES[self.layout.axis], self.layout
+        v = dict(zip(layout.names, x[: layout.shared], strict=True))
+        group = layout.groups.of_run[run]
+        share, ratio = self._scales(run)
+        return Base(
+            v[names.damping] * share ** v.get("damping_exponent", 1.0),
+            0.0 if names.stiffness is None else v[names.stiffness],
+            v[group_name(names.authority, layout.groups, group)] * ratio**2,
+            v[names.trim],
+        )
+
+    def _scales(self, run: int) -> tuple[float, float]:
+        """Return speed over reference speed, and speed over the speed of the run's own group."""
+        g, speed = self.layout.groups, self.records[run].speed
+        if not np.isfinite(speed) or not np.isfinite(g.speeds[g.reference]):
+            return 1.0, 1.0
+        return speed / g.speeds[g.reference], speed / g.speeds[g.of_run[run]]
+
+    def values_of(self, x: FloatArray, run: int) -> dict[str, float]:
+        """Return the effects' coefficients as a run sees them."""
+        layout = self.layout
+        own = {layout.slots[i].name: float(x[i]) for i in layout.of_run(run)}
+        return dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
+
+    def start_of(self, values: dict[str, float]) -> FloatArray:
+        """Return the initial state among a run's values."""
+        return np.array([values["angle0"], values["rate0"], values.get("cross0", 0.0)])
+
+    def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
+        """Return one run's free run as the sensors would show it."""
+        record, effects = self.records[run], self.layout.effects
+        base, values = self.base_of(x, run), self.values_of(x, run)
+        start = self.start_of(values)
+        arrays = assemble(record, effects, base, values, self._scales(run)[0])
+        arrays = with_moments(record, arrays, effects, values, start)
+        out = run_core(record, arrays, start)
+        return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
+
+    def residual(self, x: FloatArray, run: int) -> tuple[FloatArray, Base]:
+        """Return measured minus simulated, (2, n), zero where nothing was measured; and the run's base."""
+        motion, base = self.simulate(x, run)
+        return _difference(self.records[run], motion), base
+
+    def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
+        """Return one run's free run with its sensitivities to the free slots that touch it."""
+        record, layout = self.records[run], self.layout
+        values, base = self.values_of(x, run), self.base_of(x, run)
+        start, scale = self.start_of(values), self._scales(run)[0]
+        wanted = set(range(len(x)) if free is None else free)
+        slots = tuple(i for i in (*range(layout.shared), *layout.of_run(run)) if i in wanted and self._touches(i, run))
+        raw = assemble(record, layout.effects, base, values, scale)
+        arrays = with_moments(record, raw, layout.effects, values, start)
+        pushes = _Pushes(self, run, base, values, start, scale, raw, arrays)
+        out, sens = pushes.integrate(slots)
+        motion = Motion(out[:, 0], out[:, 1])
+        shown, sens = pushes.through_sensors(motion, slots, sens)
+        return RunResult(shown.angle, shown.rate, _difference(record, shown), slots, sens, base)
+
+    def _touches(self, slot: int, run: int) -> bool:
+        """Whether a shared slot enters a run: another speed group's authority does not."""
+        names, g = NAMES[self.layout.axis], self.layout.groups
+        name = self.layout.slots[slot].name
+        if name == names.authority or name.startswith(f"{names.authority}@"):
+            return name == group_name(names.authority, g, g.of_run[run])
+        return True
+
+    def start(self) -> FloatArray:
+        """Return the start vector of the layout."""
+        return np.array([s.start for s in self.layout.slots])
+
+
+def _difference(record: Record, motion: Motion) -> FloatArray:
+    return np.stack(
+        [
+            np.where(record.angle_ok, record.angle - motion.angle, 0.0),
+            np.where(record.rate_ok, record.rate - motion.rate, 0.0),
+        ]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Pushes:
+    """What each slot does to the core's arrays of one run: the input of its tangents."""
+
+    problem: Problem
+    run: int
+    base: Base
+    values: dict[str, float]
+    start: FloatArray
+    scale: float
+    raw: Assembled
+    arrays: Assembled
+
+    @property
+    def record(self) -> Record:
+        return self.problem.records[self.run]
+
+    def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+        """Return motion (n, 3) and sensitivities (P, 2, n) before the sensor."""
+        n, count = len(self.record), len(slots)
+        rows: list[FloatArray] = []
+        which = np.full(count, -1.0)
+        d_c = np.zeros((count, len(kernels.CONSTANTS)))
+        d_start = np.zeros((count, 3))
+        for j, slot in enumerate(slots):
+            name = self.problem.layout.slots[slot].name
+            if name in STATE_NAMES:
+                d_start[j, STATE_NAMES.index(name)] = 1.0
+                continue
+            d_drive, constants = self._push(name)
+            d_c[j] = constants
+            if d_drive is not None:
+                which[j] = len(rows)
+                rows.append(d_drive)
+        d_drive_all = np.stack(rows) if rows else np.zeros((0, n - 1, len(kernels.DRIVES)))
+        out, sens = np.empty((n, 3)), np.empty((count, 2, n))
+        a = self.arrays
+        kernels.tangents(
+            self.record.steps, a.drive, a.constants, self.start, a.pieces, d_drive_all, which, d_c, d_start, out, sens
+        )
+        return out, sens
+
+    def _push(self, name: str) -> tuple[FloatArray | None, FloatArray]:
+        names = NAMES[self.problem.layout.axis]
+        none = np.zeros(len(kernels.CONSTANTS))
+        share, ratio = self.problem._scales(self.run)
+        exponent = self.values.get("damping_exponent", 1.0)
+        if name == names.damping:
+            return self._damping(share**exponent), none
+        if name == "damping_exponent":
+            return self._damping(self.base.damping * float(np.log(share))), none
+        if name == names.authority or name.startswith(f"{names.authority}@"):
+            return self._authority(ratio**2), none
+        d = np.zeros_like(self.arrays.drive)
+        if name == names.stiffness:
+            d[:, 1] = 1.0
+            return d, none
+        if name == names.trim:
+            d[:, 2:4] = 1.0
+            return d, none
+        return self._of_effect(name)
+
+    def _damping(self, factor: float) -> FloatArray:
+        d = np.zeros_like(self.arrays.drive)
+        shape = self.arrays.terms.damping_factor
+        d[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1] + shape[1:])
+        return d
+
+    def _authority(self, factor: float) -> FloatArray:
+        d = np.zeros_like(self.arrays.drive)
+        start, end = lift(self.arrays.fin, self.arrays.terms)
+        d[:, 2], d[:, 3] = factor * start, factor * end
+        return d
+
+    def _of_effect(self, name: str) -> tuple[FloatArray | None, FloatArray]:
+        """Central difference of the arrays by an effect's coefficient; they are cheap, and no motion enters."""
+        layout, coefficient = self.problem.layout, self._coefficient(name)
+        owner = [e for e in layout.effects if any(c.name == name for c in e.coefficients)]
+        if owner[0].measure is not None:
+            return None, np.zeros(len(kernels.CONSTANTS))
+        step = coefficient.step
+        high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
+        ends = []
+        for value in (high, low):
+            shifted = self.values | {name: value}
+            arrays = assemble(self.record, layout.effects, self.base, shifted, self.scale)
+            ends.append(self._with_own_moment(arrays, shifted))
+        width = high - low
+        d_drive = (ends[0].drive - ends[1].drive) / width
+        d_c = (ends[0].constants - ends[1].constants) / width
+        return (d_drive if d_drive.any() else None), d_c
+
+    def _with_own_moment(self, arrays: Assembled, values: dict[str, float]) -> Assembled:
+        """Add the state-dependent moments along the converged motion, their slopes left out of the difference."""
+        own = [e for e in self.problem.layout.effects if e.moment is not None]
+        if not own:
+            return arrays
+        path = run_core(self.record, self.arrays, self.start)
+        drive = arrays.drive.copy()
+        for effect in own:
+            if effect.moment is not None:
+                value = effect.moment(Motion(path[:, 0], path[:, 1]), values, self.record)
+                drive[:, 2] += value[:-1]
+                drive[:, 3] += value[1:]
+        return Assembled(drive, arrays.constants, arrays.pieces, arrays.fin, arrays.terms)
+
+    def _coefficient(self, name: str) -> Coefficient:
+        return next(c for e in self.problem.layout.effects for c in e.coefficients if c.name == name)
+
+    def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> tuple[Motion, FloatArray]:
+        """Return what the sensors show, with the sensitivities carried through them by directional differences."""
+        effects = self.problem.layout.effects
+        if all(e.measure is None for e in effects):
+            return motion, sens
+        shown = measured(motion, self.record, effects, self.values)
+        out = np.empty_like(sens)
+        sensor_names = {c.name: c for e in effects if e.measure is not None for c in e.coefficients}
+        for j, slot in enumerate(slots):
+            name = self.problem.layout.slots[slot].name
+            if name in sensor_names:
+                step = sensor_names[name].step
+                plus = measured(motion, self.record, effects, self.values | {name: self.values[name] + step})
+                minus = measured(motion, self.record, effects, self.values | {name: self.values[name] - step})
+            else:
+                size = float(np.max(np.abs(sens[j])))
+                step = 1e-6 / size if size > 0 else 1.0
+                plus = measured(_moved(motion, sens[j], step), self.record, effects, self.values)
+                minus = measured(_moved(motion, sens[j], -step), self.record, effects, self.values)
+            out[j, 0] = (plus.angle - minus.angle) / (2 * step)
+            out[j, 1] = (plus.rate - minus.rate) / (2 * step)
+        return shown, out
+
+
+STATE_NAMES = ("angle0", "rate0", "cross0")
+
+
+def _moved(motion: Motion, direction: FloatArray, step: float) -> Motion:
+    return Motion(motion.angle + step * direction[0], motion.rate + step * direction[1])

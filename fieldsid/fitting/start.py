@@ -1,0 +1,100 @@
+"""Start values without simulation: the equation of motion integrated over short windows, by least squares.
+
+    p(t+W) - p(t) = -a int p - k int y + b int delta + C W
+with the fin held and the measurement straight between samples: no derivative of noise is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.fitting.layout import Layout, group_name
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES
+from fieldsid.models.record import Record
+
+WINDOW_S = 0.6
+
+
+def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
+    """Return the layout's start vector with the base parameters from windowed equation error."""
+    x = np.array([s.start for s in layout.slots])
+    names, groups = NAMES[layout.axis], layout.groups
+    columns = [s.name for s in layout.slots[: layout.shared]]
+    base = [names.damping, *([] if names.stiffness is None else [names.stiffness])]
+    base += [group_name(names.authority, groups, i) for i in range(len(groups.speeds))] + [names.trim]
+    rows, targets = [], []
+    for run, record in enumerate(records):
+        block, target = _windows(record, names.stiffness is not None)
+        full = np.zeros((len(target), len(base)))
+        share = _share(record.speed, groups.speeds[groups.reference])
+        full[:, 0] = block[:, 0] * share
+        if names.stiffness is not None:
+            full[:, 1] = block[:, 1]
+        full[:, base.index(group_name(names.authority, groups, groups.of_run[run]))] = block[:, 2]
+        full[:, -1] = block[:, 3]
+        rows.append(full)
+        targets.append(target)
+    matrix, target = np.concatenate(rows), np.concatenate(targets)
+    if len(target) < len(base):
+        return x
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
+    solution = np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale
+    for name, value in zip(base, solution, strict=True):
+        slot = layout.slots[columns.index(name)]
+        x[columns.index(name)] = float(np.clip(value, max(slot.low, -0.5) if name == base[0] else slot.low, slot.high))
+    return x
+
+
+def _share(speed: float, reference: float) -> float:
+    ok = np.isfinite(speed) and np.isfinite(reference)
+    return float(speed / reference) if ok else 1.0
+
+
+def _windows(record: Record, stiff: bool) -> tuple[FloatArray, FloatArray]:
+    """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of one run."""
+    h = record.steps
+    rate, ok = _rate(record)
+    angle = np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
+    count = max(2, round(WINDOW_S / float(np.median(h))))
+    if len(record) <= count + 2:
+        return np.zeros((0, 4)), np.zeros(0)
+    sums = [_integral(0.5 * (v[:-1] + v[1:]) * h) for v in (rate, angle)]
+    fin = _integral(record.commanded.mean * h)
+    time = record.time - record.time[0]
+    span = slice(count, None), slice(None, -count)
+    parts = [s[span[0]] - s[span[1]] for s in (*sums, fin, time)]
+    smooth = _smoothed(rate)
+    target = smooth[span[0]] - smooth[span[1]]
+    good = _whole(ok, count)
+    block = np.column_stack([-parts[0], -parts[1] if stiff else 0 * parts[1], parts[2], parts[3]])
+    return block[good], target[good]
+
+
+def _rate(record: Record) -> tuple[FloatArray, FloatArray]:
+    """Return the measured rate, or the smoothed slope of the angle where there is none."""
+    if record.rate_ok.any():
+        known = record.rate_ok
+        return np.interp(record.time, record.time[known], record.rate[known]), known
+    known = record.angle_ok
+    angle = _smoothed(np.interp(record.time, record.time[known], record.angle[known]), 9)
+    return np.gradient(angle, record.time), known
+
+
+def _smoothed(values: FloatArray, width: int = 5) -> FloatArray:
+    width = min(width, values.size)
+    kernel = np.ones(width) / width
+    weight = np.convolve(np.ones_like(values), kernel, mode="same")
+    return np.asarray(np.convolve(values, kernel, mode="same") / weight)
+
+
+def _whole(ok: FloatArray, count: int) -> FloatArray:
+    missing = _integral((~ok.astype(bool)).astype(float))[: ok.size]
+    total = np.append(missing, missing[-1] + float(not ok[-1]))[: ok.size + 1]
+    return np.asarray((total[count : ok.size] - total[: ok.size - count]) < 0.2 * count)
+
+
+def _integral(values: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(values)])

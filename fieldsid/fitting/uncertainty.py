@@ -1,0 +1,85 @@
+"""Standard errors of free-run least squares when the residuals are not white.
+
+With normal matrix N = sum J' W J and residual covariance S the estimate's covariance is N^-1 (J' W S W J) N^-1.
+S is that of the fitted noise model (AR(1) moment through the base dynamics, AR(1) sensor noise, white noise); the
+middle is summed exactly by the adjoint of the noise's state recursion, no stationarity assumed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.fitting.whitening import noise_vector, transition
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.jit import jit
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+
+@jit
+def _middle(
+    steps: FloatArray,
+    angle_ok: npt.NDArray[np.bool_],
+    rate_ok: npt.NDArray[np.bool_],
+    a: float,
+    k: float,
+    noise: FloatArray,
+    weighted: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Add J' W S W J of one run to out (P, P); weighted (P, 2, n) is W J."""
+    count, n = weighted.shape[0], weighted.shape[2]
+    adjoint = np.zeros((count, 5))
+    nxt = np.zeros(5)
+    for i in range(n - 1, -1, -1):
+        if i < n - 1:
+            h = steps[i]
+            yy, yp, py, pp, wy, wp = transition(a, k, h)
+            rho, col = np.exp(-h / noise[3]), np.exp(-h / noise[6])
+            q2 = noise[2] ** 2 * (1.0 - rho * rho)
+            q3 = noise[4] ** 2 * (1.0 - col * col)
+            q4 = noise[5] ** 2 * (1.0 - col * col)
+            for j in range(count):
+                for l in range(j + 1):
+                    out[j, l] += (
+                        q2 * adjoint[j, 2] * adjoint[l, 2]
+                        + q3 * adjoint[j, 3] * adjoint[l, 3]
+                        + q4 * adjoint[j, 4] * adjoint[l, 4]
+                    )
+            for j in range(count):
+                s = adjoint[j]
+                nxt[0] = yy * s[0] + py * s[1]
+                nxt[1] = yp * s[0] + pp * s[1]
+                nxt[2] = wy * s[0] + wp * s[1] + rho * s[2]
+                nxt[3] = col * s[3]
+                nxt[4] = col * s[4]
+                for l in range(5):
+                    adjoint[j, l] = nxt[l]
+        for ch in range(2):
+            ok = angle_ok[i] if ch == 0 else rate_ok[i]
+            if not ok:
+                continue
+            for j in range(count):
+                g = weighted[j, ch, i]
+                adjoint[j, ch] += g
+                adjoint[j, ch + 3] += g
+                for l in range(j + 1):
+                    out[j, l] += noise[ch] ** 2 * g * weighted[l, ch, i]
+    for j in range(count):
+        for l in range(j + 1):
+            out[j, l] += (
+                noise[2] ** 2 * adjoint[j, 2] * adjoint[l, 2]
+                + noise[4] ** 2 * adjoint[j, 3] * adjoint[l, 3]
+                + noise[5] ** 2 * adjoint[j, 4] * adjoint[l, 4]
+            )
+
+
+def middle(record: Record, noise: Noise, damping: float, stiffness: float, weighted: FloatArray) -> FloatArray:
+    """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise model."""
+    out = np.zeros((weighted.shape[0], weighted.shape[0]))
+    _middle(
+        record.steps, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise),
+        np.ascontiguousarray(weighted), out,
+    )  # fmt: skip
+    return np.asarray(out + np.tril(out, -1).T)

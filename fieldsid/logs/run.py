@@ -1,0 +1,113 @@
+"""A Run: the clean log of one test run, SI and radians, NED and forward-starboard-down, on one clock.
+
+Signals carry the canonical column names, the only names inside the package. A sample where a sensor gave
+nothing is NaN: gaps stay gaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import DataError
+
+FloatArray = npt.NDArray[np.float64]
+
+SIGNALS: Mapping[str, str] = MappingProxyType(
+    {
+        "yaw_rad": "rad",
+        "yaw_rate_rad_s": "rad/s",
+        "pitch_rad": "rad",
+        "pitch_rate_rad_s": "rad/s",
+        "roll_rad": "rad",
+        "roll_rate_rad_s": "rad/s",
+        "depth_m": "m",
+        "surge_m_s": "m/s",
+        "sway_m_s": "m/s",
+        "heave_m_s": "m/s",
+        "x_m": "m",
+        "y_m": "m",
+        "rudder_rad": "rad",
+        "elevator_rad": "rad",
+        "rudder_measured_rad": "rad",
+        "elevator_measured_rad": "rad",
+        "thrust": "",
+        "thrust_ratio": "1",
+        "propeller_rpm": "1/min",
+    }
+)
+"""Canonical signal names and their units; `thrust` may be in any unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """One remark on the quality of a log or a fit: a code, a sentence, and the number behind it."""
+
+    code: str
+    message: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One log: time (n,) in s strictly increasing, and signals (n,) by canonical name, NaN where missing."""
+
+    name: str
+    time: FloatArray
+    signals: Mapping[str, FloatArray]
+    source: Path | None = None
+    notes: tuple[Note, ...] = ()
+
+    def __post_init__(self) -> None:
+        time = frozen(self.time)
+        signals = {k: frozen(v) for k, v in self.signals.items()}
+        if time.ndim != 1 or any(v.shape != time.shape for v in signals.values()):
+            raise DataError(f"run {self.name!r}: every signal must have the shape of time", found=f"time {time.shape}")
+        if time.size > 1 and not bool(np.all(np.diff(time) > 0)):
+            raise DataError(f"run {self.name!r}: time does not increase", hint="import the log again with `sysid import`")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "signals", MappingProxyType(signals))
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    def has(self, name: str) -> bool:
+        """Whether a signal is in the log with at least one finite sample."""
+        values = self.signals.get(name)
+        return values is not None and bool(np.isfinite(values).any())
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a signal (n,); raises DataError naming what the log holds."""
+        if name not in self.signals:
+            raise DataError(
+                f"run {self.name!r} has no signal `{name}`",
+                found=", ".join(sorted(self.signals)) or "no signals",
+                hint="map it on import: `sysid inspect LOG`",
+            )
+        return self.signals[name]
+
+    def between(self, start_s: float, end_s: float) -> Run:
+        """Return the part with start_s <= time <= end_s; raises DataError when nothing is left."""
+        keep = (self.time >= start_s - 1e-9) & (self.time <= end_s + 1e-9)
+        if keep.sum() < 2:
+            raise DataError(
+                f"run {self.name!r} has no samples between {start_s:g} and {end_s:g} s",
+                found=f"time runs from {self.time[0]:g} to {self.time[-1]:g} s" if self.time.size else "an empty log",
+                hint="change `--from` and `--to`",
+            )
+        return Run(self.name, self.time[keep], {k: v[keep] for k, v in self.signals.items()}, self.source, self.notes)
+
+
+def frozen(values: npt.ArrayLike) -> FloatArray:
+    """Return a read-only float64 copy or view of an array."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.copy() if array is values else array
+        array.setflags(write=False)
+    return array

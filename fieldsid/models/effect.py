@@ -1,0 +1,182 @@
+"""The contract of a physical effect: everything any command may ask of it, in one frozen record.
+
+Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The core integrates
+    angle' = p
+    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| - crossflow F(w, p)
+         + heading_sin sin(angle) + heading_cos cos(angle) + righting_sin (angle - sin angle)
+         + righting_cos (cos angle - 1) + x
+    x' = -cross_damping x - cross_rate p + cross_fin delta
+with p the rate and x the cross state (sway or heave, scaled so that its moment is +x).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import Axis
+from fieldsid.registry import pick
+
+if TYPE_CHECKING:
+    from fieldsid.models.record import Record
+
+Values = Mapping[str, float]
+
+
+class Stage(StrEnum):
+    """Where in the signal path an effect acts."""
+
+    ACTUATOR = "actuator"
+    HYDRODYNAMICS = "hydrodynamics"
+    SENSOR = "sensor"
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """One number of an effect: unit, bounds, start value, and the grid to scan where the cost is not smooth.
+
+    `scan` gives start values tried before the descent; `step` the half width of the central difference.
+    `per_run` marks a nuisance (a phase, an event time) that every run has of its own and that is refitted
+    on validation runs; its bounds are then fractions of the run's length when `unit` is "run".
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    scan: tuple[float, ...] = ()
+    step: float = 1e-4
+    per_run: bool = False
+    says: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FinPath:
+    """Fin angle over each sampling interval, straight from `start` to `end`, both (n-1,) in rad."""
+
+    start: FloatArray
+    end: FloatArray
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean over each interval, (n-1,)."""
+        return 0.5 * (self.start + self.end)
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """Time-varying parts that depend on measured signals only, each a factor or an addition per sample (n,).
+
+    `damping_factor` and `authority_factor` multiply a(t) and b(t); `moment` (rad/s^2) is added to m(t);
+    `damping` (1/s) is added to a(t) after the factor. None leaves the part as it is.
+    """
+
+    damping_factor: FloatArray | None = None
+    authority_factor: FloatArray | None = None
+    moment: FloatArray | None = None
+    damping: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Core:
+    """Coefficients of the state-dependent terms the compiled core knows; zero where an effect is absent."""
+
+    quadratic: float = 0.0
+    crossflow: float = 0.0
+    length: float = 1.0
+    heading_sin: float = 0.0
+    heading_cos: float = 0.0
+    righting_sin: float = 0.0
+    righting_cos: float = 0.0
+    cross_damping: float = 0.0
+    cross_rate: float = 0.0
+    cross_fin: float = 0.0
+
+    def plus(self, other: Core) -> Core:
+        """Return the sum of two sets of coefficients; `length` is taken from whichever sets it."""
+        total = {f: getattr(self, f) + getattr(other, f) for f in CORE_FIELDS if f != "length"}
+        return replace(self, **total, length=other.length if other.length != 1.0 else self.length)
+
+
+CORE_FIELDS = tuple(Core.__dataclass_fields__)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Simulated motion at the samples: angle (n,) rad, rate (n,) rad/s."""
+
+    angle: FloatArray
+    rate: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What a user's own moment may use, along a trajectory: arrays (n,) by short name."""
+
+    values: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One physical effect. Exactly the hooks of its stage are given; a hook is a pure function.
+
+    fin(path, values, record) -> FinPath                    actuator, in rising `order`
+    terms(values, record) -> Terms                          hydrodynamics known before integration
+    core(values, scale) -> Core                             hydrodynamics inside the core; scale = speed / reference
+    moment(motion, values, record) -> (n,) rad/s^2          hydrodynamics evaluated along the last trajectory
+    measure(motion, values, record) -> Motion               sensor
+    `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
+    """
+
+    name: str
+    says: str
+    stage: Stage
+    axes: tuple[Axis, ...]
+    equation: str
+    coefficients: tuple[Coefficient, ...]
+    telltale: str
+    excited_by: tuple[str, ...]
+    mistaken_for: tuple[str, ...]
+    source: str
+    needs: tuple[str, ...] = ()
+    extra_states: tuple[str, ...] = ()
+    order: int = 0
+    fin: Callable[[FinPath, Values, Record], FinPath] | None = None
+    terms: Callable[[Values, Record], Terms] | None = None
+    core: Callable[[Values, float], Core] | None = None
+    moment: Callable[[Motion, Values, Record], FloatArray] | None = None
+    measure: Callable[[Motion, Values, Record], Motion] | None = None
+    origin: str = field(default="built in")
+
+    @property
+    def shared(self) -> tuple[Coefficient, ...]:
+        """Coefficients that all runs have in common."""
+        return tuple(c for c in self.coefficients if not c.per_run)
+
+    @property
+    def nuisance(self) -> tuple[Coefficient, ...]:
+        """Coefficients every run has of its own."""
+        return tuple(c for c in self.coefficients if c.per_run)
+
+    def starts(self) -> dict[str, float]:
+        """Return the start value of every coefficient."""
+        return {c.name: c.start for c in self.coefficients}
+
+
+def held(values: FloatArray) -> FloatArray:
+    """Return the value over each interval, (n-1,), of a signal known at its ends, (n,)."""
+    return np.asarray(0.5 * (values[:-1] + values[1:]))
+
+
+def effect_named(name: str) -> Effect:
+    """Return an effect of the registry; raises UsageError naming the near matches."""
+    effect = pick("fieldsid.effects", "EFFECT", name)
+    if not isinstance(effect, Effect):
+        raise TypeError(f"registry member {name!r} is {type(effect).__name__}, not Effect")
+    return effect

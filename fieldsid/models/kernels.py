@@ -1,0 +1,182 @@
+"""The compiled core: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
+
+    y' = p
+    p' = -a p - k y + m(t) - Q p|p| - X F(w/L, p) + hs sin y + hc cos y + rs (y - sin y) + rc (cos y - 1) + x
+    x' = -e x - f p + q(t)
+    F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
+a and k are held over an interval; m, q and w run straight from its start to its end. The tangents are the
+derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.jit import jit
+
+DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_start", "cross_end", "flow_start", "flow_end")
+CONSTANTS = (
+    "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
+    "cross_damping", "cross_rate",
+)  # fmt: skip
+DIVERGED = 1e4
+
+
+@jit
+def crossflow(alpha: float, p: float) -> tuple[float, float, float]:
+    """Return F(alpha, p) and its derivatives by alpha and by p, from the closed form of the integral."""
+    if abs(alpha) >= 0.5 * abs(p):
+        s = 1.0 if alpha >= 0.0 else -1.0
+        return 16.0 / 3.0 * abs(alpha) * p, 16.0 / 3.0 * s * p, 16.0 / 3.0 * abs(alpha)
+    s = 1.0 if p >= 0.0 else -1.0
+    ratio = alpha / p
+    value = s * (p * p + 8.0 * alpha * alpha - 16.0 / 3.0 * alpha * alpha * ratio * ratio)
+    by_alpha = s * (16.0 * alpha - 64.0 / 3.0 * alpha * ratio * ratio)
+    by_p = s * (2.0 * p + 32.0 / 3.0 * alpha * ratio * ratio * ratio)
+    return value, by_alpha, by_p
+
+
+@jit
+def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> None:
+    """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on."""
+    n = steps.shape[0] + 1
+    weight = np.array([1.0, 2.0, 2.0, 1.0])
+    reach = np.array([0.0, 0.5, 0.5, 1.0])
+    y, p, x = start[0], start[1], start[2]
+    out[0, 0], out[0, 1], out[0, 2] = y, p, x
+    turning = c[3] != 0.0 or c[4] != 0.0 or c[5] != 0.0 or c[6] != 0.0
+    for i in range(n - 1):
+        h = steps[i] / pieces
+        a, k = drive[i, 0], drive[i, 1]
+        for piece in range(pieces):
+            ky, kp, kx = 0.0, 0.0, 0.0
+            ty, tp, tx = 0.0, 0.0, 0.0
+            for stage in range(4):
+                g = reach[stage] * h
+                part = (piece + reach[stage]) / pieces
+                ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
+                m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
+                f = -a * ps - k * ys + m - c[0] * ps * abs(ps) + xs
+                if c[1] != 0.0:
+                    w = drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part
+                    f -= c[1] * crossflow(w / c[2], ps)[0]
+                if turning:
+                    sin, cos = np.sin(ys), np.cos(ys)
+                    f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
+                q = drive[i, 4] + (drive[i, 5] - drive[i, 4]) * part
+                ky, kp, kx = ps, f, -c[7] * xs - c[8] * ps + q
+                ty += weight[stage] * ky
+                tp += weight[stage] * kp
+                tx += weight[stage] * kx
+            y += h / 6.0 * ty
+            p += h / 6.0 * tp
+            x += h / 6.0 * tx
+        if not abs(p) < DIVERGED:
+            out[i + 1 :] = np.nan
+            return
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+
+
+@jit
+def tangents(
+    steps: FloatArray,
+    drive: FloatArray,
+    c: FloatArray,
+    start: FloatArray,
+    pieces: int,
+    d_drive: FloatArray,
+    which: FloatArray,
+    d_c: FloatArray,
+    d_start: FloatArray,
+    out: FloatArray,
+    sens: FloatArray,
+) -> None:
+    """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
+
+    d_drive (K, n-1, 8) holds derivatives of the drives; which (P,) is the row of each parameter in it, -1 for
+    none; d_c (P, 9) those of the constants; d_start (P, 3) those of the initial state.
+    """
+    n = steps.shape[0] + 1
+    count = d_c.shape[0]
+    weight = np.array([1.0, 2.0, 2.0, 1.0])
+    reach = np.array([0.0, 0.5, 0.5, 1.0])
+    s = d_start.copy()
+    kt = np.zeros((count, 3))
+    acc = np.zeros((count, 3))
+    has_c = np.zeros(count, dtype=np.bool_)
+    for j in range(count):
+        sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
+        for l in range(d_c.shape[1]):
+            has_c[j] = has_c[j] or d_c[j, l] != 0.0
+    turning = np.any(c[3:7] != 0.0) or np.any(d_c[:, 3:7] != 0.0)
+    flowing = c[1] != 0.0 or np.any(d_c[:, 1] != 0.0)
+    y, p, x = start[0], start[1], start[2]
+    out[0, 0], out[0, 1], out[0, 2] = y, p, x
+    for i in range(n - 1):
+        h = steps[i] / pieces
+        a, k = drive[i, 0], drive[i, 1]
+        for piece in range(pieces):
+            ky, kp, kx = 0.0, 0.0, 0.0
+            ty, tp, tx = 0.0, 0.0, 0.0
+            acc[:] = 0.0
+            kt[:] = 0.0
+            for stage in range(4):
+                g = reach[stage] * h
+                part = (piece + reach[stage]) / pieces
+                wt = weight[stage]
+                ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
+                m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
+                drag = ps * abs(ps)
+                f = -a * ps - k * ys + m - c[0] * drag + xs
+                by_y = -k
+                by_p = -a - 2.0 * c[0] * abs(ps)
+                flow, flow_a, flow_p, alpha = 0.0, 0.0, 0.0, 0.0
+                if flowing:
+                    alpha = (drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part) / c[2]
+                    flow, flow_a, flow_p = crossflow(alpha, ps)
+                    f -= c[1] * flow
+                    by_p -= c[1] * flow_p
+                sin, cos = 0.0, 1.0
+                if turning:
+                    sin, cos = np.sin(ys), np.cos(ys)
+                    f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
+                    by_y += c[3] * cos - c[4] * sin + c[5] * (1.0 - cos) - c[6] * sin
+                q = drive[i, 4] + (drive[i, 5] - drive[i, 4]) * part
+                for j in range(count):
+                    dy = s[j, 0] + g * kt[j, 0]
+                    dp = s[j, 1] + g * kt[j, 1]
+                    dx = s[j, 2] + g * kt[j, 2]
+                    e = by_y * dy + by_p * dp + dx
+                    z = -c[7] * dx - c[8] * dp
+                    r = int(which[j])
+                    if r >= 0:
+                        d0, d1 = d_drive[r, i, 2], d_drive[r, i, 3]
+                        e += d0 + (d1 - d0) * part - d_drive[r, i, 0] * ps - d_drive[r, i, 1] * ys
+                        d0, d1 = d_drive[r, i, 4], d_drive[r, i, 5]
+                        z += d0 + (d1 - d0) * part
+                    if has_c[j]:
+                        e -= d_c[j, 0] * drag + d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
+                        e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * (ys - sin) + d_c[j, 6] * (cos - 1.0)
+                        z -= d_c[j, 7] * xs + d_c[j, 8] * ps
+                    kt[j, 0], kt[j, 1], kt[j, 2] = dp, e, z
+                    acc[j, 0] += wt * dp
+                    acc[j, 1] += wt * e
+                    acc[j, 2] += wt * z
+                ky, kp, kx = ps, f, -c[7] * xs - c[8] * ps + q
+                ty += wt * ky
+                tp += wt * kp
+                tx += wt * kx
+            y += h / 6.0 * ty
+            p += h / 6.0 * tp
+            x += h / 6.0 * tx
+            for j in range(count):
+                for l in range(3):
+                    s[j, l] += h / 6.0 * acc[j, l]
+        if not abs(p) < DIVERGED:
+            out[i + 1 :] = np.nan
+            sens[:, :, i + 1 :] = np.nan
+            return
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        for j in range(count):
+            sens[j, 0, i + 1], sens[j, 1, i + 1] = s[j, 0], s[j, 1]

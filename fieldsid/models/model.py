@@ -1,0 +1,136 @@
+"""A Model: axis, effects, values with their covariance, speed law and noise; saved and loaded as YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid.artifacts import load_record, save_record
+from fieldsid.errors import ArtifactError
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.speed_law import SpeedLaw
+
+KIND = "fieldsid/model"
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Noise of the measurement and of the motion.
+
+    Standard deviations: angle (rad), rate (rad/s), disturbance (rad/s^2, an AR(1) moment of correlation time
+    `disturbance_time` s), and of coloured sensor noise with correlation time `coloured_time`.
+    """
+
+    angle: float
+    rate: float
+    disturbance: float = 0.0
+    disturbance_time: float = 1.0
+    coloured_angle: float = 0.0
+    coloured_rate: float = 0.0
+    coloured_time: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """An identified model.
+
+    `values` holds the base parameters at the law's reference speed and the effects' shared coefficients (SI,
+    rad); `units` theirs; `covariance` (p, p) in the order of `free`, the names that were estimated. `trained`
+    says what the data reached: speed_low, speed_high, fin_max, rate_max (all in SI).
+    """
+
+    axis: Axis
+    effects: tuple[str, ...]
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    free: tuple[str, ...]
+    covariance: FloatArray
+    law: SpeedLaw
+    noise: Noise
+    trained: Mapping[str, float] = field(default_factory=dict)
+    method: str = ""
+    runs: tuple[str, ...] = ()
+    info: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def base(self) -> dict[str, float]:
+        """The base parameters at the reference speed."""
+        return {n: self.values[n] for n in NAMES[self.axis].base}
+
+    def std_error(self, name: str) -> float:
+        """Return the standard error of a free value, NaN for one that was not estimated."""
+        if name not in self.free:
+            return float("nan")
+        i = self.free.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def at_speed(self, speed: float) -> dict[str, float]:
+        """Return the base parameters at a speed by the model's own law."""
+        names = NAMES[self.axis]
+        out = self.base
+        out[names.damping] *= self.law.damping_factor(speed)
+        out[names.authority] = self.law.authority(speed, out[names.authority])
+        return out
+
+
+def save_model(
+    model: Model, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False
+) -> Path:
+    """Write a model as YAML; raises ArtifactError."""
+    body = {
+        "axis": model.axis.value,
+        "effects": list(model.effects),
+        "method": model.method,
+        "runs": list(model.runs),
+        "parameters": {
+            n: {"value": v, "std_error": model.std_error(n), "unit": model.units.get(n, "")} for n, v in model.values.items()
+        },
+        "free": list(model.free),
+        "covariance": model.covariance,
+        "speed_law": {
+            "reference_m_s": model.law.reference,
+            "damping_exponent": model.law.damping_exponent,
+            "authority_exponent": model.law.authority_exponent,
+            "points": [list(p) for p in model.law.points],
+        },
+        "noise": {f: getattr(model.noise, f) for f in Noise.__dataclass_fields__},
+        "trained": dict(model.trained),
+        "info": dict(model.info),
+    }
+    return save_record(path, f"{KIND}/1", body, inputs=inputs, parent=parent, force=force)
+
+
+def load_model(path: Path) -> Model:
+    """Read a model back; raises ArtifactError naming the key that is missing or wrong."""
+    body = load_record(path, KIND)
+    try:
+        law = body["speed_law"]
+        reference = law["reference_m_s"]
+        return Model(
+            axis=Axis(body["axis"]),
+            effects=tuple(str(e) for e in body["effects"]),
+            values={k: float(p["value"]) for k, p in body["parameters"].items()},
+            units={k: str(p["unit"]) for k, p in body["parameters"].items()},
+            free=tuple(body["free"]),
+            covariance=np.array(body["covariance"], dtype=np.float64).reshape(len(body["free"]), len(body["free"])),
+            law=SpeedLaw(
+                float("nan") if reference is None else float(reference),
+                float(law["damping_exponent"]),
+                float(law["authority_exponent"]),
+                tuple((float(a), float(b)) for a, b in law["points"]),
+            ),
+            noise=Noise(**{k: float(v) for k, v in body["noise"].items()}),
+            trained={k: float("nan") if v is None else float(v) for k, v in body["trained"].items()},
+            method=str(body["method"]),
+            runs=tuple(body["runs"]),
+            info=body["info"],
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError(
+            f"`{path}` is not a complete model file", found=f"{type(error).__name__}: {error}", hint="identify again, with `--force`"
+        ) from error

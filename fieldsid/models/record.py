@@ -1,0 +1,140 @@
+"""One run on one axis, in the form the compiled core takes: samples, weights' masks, fin path and measured helpers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import DataError, EffectError
+from fieldsid.logs.run import FloatArray, Run
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import FinPath
+
+ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
+SMOOTHING_S = 1.0
+"""Width of the zero-phase mean taken over helper signals, so that their noise does not enter the simulation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Samples (n,) of one run on one axis.
+
+    `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held`
+    tells which). `angle_ok` and `rate_ok` mark samples that were measured. `signals` holds gap-free helpers by
+    role (surge, thrust, roll, depth, cross). `speed` is the median surge in m/s, NaN when not measured.
+    """
+
+    name: str
+    axis: Axis
+    time: FloatArray
+    fin: FloatArray
+    fin_is_held: bool
+    fin_is_measured: bool
+    angle: FloatArray
+    rate: FloatArray
+    angle_ok: npt.NDArray[np.bool_]
+    rate_ok: npt.NDArray[np.bool_]
+    signals: Mapping[str, FloatArray]
+    speed: float
+
+    def __len__(self) -> int:
+        return int(self.time.size)
+
+    @property
+    def steps(self) -> FloatArray:
+        """Length of each interval, (n-1,) s."""
+        return np.diff(self.time)
+
+    @property
+    def commanded(self) -> FinPath:
+        """The fin as logged, as a path over the intervals."""
+        if self.fin_is_held:
+            return FinPath(self.fin[:-1], self.fin[:-1])
+        return FinPath(self.fin[:-1], self.fin[1:])
+
+    def __getitem__(self, role: str) -> FloatArray:
+        """Return a helper signal (n,); raises EffectError when the log has none."""
+        if role not in self.signals:
+            raise EffectError(f"run {self.name!r} has no {role} signal", found=", ".join(sorted(self.signals)) or "none")
+        return self.signals[role]
+
+
+def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
+    """Return the record of a run on an axis.
+
+    fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. Raises DataError
+    when the angle and the rate are both missing, or the fin is.
+    """
+    names = NAMES[axis]
+    measured = fin == "measured" or (fin == "auto" and run.has(names.fin_measured))
+    column = names.fin_measured if measured else names.fin
+    if not run.has(column):
+        raise DataError(
+            f"run {run.name!r} has no fin signal for {axis.value}: `{column}` is missing or empty",
+            found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
+            hint=f"map it on import, or identify the other axis: `--axis {'pitch' if axis is Axis.YAW else 'yaw'}`",
+        )
+    if not run.has(names.angle) and not run.has(names.rate):
+        raise DataError(
+            f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`",
+            found=", ".join(k for k in run.signals if run.has(k)),
+            hint="map one of them on import: `sysid inspect LOG`",
+        )
+    angle, angle_ok = _measured(run, names.angle)
+    rate, rate_ok = _measured(run, names.rate)
+    if axis is Axis.YAW and angle_ok.any():
+        angle = angle.copy()
+        angle[angle_ok] = np.unwrap(angle[angle_ok])
+    roles = {**ROLES, "cross": names.cross}
+    signals = {role: _helper(run.time, run.signals[c]) for role, c in roles.items() if run.has(c)}
+    surge = run.signals.get("surge_m_s")
+    speed = float(np.nanmedian(surge)) if surge is not None and np.isfinite(surge).any() else float("nan")
+    return Record(
+        name=run.name,
+        axis=axis,
+        time=run.time,
+        fin=_held_fin(run.signals[column]),
+        fin_is_held=not measured,
+        fin_is_measured=measured,
+        angle=angle,
+        rate=rate,
+        angle_ok=angle_ok,
+        rate_ok=rate_ok,
+        signals=MappingProxyType(signals),
+        speed=speed,
+    )
+
+
+def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    values = run.signals.get(name)
+    if values is None:
+        return np.zeros(len(run)), np.zeros(len(run), dtype=bool)
+    ok = np.isfinite(values)
+    return np.where(ok, values, 0.0), ok
+
+
+def _held_fin(values: FloatArray) -> FloatArray:
+    """Fill gaps of a command with its last value (the fin stays where it was told to be)."""
+    ok = np.isfinite(values)
+    index = np.maximum.accumulate(np.where(ok, np.arange(values.size), -1))
+    first = int(np.argmax(ok))
+    return np.asarray(values[np.where(index < 0, first, index)])
+
+
+def _helper(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Interpolate gaps and take a centred mean over about a second."""
+    ok = np.isfinite(values)
+    full = np.interp(time, time[ok], values[ok])
+    if full.size < 3:
+        return full
+    half = max(0, round(0.5 * SMOOTHING_S / float(np.median(np.diff(time)))))
+    if half == 0 or full.size <= 2 * half + 1:
+        return full
+    total = np.cumsum(np.concatenate([[0.0], full]))
+    index = np.arange(full.size)
+    reach = np.minimum(np.minimum(index, full.size - 1 - index), half)
+    return np.asarray((total[index + reach + 1] - total[index - reach]) / (2 * reach + 1))

@@ -1,0 +1,201 @@
+"""From parameters to the arrays the compiled core takes: the actuator before it, the sensor after it.
+
+One code path for effects present and absent: every hook of every effect is applied in its stage's order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models import kernels
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Core, Effect, FinPath, Motion, Terms, Values
+from fieldsid.models.record import Record
+
+LONGEST_PIECE = 0.3
+"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step)."""
+MOMENT_ROUNDS = 30
+MOMENT_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """Base parameters at a run's own speed: damping (1/s), stiffness (1/s^2), authority (1/s^2), trim (rad/s^2)."""
+
+    damping: float
+    stiffness: float
+    authority: float
+    trim: float
+
+
+@dataclass(frozen=True, slots=True)
+class Assembled:
+    """Arrays of the core: drive (n-1, 8), constants (9,), pieces per interval; and the fin path they came from."""
+
+    drive: FloatArray
+    constants: FloatArray
+    pieces: int
+    fin: FinPath
+    terms: Terms
+
+
+def fin_path(record: Record, effects: Sequence[Effect], values: Values) -> FinPath:
+    """Return the fin angle over the intervals after the actuator effects, in their order."""
+    path = record.commanded
+    for effect in sorted((e for e in effects if e.fin is not None), key=lambda e: e.order):
+        if effect.fin is not None:
+            path = effect.fin(path, values, record)
+    return path
+
+
+def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:
+    """Return the product of all factors and the sum of all additions of the effects' signal-driven terms."""
+    damping_factor: FloatArray | None = None
+    authority_factor: FloatArray | None = None
+    moment: FloatArray | None = None
+    damping: FloatArray | None = None
+    for effect in effects:
+        if effect.terms is None:
+            continue
+        t = effect.terms(values, record)
+        damping_factor = _times(damping_factor, t.damping_factor)
+        authority_factor = _times(authority_factor, t.authority_factor)
+        moment = _plus(moment, t.moment)
+        damping = _plus(damping, t.damping)
+    return Terms(damping_factor, authority_factor, moment, damping)
+
+
+def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
+    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
+    fin = fin_path(record, effects, values)
+    terms = combined_terms(record, effects, values)
+    core = Core()
+    for effect in effects:
+        if effect.core is not None:
+            core = core.plus(effect.core(values, scale))
+    drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
+    drive[:, 0] = base.damping if terms.damping_factor is None else base.damping * _held(terms.damping_factor)
+    if terms.damping is not None:
+        drive[:, 0] += _held(terms.damping)
+    drive[:, 1] = base.stiffness
+    start, end = lift(fin, terms)
+    drive[:, 2] = base.authority * start + base.trim
+    drive[:, 3] = base.authority * end + base.trim
+    if terms.moment is not None:
+        drive[:, 2] += terms.moment[:-1]
+        drive[:, 3] += terms.moment[1:]
+    if core.cross_fin != 0.0:
+        drive[:, 4] = core.cross_fin * fin.start
+        drive[:, 5] = core.cross_fin * fin.end
+    if core.crossflow != 0.0:
+        # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
+        cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
+        drive[:, 6], drive[:, 7] = cross[:-1], cross[1:]
+    constants = np.array([getattr(core, name) for name in kernels.CONSTANTS])
+    return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms)
+
+
+def lift(fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
+    """Return fin angle times the authority factor at both ends of each interval, (n-1,) each."""
+    if terms.authority_factor is None:
+        return fin.start, fin.end
+    return fin.start * terms.authority_factor[:-1], fin.end * terms.authority_factor[1:]
+
+
+def run_core(record: Record, assembled: Assembled, start: FloatArray) -> FloatArray:
+    """Return angle, rate and cross state at the samples, (n, 3)."""
+    out = np.empty((len(record), 3))
+    kernels.simulate(record.steps, assembled.drive, assembled.constants, start, assembled.pieces, out)
+    return out
+
+
+def with_moments(
+    record: Record, assembled: Assembled, effects: Sequence[Effect], values: Values, start: FloatArray
+) -> Assembled:
+    """Return the arrays with every state-dependent moment the core does not know, iterated to convergence.
+
+    Quasilinearisation: m(y, p) is replaced by its value and slopes along the last trajectory, the slopes joining
+    the held stiffness and damping; at the fixed point the slopes cancel (Bellman and Kalaba 1965).
+    """
+    own = [e for e in effects if e.moment is not None]
+    if not own:
+        return assembled
+    path = run_core(record, assembled, start)
+    current = assembled
+    for _ in range(MOMENT_ROUNDS):
+        if not np.isfinite(path).all():
+            return current
+        drive = assembled.drive.copy()
+        for effect in own:
+            _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
+        current = Assembled(drive, assembled.constants, _pieces(record, drive, assembled.constants), assembled.fin, assembled.terms)
+        new = run_core(record, current, start)
+        change = float(np.max(np.abs(new[:, :2] - path[:, :2])))
+        path = new
+        if change < MOMENT_TOLERANCE * (1.0 + float(np.max(np.abs(new[:, :2])))):
+            break
+    return current
+
+
+def measured(motion: Motion, record: Record, effects: Sequence[Effect], values: Values) -> Motion:
+    """Return what the sensors show of a motion."""
+    for effect in effects:
+        if effect.measure is not None:
+            motion = effect.measure(motion, values, record)
+    return motion
+
+
+def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Values, record: Record) -> None:
+    if effect.moment is None:
+        return
+    step = 1e-5
+    value = effect.moment(motion, values, record)
+    by_angle = (
+        effect.moment(Motion(motion.angle + step, motion.rate), values, record)
+        - effect.moment(Motion(motion.angle - step, motion.rate), values, record)
+    ) / (2 * step)
+    by_rate = (
+        effect.moment(Motion(motion.angle, motion.rate + step), values, record)
+        - effect.moment(Motion(motion.angle, motion.rate - step), values, record)
+    ) / (2 * step)
+    slope_y, slope_p = _held(by_angle), _held(by_rate)
+    drive[:, 0] -= slope_p
+    drive[:, 1] -= slope_y
+    drive[:, 2] += value[:-1] - slope_p * motion.rate[:-1] - slope_y * motion.angle[:-1]
+    drive[:, 3] += value[1:] - slope_p * motion.rate[1:] - slope_y * motion.angle[1:]
+
+
+def _pieces(record: Record, drive: FloatArray, constants: FloatArray) -> int:
+    step = float(np.max(record.steps))
+    fastest = max(
+        float(np.max(np.abs(drive[:, 0]))),
+        float(np.sqrt(np.max(np.abs(drive[:, 1])))),
+        abs(float(constants[7])),
+        float(np.sqrt(abs(float(constants[8])))),
+    )
+    return int(min(max(1, np.ceil(step * fastest / LONGEST_PIECE)), 200))
+
+
+def _held(values: FloatArray) -> FloatArray:
+    return np.asarray(0.5 * (values[:-1] + values[1:]))
+
+
+def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+    if a is None or b is None:
+        return a if b is None else b
+    return a * b
+
+
+def _plus(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+    if a is None or b is None:
+        return a if b is None else b
+    return a + b
+
+
+def merged(*parts: Mapping[str, float]) -> dict[str, float]:
+    """Return several sets of values as one."""
+    return {k: v for part in parts for k, v in part.items()}

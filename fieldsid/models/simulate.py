@@ -1,0 +1,111 @@
+"""Free-run simulation of a model along a record's fin: the model's own prediction, sensor effects included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import ModelError
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect, Motion, effect_named
+from fieldsid.models.model import Model
+from fieldsid.models.record import Record
+from fieldsid.models.signal_path import Base, assemble, measured, run_core, with_moments
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Simulated samples (n,): time s, measured angle rad, measured rate rad/s, cross state, fin angle rad."""
+
+    time: FloatArray
+    angle: FloatArray
+    rate: FloatArray
+    cross: FloatArray
+    fin: FloatArray
+
+
+def effects_of(model: Model) -> tuple[Effect, ...]:
+    """Return the model's effects from the registry; raises UsageError for one that is not known."""
+    return tuple(effect_named(name) for name in model.effects)
+
+
+def base_at(model: Model, speed: float) -> Base:
+    """Return the model's base parameters at a speed."""
+    names = NAMES[model.axis]
+    v = model.at_speed(speed)
+    return Base(v[names.damping], 0.0 if names.stiffness is None else v[names.stiffness], v[names.authority], v[names.trim])
+
+
+def simulate(
+    model: Model,
+    record: Record,
+    *,
+    state: tuple[float, float, float] | None = None,
+    nuisance: Mapping[str, float] = MappingProxyType({}),
+    effects: tuple[Effect, ...] | None = None,
+) -> Trajectory:
+    """Return the free run of a model along a record.
+
+    state is the initial (angle rad, rate rad/s, cross state); by default the first measured angle and rate.
+    nuisance holds per-run coefficients (wave phase, event time); the coefficients' start values fill the rest.
+    Raises ModelError when the motion grows without bound.
+    """
+    parts = effects_of(model) if effects is None else effects
+    values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
+    if state is None:
+        state = (
+            float(record.angle[np.argmax(record.angle_ok)]),
+            float(record.rate[np.argmax(record.rate_ok)]) if record.rate_ok.any() else 0.0,
+            0.0,
+        )
+    start = np.array(state, dtype=np.float64)
+    arrays = assemble(record, parts, base_at(model, record.speed), values, model.law.scale(record.speed))
+    arrays = with_moments(record, arrays, parts, values, start)
+    out = run_core(record, arrays, start)
+    if not np.isfinite(out).all():
+        at = float(record.time[np.argmin(np.isfinite(out[:, 1]))])
+        raise ModelError(
+            f"the {model.axis.value} model grows without bound on run {record.name!r}",
+            found=f"diverged at t = {at:.2f} s",
+            hint="the model is unstable there: identify again, or add `--effects quadratic_damping`",
+        )
+    shown = measured(Motion(out[:, 0], out[:, 1]), record, parts, values)
+    fin = np.append(arrays.fin.start, arrays.fin.end[-1])
+    return Trajectory(record.time, shown.angle, shown.rate, out[:, 2], fin)
+
+
+def command_record(
+    axis: Axis,
+    time: npt.ArrayLike,
+    fin: npt.ArrayLike,
+    *,
+    speed: float,
+    signals: Mapping[str, FloatArray] = MappingProxyType({}),
+    name: str = "command",
+) -> Record:
+    """Return a record made of a held fin command alone, time (n,) s and fin (n,) rad, at a speed in m/s.
+
+    Helper roles that are not given are filled as on a steady straight run: surge at `speed`, the rest zero.
+    """
+    t = np.ascontiguousarray(time, dtype=np.float64)
+    none = np.zeros(t.size, dtype=bool)
+    steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth", "cross")} | {"surge": np.full(t.size, speed)}
+    return Record(
+        name=name,
+        axis=axis,
+        time=t,
+        fin=np.ascontiguousarray(fin, dtype=np.float64),
+        fin_is_held=True,
+        fin_is_measured=False,
+        angle=np.zeros(t.size),
+        rate=np.zeros(t.size),
+        angle_ok=none,
+        rate_ok=none,
+        signals=MappingProxyType(steady | dict(signals)),
+        speed=speed,
+    )

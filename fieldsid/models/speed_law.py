@@ -1,0 +1,43 @@
+"""How the base parameters move with speed: damping as (u/u0)^p, authority by u^2 or by speed group, trim constant.
+
+With u0 the reference speed and s = u/u0: a(u) = a22 s^p, k(u) = c23 (hydrostatic, no speed), b(u) = b2 s^e or the
+groups' own values with a power law between them. A model of one run keeps p = 1 and e = 2, the scaling of lift
+and linear lift-type damping (Fossen 2011, section 6.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLaw:
+    """Speeds in m/s; `points` are (speed, authority) of the groups, empty where the power law holds."""
+
+    reference: float
+    damping_exponent: float = 1.0
+    authority_exponent: float = 2.0
+    points: tuple[tuple[float, float], ...] = ()
+
+    def scale(self, speed: float) -> float:
+        """Return u/u0, 1 where either speed is not known."""
+        ok = np.isfinite(speed) and np.isfinite(self.reference) and self.reference > 0 and speed > 0
+        return float(speed / self.reference) if ok else 1.0
+
+    def damping_factor(self, speed: float) -> float:
+        """Return a(u)/a(u0)."""
+        return float(self.scale(speed) ** self.damping_exponent)
+
+    def authority(self, speed: float, at_reference: float) -> float:
+        """Return b(u); between groups log-linear in log u, beyond them by the power law from the nearest."""
+        scale = self.scale(speed)
+        if not self.points:
+            return float(at_reference * scale**self.authority_exponent)
+        speeds = np.array([p[0] for p in self.points])
+        values = np.array([p[1] for p in self.points])
+        u = float(np.clip(scale * self.reference, speeds[0], speeds[-1]))
+        beyond = scale * self.reference / u
+        inside = float(np.interp(np.log(u), np.log(speeds), values / speeds**self.authority_exponent))
+        return inside * u**self.authority_exponent * beyond**self.authority_exponent
