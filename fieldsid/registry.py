@@ -13,18 +13,17 @@ from typing import Any
 
 from fieldsid.errors import FieldsidError, UsageError
 
-
 _added: dict[str, dict[str, Any]] = {}
 
 
 def add(package: str, item: Any) -> None:
-    """Add a member that came from the user's own trial folder; it may replace only one added before it.
-
-    Raises FieldsidError where the name is taken by a member of the package.
-    """
-    if item.name in _installed(package, type(item).__name__.upper()):
-        raise FieldsidError(f"the name {item.name!r} is taken", found=f"`{package}` has one", hint="rename yours")
+    """Make a member known by its name for the rest of the process; one added before under that name is replaced."""
     _added.setdefault(package, {})[item.name] = item
+
+
+def forget(package: str) -> None:
+    """Forget the members of a registry that were added in this process."""
+    _added.pop(package, None)
 
 
 def members(package: str, attribute: str) -> Mapping[str, Any]:

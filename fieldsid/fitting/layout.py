@@ -13,8 +13,10 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import SpeedLaw
 
-GROUP_WIDTH = 0.06
+GROUP_WIDTH = 0.08
 """Runs whose speeds differ by less than this share form one speed group."""
+SNAP_WIDTH = 0.12
+"""A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}
 
 
@@ -32,26 +34,33 @@ class Slot:
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """Speed groups: mean speed of each, and the group of each run; `reference` is the group the law refers to."""
+    """Speed groups: mean speed of each, group and speed of each run; `reference` is the group the law refers to.
+
+    `snapped` runs count as being at their group's speed.
+    """
 
     speeds: tuple[float, ...]
     of_run: tuple[int, ...]
     reference: int
+    run_speeds: tuple[float, ...]
+    snapped: bool = False
 
 
-def speed_groups(records: Sequence[Record]) -> Groups:
+def speed_groups(records: Sequence[Record], *, snapped: bool = False) -> Groups:
     """Return the runs' speed groups by single linkage in log speed; one group when any speed is not known."""
+    own = tuple(r.speed for r in records)
     speeds = np.array([r.speed for r in records])
     if not np.isfinite(speeds).all() or (speeds <= 0).any():
         known = speeds[np.isfinite(speeds)]
-        return Groups((float(known.mean()) if known.size else float("nan"),), (0,) * len(records), 0)
+        return Groups((float(known.mean()) if known.size else float("nan"),), (0,) * len(records), 0, own, snapped)
     order = np.argsort(speeds)
     labels = np.zeros(len(records), dtype=int)
     for previous, index in zip(order[:-1], order[1:], strict=True):
         labels[index] = labels[previous] + int(np.log(speeds[index] / speeds[previous]) > GROUP_WIDTH)
     means = tuple(float(speeds[labels == g].mean()) for g in range(labels.max() + 1))
     reference = int(np.argmin(np.abs(np.log(np.array(means) / np.median(speeds)))))
-    return Groups(means, tuple(int(g) for g in labels), reference)
+    of_run = tuple(int(g) for g in labels)
+    return Groups(means, of_run, reference, tuple(means[g] for g in of_run) if snapped else own, snapped)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +98,9 @@ class Layout:
         g = self.groups
         reference = g.speeds[g.reference]
         if len(g.speeds) == 1:
-            return SpeedLaw(reference)
+            return SpeedLaw(reference, snap=SNAP_WIDTH if g.snapped else 0.0)
         points = tuple((u, values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
-        return SpeedLaw(reference, values["damping_exponent"], 2.0, points)
+        return SpeedLaw(reference, values["damping_exponent"], 2.0, points, SNAP_WIDTH if g.snapped else 0.0)
 
 
 def group_name(authority: str, groups: Groups, index: int) -> str:
@@ -99,9 +108,9 @@ def group_name(authority: str, groups: Groups, index: int) -> str:
     return authority if index == groups.reference else f"{authority}@{groups.speeds[index]:.3g}"
 
 
-def layout_of(records: Sequence[Record], axis: Axis, effects: Sequence[Effect]) -> Layout:
+def layout_of(records: Sequence[Record], axis: Axis, effects: Sequence[Effect], groups: Groups | None = None) -> Layout:
     """Return the slots of a joint fit of records with effects."""
-    names, groups = NAMES[axis], speed_groups(records)
+    names, groups = NAMES[axis], speed_groups(records) if groups is None else groups
     slots = [Slot(names.damping, "1/s", *BASE_BOUNDS["damping"], 1.0)]
     if names.stiffness is not None:
         slots.append(Slot(names.stiffness, "1/s^2", *BASE_BOUNDS["stiffness"], 0.1))

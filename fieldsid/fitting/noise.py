@@ -91,8 +91,7 @@ def estimate_noise(
     floor = floor_of(records)
     rough = _rough_start(records, dynamics, residuals, floor, start)
     off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
-    low = np.log([LOW[n] for n in names])
-    high = np.log([HIGH[n] for n in names])
+    low, high = _bounds(names, floor)
 
     def vector(x: FloatArray) -> FloatArray:
         known = off | dict(zip(names, np.exp(x), strict=True))
@@ -105,10 +104,17 @@ def estimate_noise(
     x0 = np.clip(np.log([rough[n] for n in names]), low, high)
     best = minimize(
         cost, x0, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
-        options={"maxiter": 40, "eps": 1e-4, "ftol": 1e-9},
+        options={"maxiter": 30, "eps": 1e-4, "ftol": 1e-8},
     )  # fmt: skip
     known = off | dict(zip(names, np.exp(best.x), strict=True))
     return Noise(**{n: float(known[n]) for n in NOISE_FIELDS}), float(-best.fun)
+
+
+def _bounds(names: tuple[str, ...], floor: Noise) -> tuple[FloatArray, FloatArray]:
+    """Return log bounds; white sensor noise stays near what the differences of the signal show of it."""
+    low = {**LOW, "angle": max(0.4 * floor.angle, LOW["angle"]), "rate": max(0.4 * floor.rate, LOW["rate"])}
+    high = {**HIGH, "angle": max(2.0 * floor.angle, 1e-5), "rate": max(2.0 * floor.rate, 1e-5)}
+    return np.log([low[n] for n in names]), np.log([high[n] for n in names])
 
 
 def _rough_start(

@@ -64,7 +64,8 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     names = NAMES[model.axis]
     layout = layout_of([record], model.axis, effects)
     reference = model.law.reference
-    layout = Layout(layout.axis, layout.effects, Groups((reference,), (0,), 0), layout.slots, layout.shared)
+    groups = Groups((reference,), (0,), 0, (model.law.effective(record.speed),))
+    layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared)
     at_speed = model.at_speed(record.speed)
     scale = model.law.scale(record.speed)
     # the frozen layout scales damping by s and authority by s^2: divide that out of the law's own values
@@ -117,7 +118,8 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
 
 def _layout_of_one(layout: Layout, run: int) -> Layout:
     slots = [*layout.slots[: layout.shared], *[_moved(layout.slots[i]) for i in layout.of_run(run)]]
-    groups = Groups(layout.groups.speeds, (layout.groups.of_run[run],), layout.groups.reference)
+    g = layout.groups
+    groups = Groups(g.speeds, (g.of_run[run],), g.reference, (g.run_speeds[run],), g.snapped)
     return Layout(layout.axis, layout.effects, groups, tuple(slots), layout.shared)
 
 

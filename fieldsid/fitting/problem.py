@@ -50,7 +50,8 @@ class Problem:
 
     def _scales(self, run: int) -> tuple[float, float]:
         """Return speed over reference speed, and speed over the speed of the run's own group."""
-        g, speed = self.layout.groups, self.records[run].speed
+        g = self.layout.groups
+        speed = g.run_speeds[run]
         if not np.isfinite(speed) or not np.isfinite(g.speeds[g.reference]):
             return 1.0, 1.0
         return speed / g.speeds[g.reference], speed / g.speeds[g.of_run[run]]

@@ -29,7 +29,7 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
     for run, record in enumerate(records):
         block, target = _windows(record, names.stiffness is not None)
         full = np.zeros((len(target), len(base)))
-        share = _share(record.speed, groups.speeds[groups.reference])
+        share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
         full[:, 0] = block[:, 0] * share
         if names.stiffness is not None:
             full[:, 1] = block[:, 1]

@@ -11,7 +11,7 @@ with p the rate and x the cross state (sway or heave, scaled so that its moment 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -132,6 +132,10 @@ class Effect:
     moment(motion, values, record) -> (n,) rad/s^2          hydrodynamics evaluated along the last trajectory
     measure(motion, values, record) -> Motion               sensor
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
+    suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
+    the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
+    `handicap` is log evidence the effect must bring beyond others: where another says the same in simpler words,
+    or where free event times make it fit anything.
     """
 
     name: str
@@ -152,6 +156,9 @@ class Effect:
     core: Callable[[Values, float], Core] | None = None
     moment: Callable[[Motion, Values, Record], FloatArray] | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None
+    suggest: Callable[[Sequence[Record], Sequence[FloatArray]], list[dict[str, float]]] | None = None
+    twin: Callable[[Values, Axis], dict[str, float] | None] | None = None
+    handicap: float = 0.0
     origin: str = field(default="built in")
 
     @property

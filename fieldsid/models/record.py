@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
@@ -40,14 +40,14 @@ class Record:
     rate_ok: npt.NDArray[np.bool_]
     signals: Mapping[str, FloatArray]
     speed: float
+    steps: FloatArray = field(init=False)
+    """Length of each interval, (n-1,) s."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "steps", np.diff(self.time))
 
     def __len__(self) -> int:
         return int(self.time.size)
-
-    @property
-    def steps(self) -> FloatArray:
-        """Length of each interval, (n-1,) s."""
-        return np.diff(self.time)
 
     @property
     def commanded(self) -> FinPath:

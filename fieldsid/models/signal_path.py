@@ -170,10 +170,12 @@ def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Value
 
 
 def _pieces(record: Record, drive: FloatArray, constants: FloatArray) -> int:
-    step = float(np.max(record.steps))
+    step = float(record.steps.max())
+    damping, stiffness = drive[:, 0], drive[:, 1]
     fastest = max(
-        float(np.max(np.abs(drive[:, 0]))),
-        float(np.sqrt(np.max(np.abs(drive[:, 1])))),
+        float(damping.max()),
+        -float(damping.min()),
+        float(np.sqrt(max(float(stiffness.max()), -float(stiffness.min()), 0.0))),
         abs(float(constants[7])),
         float(np.sqrt(abs(float(constants[8])))),
     )

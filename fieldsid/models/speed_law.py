@@ -14,17 +14,30 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class SpeedLaw:
-    """Speeds in m/s; `points` are (speed, authority) of the groups, empty where the power law holds."""
+    """Speeds in m/s; `points` are (speed, authority) of the groups, empty where the power law holds.
+
+    A speed within the share `snap` of a group's speed counts as that group's: set where runs of one group did not
+    follow the law among themselves.
+    """
 
     reference: float
     damping_exponent: float = 1.0
     authority_exponent: float = 2.0
     points: tuple[tuple[float, float], ...] = ()
+    snap: float = 0.0
+
+    def effective(self, speed: float) -> float:
+        """Return the speed the law is taken at."""
+        if self.snap <= 0.0 or not np.isfinite(speed) or speed <= 0.0:
+            return speed
+        known = np.array([p[0] for p in self.points] or [self.reference])
+        nearest = float(known[np.argmin(np.abs(np.log(known / speed)))])
+        return nearest if abs(np.log(nearest / speed)) <= self.snap else speed
 
     def scale(self, speed: float) -> float:
         """Return u/u0, 1 where either speed is not known."""
         ok = np.isfinite(speed) and np.isfinite(self.reference) and self.reference > 0 and speed > 0
-        return float(speed / self.reference) if ok else 1.0
+        return float(self.effective(speed) / self.reference) if ok else 1.0
 
     def damping_factor(self, speed: float) -> float:
         """Return a(u)/a(u0)."""
@@ -40,4 +53,4 @@ class SpeedLaw:
         u = float(np.clip(scale * self.reference, speeds[0], speeds[-1]))
         beyond = scale * self.reference / u
         inside = float(np.interp(np.log(u), np.log(speeds), values / speeds**self.authority_exponent))
-        return inside * u**self.authority_exponent * beyond**self.authority_exponent
+        return float(inside * (u * beyond) ** self.authority_exponent)

@@ -1,0 +1,133 @@
+"""A judged hypothesis with its errors on training and on unseen runs, and the score hypotheses are ranked by.
+
+    score = gain in log likelihood, training (fitted) + validation (not fitted) - 1/2 k log N
+the Schwarz approximation of the evidence of the training runs times the predictive density of the unseen ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.predict import frozen_problem, refit_own
+from fieldsid.fitting.problem import Problem
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """A judged trial: log likelihoods per training and validation run, errors, price of its parameters, its model."""
+
+    judged: Judged
+    by_run: FloatArray
+    unseen: FloatArray
+    errors: Pair
+    cost: float
+    model: Model
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of the hypothesis."""
+        return self.judged.trial.effects
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return self.judged.trial.names
+
+    @property
+    def score(self) -> float:
+        """Log evidence up to a constant that all hypotheses share."""
+        return float(self.by_run.sum() + self.unseen.sum() - self.cost)
+
+
+def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
+    """Return a judged trial with its errors on the runs it was fitted to and on the runs it was not."""
+    problem, x = judged.trial.problem, judged.trial.x
+    model = bare_model(problem, x, judged.noise)
+    unseen, left = [], []
+    for record in validation:
+        alone, start = frozen_problem(model, record, judged.trial.effects)
+        vector = refit_own(alone, start, 0, judged.noise)
+        unseen.append(float(likelihood_by_run(alone, vector, judged.noise)[0]))
+        left.append(alone.residual(refit_own(alone, vector, 0, floor_of([record])), 0)[0])
+    return Hypothesis(
+        judged,
+        likelihood_by_run(problem, x, judged.noise),
+        np.array(unseen),
+        Pair(training_errors(judged.trial), errors_of(validation, left)),
+        _price(judged, validation),
+        model,
+    )
+
+
+def with_free_run(h: Hypothesis, validation: Sequence[Record], floor: Noise) -> Hypothesis:
+    """Return the hypothesis with the errors and model of plain output error where unseen runs are predicted better so.
+
+    Generalised least squares is efficient when the hypothesis is right and may lose the free run when it is not.
+    """
+    trial = h.judged.trial
+    plain = refine(trial.problem, trial.x, trial.weights)
+    model = bare_model(plain.problem, plain.x, h.judged.noise)
+    left = []
+    for record in validation:
+        alone, start = frozen_problem(model, record, trial.effects)
+        left.append(alone.residual(refit_own(alone, start, 0, floor_of([record])), 0)[0])
+    errors = Pair(training_errors(plain), errors_of(validation, left))
+    old, new = (e.validation if validation else e.train for e in (h.errors, errors))
+    return replace(h, errors=errors, model=model) if new.over(floor) < old.over(floor) else h
+
+
+def training_errors(trial: Trial) -> Errors:
+    """Return the errors of a trial on the runs it was fitted to, each run's own start at its best for them."""
+    problem = trial.problem
+    left = []
+    for run, record in enumerate(problem.records):
+        left.append(problem.residual(refit_own(problem, trial.x, run, floor_of([record])), run)[0])
+    return errors_of(problem.records, left)
+
+
+def _price(judged: Judged, validation: Sequence[Record]) -> float:
+    """Return 1/2 k log N: shared coefficients once, nuisances once for every run they are fitted to."""
+    layout, records = judged.trial.problem.layout, judged.trial.problem.records
+    own = sum(len(e.nuisance) for e in layout.effects) + (1 if any(e.extra_states for e in layout.effects) else 0)
+    count = sum(len(e.shared) for e in layout.effects)
+    price = sum(e.handicap for e in layout.effects) + 0.5 * count * np.log(samples(records))
+    for record in (*records, *validation):
+        price += 0.5 * own * np.log(max(samples([record]), 2))
+    return float(price)
+
+
+def errors_of(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
+    """Return the pooled rms of residuals (2, n) over the measured samples of all runs."""
+    values = []
+    for channel in range(2):
+        ok = [(r.angle_ok, r.rate_ok)[channel] for r in records]
+        squares = sum(float(np.sum(e[channel][m] ** 2)) for e, m in zip(residuals, ok, strict=True))
+        count = sum(int(m.sum()) for m in ok)
+        values.append(float(np.sqrt(squares / count)) if count else float("nan"))
+    return Errors(values[0], values[1])
+
+
+def bare_model(problem: Problem, x: FloatArray, noise: Noise) -> Model:
+    """Return the model of a vector without covariance, for simulation only."""
+    layout = problem.layout
+    values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    return Model(
+        axis=layout.axis,
+        effects=tuple(e.name for e in layout.effects),
+        values=values,
+        units={s.name: s.unit for s in layout.slots[: layout.shared]},
+        free=(),
+        covariance=np.zeros((0, 0)),
+        law=layout.law(values),
+        noise=noise,
+    )

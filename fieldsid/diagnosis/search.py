@@ -1,0 +1,184 @@
+"""The search over hypotheses: singles, then pairs and triples grown from the best, with swaps and pruning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.screen import Promise, ground_of, promise_of
+from fieldsid.diagnosis.trial import Judged, Trial, judge, refine
+from fieldsid.fitting.layout import layout_of, speed_groups
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.start import start_vector
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+NOISES = ("disturbance", "coloured")
+FREE_RUNS = 3
+PROMISING = 5
+"""Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise."""
+LARGEST = 3
+WORTH = 6.0
+"""Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
+MATTERS = 0.985
+"""Share the free-run error over the floor must fall to: significant is not important."""
+
+
+@dataclass(slots=True)
+class Search:
+    """Everything tried so far on one set of runs, by the set of effects."""
+
+    records: tuple[Record, ...]
+    validation: tuple[Record, ...]
+    axis: Axis
+    catalogue: tuple[Effect, ...]
+    floor: Noise
+    tried: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
+    family: str = NOISES[0]
+    grown_from: set[frozenset[str]] = field(default_factory=set)
+
+    def base(self) -> Hypothesis:
+        """Return the hypothesis without effects."""
+        if frozenset() not in self.tried:
+            trial = min((self._base_trial(snapped=s) for s in self._laws()), key=lambda t: t.weights.angle * t.weights.rate)
+            judged = max((judge(trial.problem, trial.x, self.floor, f) for f in NOISES), key=lambda j: j.likelihood)
+            self.family = judged.family
+            self._keep(judged)
+            self.tried[frozenset()] = with_free_run(self.tried[frozenset()], self.validation, self.floor)
+        return self.tried[frozenset()]
+
+    def _laws(self) -> tuple[bool, ...]:
+        """Whether runs of one speed group share their parameters as they are, besides by the scaling with speed."""
+        groups = speed_groups(self.records)
+        return (False, True) if len(groups.speeds) < len(self.records) else (False,)
+
+    def _base_trial(self, *, snapped: bool) -> Trial:
+        layout = layout_of(self.records, self.axis, (), speed_groups(self.records, snapped=snapped))
+        problem = Problem(self.records, layout)
+        return refine(problem, start_vector(self.records, layout), self.floor)
+
+    def _keep(self, judged: Judged) -> Hypothesis:
+        key = frozenset(judged.trial.names)
+        known = self.tried.get(key)
+        if known is None or judged.likelihood > known.judged.likelihood + 1e-3:
+            self.tried[key] = hypothesis_of(judged, self.validation)
+        return self.tried[key]
+
+    def grow(self, parent: Hypothesis) -> list[Hypothesis]:
+        """Return the parent with each promising effect added, judged, best first."""
+        key = frozenset(parent.names)
+        if key not in self.grown_from:
+            self.grown_from.add(key)
+            for promise in self._promising(parent):
+                child = judge(promise.problem, promise.start, parent.judged.noise, self.family)
+                self._keep(child)
+                self._try_twin(child, promise.effect)
+            self._free_runs(key)
+        children = [h for k, h in self.tried.items() if len(k) == len(key) + 1 and key < k]
+        return sorted(children, key=lambda h: -h.score)
+
+    def _try_twin(self, judged: Judged, effect: Effect) -> None:
+        """Judge the other start that has the same response at one speed."""
+        problem, x = judged.trial.problem, judged.trial.x
+        layout = problem.layout
+        values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+        twin = None if effect.twin is None else effect.twin(values, self.axis)
+        if twin is None:
+            return
+        names, start = NAMES[self.axis], x.copy()
+        for i, slot in enumerate(layout.slots):
+            if slot.name in twin:
+                start[i] = np.clip(twin[slot.name], slot.low, slot.high)
+            elif slot.name.startswith(f"{names.authority}@"):
+                start[i] *= twin[names.authority] / values[names.authority]
+        self._keep(judge(problem, start, judged.noise, self.family))
+
+    def _free_runs(self, key: frozenset[str]) -> None:
+        """Give the best children the free run of plain output error where that predicts unseen runs better."""
+        children = sorted((k for k in self.tried if len(k) == len(key) + 1 and key < k), key=lambda k: -self.tried[k].score)
+        for child in children[:FREE_RUNS]:
+            self.tried[child] = with_free_run(self.tried[child], self.validation, self.floor)
+
+    def _promising(self, parent: Hypothesis) -> list[Promise]:
+        trial, noise = parent.judged.trial, parent.judged.noise
+        have = set(trial.names)
+        left = [e for e in self.catalogue if e.name not in have]
+        found: dict[str, Promise] = {}
+        plain = refine(trial.problem, trial.x, trial.weights)
+        for at, weights in ((plain, plain.weights), (trial, noise)):
+            ground = ground_of(at, weights)
+            for promise in sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)[:PROMISING]:
+                found[promise.effect.name] = promise
+        return list(found.values())
+
+    def best(self) -> Hypothesis:
+        """Return the hypothesis the search ends at."""
+        current = self.base()
+        for size in range(LARGEST):
+            children = self.grow(current)
+            paying = next((c for c in children if self.pays(current, c)), None)
+            if paying is None:
+                break
+            current = self._swapped(paying) if size else paying
+            if not self.asks_for_more(current):
+                break
+        return self._pruned(current)
+
+    def _swapped(self, found: Hypothesis) -> Hypothesis:
+        """Drop each effect in turn and add the best other one; keep what scores higher."""
+        best = found
+        for gone in found.effects[:-1]:
+            rest = frozenset(n for n in found.names if n != gone.name)
+            if rest not in self.tried:
+                continue
+            for child in self.grow(self.tried[rest])[:1]:
+                if len(child.effects) == len(found.effects) and child.score > best.score:
+                    best = child
+        return best
+
+    def _pruned(self, found: Hypothesis) -> Hypothesis:
+        """Return the smallest tried subset that loses nothing worth having."""
+        for key in sorted(self.tried, key=len):
+            if key < frozenset(found.names) and not self.pays(self.tried[key], found):
+                return self.tried[key]
+        return found
+
+    def pays(self, without: Hypothesis, with_: Hypothesis) -> bool:
+        """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
+        better = with_.score - without.score > WORTH
+        return better and self.error(with_) < MATTERS * self.error(without)
+
+    def error(self, h: Hypothesis) -> float:
+        """Return the free-run error over the noise floor on unseen runs, on training runs where there are none."""
+        return (h.errors.validation if self.validation else h.errors.train).over(self.floor)
+
+    def asks_for_more(self, h: Hypothesis) -> bool:
+        """Whether there is still something above the noise to explain."""
+        return max(self.error(h), h.errors.train.over(self.floor)) > 1.02
+
+    def ranked(self) -> list[Hypothesis]:
+        """Return all judged hypotheses, best score first."""
+        return sorted(self.tried.values(), key=lambda h: -h.score)
+
+
+def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tuple[Effect, ...], dict[str, str]]:
+    """Return the effects whose signals every run has, and why each other one is skipped."""
+    kept, skipped = [], {}
+    for effect in catalogue:
+        missing = sorted({role for role in effect.needs for r in records if role not in r.signals})
+        if missing:
+            skipped[effect.name] = f"needs {', '.join(missing)}, which the log lacks"
+        else:
+            kept.append(effect)
+    return tuple(kept), skipped
+
+
+def search(records: Sequence[Record], validation: Sequence[Record], axis: Axis, catalogue: Sequence[Effect]) -> Search:
+    """Return a search ready to go."""
+    return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor_of([*records, *validation]))

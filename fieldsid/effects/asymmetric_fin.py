@@ -1,0 +1,42 @@
+"""The fin works better to one side: delta = command (1 + asymmetry) for command > 0, command (1 - asymmetry) below.
+
+A bent stock, a damaged blade or a neighbour's wake does this; the sign says which side is the stronger.
+Source: Bertram 2012, Practical Ship Hydrodynamics, chapter 6.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.effects._paths import through_map
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.record import Record
+
+
+def fin(path: FinPath, values: Values, record: Record) -> FinPath:
+    """Return the path with the two sides scaled apart, (n-1,) rad."""
+    more = values["asymmetry"]
+    if more == 0.0:
+        return path
+    return through_map(
+        path,
+        lambda d: d + more * np.abs(d),
+        lambda d: 0.5 * d * d * (1.0 + more * np.sign(d)),
+    )
+
+
+EFFECT = Effect(
+    name="asymmetric_fin",
+    says="the fin works better to one side than to the other",
+    stage=Stage.ACTUATOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="delta = command * (1 + asymmetry * sign(command))",
+    coefficients=(Coefficient("asymmetry", "1", -0.9, 0.9, 0.05, says="gain to the positive side over the mean gain, less one"),),
+    telltale="turns to one side are stronger than simulated and weaker to the other, in proportion to the command",
+    excited_by=("square_pulses", "doublet", "zigzag", "turning_circle", "stairs"),
+    mistaken_for=("stall", "backlash", "gyro_bias", "prop_moment", "deadband"),
+    source="Bertram 2012, Practical Ship Hydrodynamics, chapter 6",
+    order=60,
+    fin=fin,
+)

@@ -1,0 +1,58 @@
+"""Play in the linkage: the fin stays until the command has crossed the gap, then follows half a gap behind (play operator).
+
+    delta <- min(max(delta, command - gap/2), command + gap/2),   gap >= 0 in rad
+The fin starts in the middle of the play. Source: Nordin and Gutman 2002, Controlling mechanical systems with backlash.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.effects._paths import line_of_two_pieces
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.jit import jit
+from fieldsid.models.record import Record
+
+
+@jit
+def played(start: FloatArray, end: FloatArray, gap: float, out: FloatArray) -> None:
+    """Fill out (n-1, 2) with start and end of the path behind a play of width `gap`."""
+    half = 0.5 * gap
+    fin = start[0]
+    for i in range(start.shape[0]):
+        first = min(max(fin, start[i] - half), start[i] + half)
+        last = min(max(first, end[i] - half), end[i] + half)
+        bend = 0.0
+        if last != first:
+            # The share of the interval before the moving command takes the fin along.
+            touches = first + half if end[i] > start[i] else first - half
+            bend = min(max((touches - start[i]) / (end[i] - start[i]), 0.0), 1.0)
+        out[i, 0], out[i, 1] = line_of_two_pieces(bend, first, first, last)
+        fin = last
+
+
+def fin(path: FinPath, values: Values, record: Record) -> FinPath:
+    """Return the path of a fin behind a play of `gap`, (n-1,) rad."""
+    if values["gap"] <= 0.0:
+        return path
+    out = np.empty((path.start.size, 2))
+    played(path.start, path.end, float(values["gap"]), out)
+    return FinPath(out[:, 0].copy(), out[:, 1].copy())
+
+
+EFFECT = Effect(
+    name="backlash",
+    says="play in the linkage: the fin hangs half a gap behind the command, on the side it came from",
+    stage=Stage.ACTUATOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="delta = play(command, gap): |delta - command| <= gap/2, and delta rests inside",
+    coefficients=(Coefficient("gap", "rad", 0.0, 0.3, 0.05, scan=(0.02, 0.06, 0.12), step=5e-4, says="full width of the play"),),
+    telltale="the same command gives two different rates, by whether it was reached from port or from starboard",
+    excited_by=("stairs", "multisine", "chirp", "three_two_one_one", "square_pulses"),
+    mistaken_for=("deadband", "servo_lag", "asymmetric_fin", "stall"),
+    source="Nordin and Gutman 2002, Automatica 38, Controlling mechanical systems with backlash",
+    order=40,
+    fin=fin,
+)

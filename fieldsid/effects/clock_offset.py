@@ -1,0 +1,43 @@
+"""The sensors' clock is off against the command's: measured(t) = motion(t - offset), offset of either sign in s.
+
+Positive: the sensors are logged late. The motion is straight between samples and held beyond the ends of the run.
+Unlike a delay it shifts whatever moves the hull, not only the fin's part, and it can be negative.
+Source: Ljung 1999, System Identification, chapter 14 (preprocessing of data).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.record import Record
+
+
+def measure(motion: Motion, values: Values, record: Record) -> Motion:
+    """Return the motion `offset` seconds later; angle (n,) rad, rate (n,) rad/s."""
+    offset = values["offset"]
+    if offset == 0.0:
+        return motion
+    then = record.time - offset
+    return Motion(np.interp(then, record.time, motion.angle), np.interp(then, record.time, motion.rate))
+
+
+EFFECT = Effect(
+    name="clock_offset",
+    says="the sensors' clock is off against the command's, early or late",
+    stage=Stage.SENSOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="measured(t) = motion(t - offset)",
+    coefficients=(
+        Coefficient(
+            "offset", "s", -1.5, 1.5, 0.05, scan=(-0.6, -0.25, -0.08, 0.08, 0.25, 0.6), step=2e-3, says="lateness of the sensors"
+        ),
+    ),
+    telltale="the residual is the rate of change of the signal itself; where it is early no delay can explain it",
+    excited_by=("square_pulses", "doublet", "three_two_one_one", "prbs"),
+    mistaken_for=("delay", "servo_lag", "rate_limit"),
+    source="Ljung 1999, System Identification, chapter 14",
+    measure=measure,
+    handicap=5.0,
+)

@@ -1,0 +1,33 @@
+"""A current across the course turns the hull by heading: r' += current_sin sin(psi) + current_cos cos(psi), rad/s^2.
+
+In a frame that drifts with the water the hull still has its log's heading; what is left is the moment of the flow
+across it, once per turn of the compass. Source: Fossen 2011, section 8.3 (ocean current forces and moments).
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
+
+
+def core(values: Values, scale: float) -> Core:
+    """Return the core's coefficients; the speed's share is left to the data."""
+    return Core(heading_sin=values["current_sin"], heading_cos=values["current_cos"])
+
+
+EFFECT = Effect(
+    name="current",
+    says="a current across the course turns the hull, differently on every heading",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.YAW,),
+    equation="r' += current_sin * sin(psi) + current_cos * cos(psi)",
+    coefficients=(
+        Coefficient("current_sin", "rad/s^2", -1.0, 1.0, 0.002, says="moment on a heading of east"),
+        Coefficient("current_cos", "rad/s^2", -1.0, 1.0, 0.002, says="moment on a heading of north"),
+    ),
+    telltale="the residual moment goes once around with the heading and changes sign on the opposite course",
+    excited_by=("turning_circle", "zigzag"),
+    mistaken_for=("compass_deviation", "trim_drift", "wave", "asymmetric_fin"),
+    source="Fossen 2011, section 8.3",
+    core=core,
+)

@@ -1,0 +1,32 @@
+"""Buoyancy and its centre shift with depth: q' += depth_moment z, z in m positive down, depth_moment in 1/(m s^2).
+
+A hull that compresses, foam that soaks and a free surface nearby do this; the trim Cb is then that at zero depth.
+Source: Fossen 2011, section 4.1 (restoring moment), with a buoyancy linear in depth.
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.record import Record
+
+
+def terms(values: Values, record: Record) -> Terms:
+    """Return the moment that goes with depth, (n,) rad/s^2."""
+    return Terms(moment=values["depth_moment"] * record["depth"])
+
+
+EFFECT = Effect(
+    name="depth_buoyancy",
+    says="the pitch trim shifts with depth",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.PITCH,),
+    equation="q' += depth_moment * z (trim: at zero depth)",
+    coefficients=(Coefficient("depth_moment", "1/(m s^2)", -2.0, 2.0, 0.005, says="pitch moment per metre of depth"),),
+    telltale="the residual pitch moves with depth, slower than any answer to the fin",
+    excited_by=("square_pulses", "doublet", "chirp"),
+    mistaken_for=("trim_drift", "heave_coupling", "speed_moment", "wave"),
+    source="Fossen 2011, section 4.1",
+    needs=("depth",),
+    terms=terms,
+)

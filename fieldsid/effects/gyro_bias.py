@@ -1,0 +1,31 @@
+"""The rate gyro has an offset: rate_measured = rate + bias, rad/s; the angle is right.
+
+Shows only where the angle is measured beside the rate, or where the trim is known. Source: Fossen 2011, chapter 11
+(strapdown sensors); Groves 2013, chapter 4.
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.record import Record
+
+
+def measure(motion: Motion, values: Values, record: Record) -> Motion:
+    """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
+    return Motion(motion.angle, motion.rate + values["bias"])
+
+
+EFFECT = Effect(
+    name="gyro_bias",
+    says="the rate gyro has a constant offset",
+    stage=Stage.SENSOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="rate_measured = rate + bias",
+    coefficients=(Coefficient("bias", "rad/s", -0.2, 0.2, 0.002, says="offset of the rate gyro"),),
+    telltale="the rate residual has a constant mean while the angle residual has none",
+    excited_by=("square_pulses", "doublet", "multisine"),
+    mistaken_for=("gyro_scale", "asymmetric_fin", "trim_drift"),
+    source="Groves 2013, chapter 4",
+    measure=measure,
+)

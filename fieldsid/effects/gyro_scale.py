@@ -1,0 +1,30 @@
+"""The rate gyro has a wrong scale: rate_measured = (1 + scale_error) rate; the angle is right.
+
+Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, chapter 4.
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.record import Record
+
+
+def measure(motion: Motion, values: Values, record: Record) -> Motion:
+    """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
+    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"]))
+
+
+EFFECT = Effect(
+    name="gyro_scale",
+    says="the rate gyro shows too much or too little by a constant share",
+    stage=Stage.SENSOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="rate_measured = (1 + scale_error) * rate",
+    coefficients=(Coefficient("scale_error", "1", -0.5, 0.5, 0.02, says="share by which the gyro shows too much"),),
+    telltale="the rate residual is in proportion to the rate while the angle residual is not in proportion to the angle",
+    excited_by=("zigzag", "turning_circle", "square_pulses", "multisine"),
+    mistaken_for=("gyro_bias", "compass_deviation", "speed_varying"),
+    source="Groves 2013, chapter 4",
+    measure=measure,
+)

@@ -1,0 +1,65 @@
+"""The fin turns no faster than its motor: |d delta/dt| <= max_rate (rad/s).
+
+The fin runs toward the command at max_rate until it meets it and then follows it as far as it can; it starts on the
+command. Source: Van Amerongen 1982 (the steering machine).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.effects._paths import line_of_two_pieces
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.jit import jit
+from fieldsid.models.record import Record
+
+
+@jit
+def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, max_rate: float, out: FloatArray) -> None:
+    """Fill out (n-1, 2) with start and end of the rate-limited path."""
+    fin = start[0]
+    for i in range(start.shape[0]):
+        h = steps[i]
+        slope = (end[i] - start[i]) / h
+        behind = start[i] - fin
+        toward = max_rate if behind > 0.0 else -max_rate
+        closing = max_rate - slope if behind > 0.0 else max_rate + slope
+        meets = h
+        if behind == 0.0:
+            meets = 0.0
+        elif closing > 0.0:
+            meets = min(abs(behind) / closing, h)
+        at_meeting = fin + toward * meets if meets > 0.0 else fin
+        if meets < h:
+            at_meeting = start[i] + slope * meets
+        after = min(max(slope, -max_rate), max_rate)
+        last = at_meeting + after * (h - meets)
+        out[i, 0], out[i, 1] = line_of_two_pieces(meets / h, fin, at_meeting, last)
+        fin = last
+
+
+def fin(path: FinPath, values: Values, record: Record) -> FinPath:
+    """Return the path of a fin that turns at `max_rate` at most, (n-1,) rad."""
+    out = np.empty((path.start.size, 2))
+    rate_limited(record.steps, path.start, path.end, float(values["max_rate"]), out)
+    return FinPath(out[:, 0].copy(), out[:, 1].copy())
+
+
+EFFECT = Effect(
+    name="rate_limit",
+    says="the fin turns no faster than its motor allows",
+    stage=Stage.ACTUATOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="d(delta)/dt = clip(toward command, -max_rate, max_rate)",
+    coefficients=(
+        Coefficient("max_rate", "rad/s", 0.02, 5.0, 0.5, scan=(0.1, 0.2, 0.4, 0.8, 1.6), step=1e-3, says="fastest fin rate"),
+    ),
+    telltale="the response starts late after large commands and in time after small ones: the lag grows with the step",
+    excited_by=("square_pulses", "doublet", "three_two_one_one", "zigzag"),
+    mistaken_for=("servo_lag", "delay", "stall", "sway_coupling", "heave_coupling"),
+    source="Van Amerongen 1982, Adaptive Steering of Ships (steering machine)",
+    order=20,
+    fin=fin,
+)

@@ -1,0 +1,32 @@
+"""A rolled hull yaws: r' += roll_moment phi, roll angle phi in rad (positive starboard down), roll_moment in 1/s^2.
+
+Rolled, the elevators and the weight beside the buoyancy have a part in the yaw plane.
+Source: Fossen 2011, section 7.5 (6-DOF underwater vehicle, coupled terms linearised in phi).
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.record import Record
+
+
+def terms(values: Values, record: Record) -> Terms:
+    """Return the moment of the roll angle, (n,) rad/s^2."""
+    return Terms(moment=values["roll_moment"] * record["roll"])
+
+
+EFFECT = Effect(
+    name="roll_coupling",
+    says="a rolled hull yaws, by its elevators and its weight",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.YAW,),
+    equation="r' += roll_moment * phi",
+    coefficients=(Coefficient("roll_moment", "1/s^2", -20.0, 20.0, 0.05, says="yaw moment per rad of roll"),),
+    telltale="the residual rate moves with the roll angle, with the fin still as well",
+    excited_by=("zigzag", "turning_circle", "square_pulses"),
+    mistaken_for=("wave", "sway_coupling", "asymmetric_fin", "step_change"),
+    source="Fossen 2011, section 7.5",
+    needs=("roll",),
+    terms=terms,
+)

@@ -1,0 +1,48 @@
+"""Speed changes within the run: authority goes as (u/u_run)^(2 s), damping as (u/u_run)^s, s = speed_share.
+
+u is the smoothed surge, u_run its median over the run, where the run's parameters hold; s = 1 is lift theory (fin
+force ~ u^2, linear damping ~ u), s = 0 no dependence. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.errors import EffectError
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.record import Record
+
+SLOWEST = 0.05
+"""Share of the run's speed below which a hull that stops or backs is held, since the law has no meaning there."""
+
+
+def terms(values: Values, record: Record) -> Terms:
+    """Return the factors on damping and authority, each (n,); raises EffectError where the run has no speed."""
+    surge = record["surge"]
+    if not record.speed > 0.0:
+        raise EffectError(
+            f"run {record.name!r} has no forward speed to refer to",
+            found=f"median surge {record.speed:.3g} m/s",
+            hint="leave `speed_varying` out, or check the sign of the surge speed on import",
+        )
+    factor = np.maximum(surge / record.speed, SLOWEST) ** values["speed_share"]
+    return Terms(damping_factor=factor, authority_factor=factor * factor)
+
+
+EFFECT = Effect(
+    name="speed_varying",
+    says="the speed changes within the run, and the fin's authority and the damping with it",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="b(t) = b * (u/u_run)^(2 * speed_share), a(t) = a * (u/u_run)^speed_share",
+    coefficients=(
+        Coefficient("speed_share", "1", 0.0, 1.5, 1.0, step=1e-3, says="1 is lift theory, b ~ u^2 and a ~ u; 0 is no change"),
+    ),
+    telltale="the gain of the response follows the speed: too strong a simulation where the vehicle has slowed down",
+    excited_by=("turning_circle", "zigzag", "square_pulses"),
+    mistaken_for=("quadratic_damping", "crossflow_drag", "stall", "step_change", "speed_moment", "prop_moment"),
+    source="Fossen 2011, section 6.4; the paper's law of authority against u^2",
+    needs=("surge",),
+    terms=terms,
+)

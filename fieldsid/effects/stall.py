@@ -1,0 +1,46 @@
+"""Lift falls off at large fin angles: beyond stall_angle the effective angle grows with slope_after only.
+
+    delta = sign(d) (stall_angle + slope_after (|d| - stall_angle))   for |d| > stall_angle, else d
+slope_after = 1 is no stall, 0 a lift that stays, negative one that drops. Source: Whicker and Fehlner 1958, DTMB
+report 933 (lift of low-aspect-ratio control surfaces).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.effects._paths import through_map
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.record import Record
+
+
+def fin(path: FinPath, values: Values, record: Record) -> FinPath:
+    """Return the path of the effective angle, (n-1,) rad."""
+    angle, lost = values["stall_angle"], 1.0 - values["slope_after"]
+    return through_map(
+        path,
+        lambda d: d - lost * np.sign(d) * np.maximum(np.abs(d) - angle, 0.0),
+        lambda d: 0.5 * d * d - 0.5 * lost * np.maximum(np.abs(d) - angle, 0.0) ** 2,
+    )
+
+
+EFFECT = Effect(
+    name="stall",
+    says="the lift of the fin falls off beyond an angle",
+    stage=Stage.ACTUATOR,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="delta = sign(d) * (stall_angle + slope_after * (|d| - stall_angle)) for |d| > stall_angle, else d",
+    coefficients=(
+        Coefficient(
+            "stall_angle", "rad", 0.03, 0.6, 0.2, scan=(0.08, 0.14, 0.2, 0.28), step=5e-4, says="angle where the lift falls off"
+        ),
+        Coefficient("slope_after", "1", -1.0, 0.95, 0.0, says="slope of the lift beyond it, as a share of the slope before"),
+    ),
+    telltale="large commands give less turn than simulated while small ones fit, whatever the rate",
+    excited_by=("stairs", "square_pulses", "multisine", "zigzag", "turning_circle"),
+    mistaken_for=("quadratic_damping", "deadband", "rate_limit", "crossflow_drag", "asymmetric_fin"),
+    source="Whicker and Fehlner 1958, DTMB report 933",
+    order=70,
+    fin=fin,
+)

@@ -1,0 +1,53 @@
+"""Something changes for good during the run, such as a lost fin: from the event on authority (1 - loss), moment + moment_step.
+
+    b(t) = b (1 - loss H(t)),   moment = moment_step H(t),   H from 0 to 1 at event_time over one sample
+event_time is a share of the run's length and every run has its own. Source: Blanke et al. 2016, Diagnosis and
+Fault-Tolerant Control, chapter 2 (abrupt actuator fault).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.record import Record
+
+GRID = tuple(round(0.05 * i, 2) for i in range(1, 20))
+
+
+def happened(share: float, record: Record) -> FloatArray:
+    """Return H (n,): 0 before the event, 1 after it, a ramp of one sample around it so that it has a derivative."""
+    length = float(record.time[-1] - record.time[0])
+    event = record.time[0] + share * length
+    sample = length / max(record.time.size - 1, 1)
+    return np.asarray(np.clip((record.time - event) / sample + 0.5, 0.0, 1.0))
+
+
+def terms(values: Values, record: Record) -> Terms:
+    """Return the factor on the authority (n,) and the moment (n,) rad/s^2."""
+    after = happened(values["event_time"], record)
+    return Terms(authority_factor=1.0 - values["loss"] * after, moment=values["moment_step"] * after)
+
+
+EFFECT = Effect(
+    name="step_change",
+    says="something changes for good during the run, such as a lost or fouled fin",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="b(t) = b * (1 - loss * H(t - event)), moment = moment_step * H(t - event)",
+    coefficients=(
+        Coefficient("loss", "1", -1.0, 1.0, 0.05, says="share of the authority lost at the event"),
+        Coefficient("moment_step", "rad/s^2", -2.0, 2.0, 0.005, says="change of the trim moment at the event"),
+        Coefficient(
+            "event_time", "run", 0.0, 1.0, 0.5, scan=GRID, step=2e-3, per_run=True, says="when it happens, as a share of the run"
+        ),
+    ),
+    telltale="the residual is white up to one moment and one-sided or too small in gain from there on",
+    excited_by=("square_pulses", "multisine", "zigzag", "prbs"),
+    mistaken_for=("trim_drift", "speed_varying", "asymmetric_fin", "prop_moment", "wave"),
+    source="Blanke, Kinnaert, Lunze and Staroswiecki 2016, Diagnosis and Fault-Tolerant Control",
+    terms=terms,
+    handicap=5.0,
+)

@@ -1,0 +1,40 @@
+"""Sway takes part in yaw through the Munk moment: an extra state x, the yaw moment of the sway speed (rad/s^2).
+
+    r' += x,   x' = -cross_damping s x - cross_rate s^2 r,   s = speed / reference speed
+From v' = -a11 v - a12 r + b1 delta and r' = -a21 v - a22 r + b2 delta, all of it lift, so a11, a12, a21 ~ u and b1 ~ u^2.
+The fin's own side force b1 cannot be seen in yaw: with z = -a21 v + (a21 b1 / b2) r it drops out and leaves the same
+transfer function, a zero at -cross_damping and two poles. So x is that combination; needs no sway sensor.
+Source: Fossen 2011, section 7.2 (second-order Nomoto: K, T1, T2, T3 are the same four numbers); the paper's full form.
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
+
+
+def core(values: Values, scale: float) -> Core:
+    """Return the core's coefficients at `scale` times the reference speed."""
+    return Core(
+        cross_damping=values["cross_damping"] * scale,
+        cross_rate=values["cross_rate"] * scale**2,
+    )
+
+
+EFFECT = Effect(
+    name="sway_coupling",
+    says="the vehicle drifts sideways in a turn and the drift turns it further (Munk moment)",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.YAW,),
+    equation="r' += x; x' = -cross_damping s x - cross_rate s^2 r, s = speed/reference",
+    coefficients=(
+        Coefficient("cross_damping", "1/s", 0.02, 10.0, 0.8, scan=(0.2, 0.8, 3.0), step=1e-3, says="damping of the sway speed"),
+        Coefficient("cross_rate", "1/s^2", -20.0, 20.0, 0.1, says="Munk moment the turn rate builds up; minus turns on"),
+    ),
+    telltale="the rate overshoots or creeps on after a command where a first-order yaw would have settled",
+    excited_by=("multisine", "zigzag", "three_two_one_one", "turning_circle", "square_pulses"),
+    mistaken_for=("servo_lag", "delay", "quadratic_damping", "crossflow_drag", "roll_coupling"),
+    source="Fossen 2011, section 7.2; the paper's yaw model before sway is dropped",
+    extra_states=("sway",),
+    core=core,
+)

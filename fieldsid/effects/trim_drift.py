@@ -1,0 +1,34 @@
+"""The trim moment drifts: moment = drift (t - t_first) / 60, drift in rad/s^2 per minute, t_first the run's first sample.
+
+Flooding, a shifting battery or a cooling servo does this; the trim itself is that of the run's start. Positive
+drift turns toward positive angle.
+Source: Fossen 2011, section 4.1 (restoring moment of a moving centre of gravity).
+"""
+
+from __future__ import annotations
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.record import Record
+
+MINUTE_S = 60.0
+
+
+def terms(values: Values, record: Record) -> Terms:
+    """Return the drifting moment, (n,) rad/s^2."""
+    return Terms(moment=values["drift"] * (record.time - record.time[0]) / MINUTE_S)
+
+
+EFFECT = Effect(
+    name="trim_drift",
+    says="the trim moment drifts steadily through the run",
+    stage=Stage.HYDRODYNAMICS,
+    axes=(Axis.YAW, Axis.PITCH),
+    equation="moment = drift * (t - t_first) / 60",
+    coefficients=(Coefficient("drift", "rad/s^2 per min", -2.0, 2.0, 0.01, says="change of the trim moment per minute"),),
+    telltale="the residual rate leans: early and late parts of every run err to opposite sides, whatever the fin does",
+    excited_by=("square_pulses", "multisine", "zigzag"),
+    mistaken_for=("step_change", "speed_moment", "depth_buoyancy", "prop_moment", "gyro_bias", "wave"),
+    source="Fossen 2011, section 4.1",
+    terms=terms,
+)

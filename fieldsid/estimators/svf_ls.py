@@ -1,0 +1,204 @@
+"""State variable filter and block least squares: the paper's method on the whole record at once.
+
+Phi Theta = Q with Phi = [-p_f, -y_f, delta_f, 1_f] from the filter's states, initial values as columns of their own.
+The command is held, the measurement straight between samples, then parabolic with the curvature of the model just
+found. The speed law of a joint fit is a(u) ~ u. Source: the paper, estimator 2 (block least squares).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.errors import DataError, ModelError
+from fieldsid.estimators.output_error import residual_noise
+from fieldsid.fitting.equation import Equation, Measured, Theta, filtered_equation, measured_signals
+from fieldsid.fitting.layout import group_name
+from fieldsid.fitting.method import Estimator, Options, Solution
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.predict import refit_own
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.sample_noise import noise_share, transfer_of
+from fieldsid.fitting.series_errors import Series, coloured_covariance
+from fieldsid.logs.run import FloatArray, Note
+from fieldsid.models.axis import NAMES
+from fieldsid.models.record import Record
+
+PASSES = 3
+WIDEST_BY_ANGLE = 4.0
+"""Filter bandwidth (rad/s) above which the noise of an angle alone biases the damping."""
+
+
+def solve(problem: Problem, options: Options) -> Solution:
+    """Return the block least-squares solution of a joint problem; raises DataError where the data cannot carry it."""
+    x, covariance, signals = regress(problem, options.bandwidth)
+    return finished(problem, x, covariance, ESTIMATOR.name, bandwidth_notes(signals, options.bandwidth))
+
+
+def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray, list[Measured]]:
+    """Return the vector (N,), covariance (S, S) of its shared slots, and the signals of each run."""
+    signals = [measured_signals(r, bandwidth) for r in problem.records]
+    slots = base_slots(problem)
+    theta: list[Theta] | None = None
+    for _ in range(PASSES):
+        blocks = [
+            filtered_equation(r, s, bandwidth, None if theta is None else theta[i])
+            for i, (r, s) in enumerate(zip(problem.records, signals, strict=True))
+        ]
+        rows = Stacked.of(problem, blocks, slots)
+        found = least_squares(rows, len(slots))
+        found, inverse = without_noise_bias(problem, rows, found, signals, bandwidth)
+        x = problem.start()
+        x[list(slots.values())] = found[: len(slots)]
+        theta = [theta_of(problem, x, run) for run in range(len(problem.records))]
+    residual = rows.target - rows.matrix @ found
+    series = [
+        Series(rows.matrix[part], residual[part], transfer_of(s.order, bandwidth, median_step(r), t), median_step(r))
+        for part, s, r, t in zip(rows.parts, signals, problem.records, theta or [], strict=True)
+    ]
+    small = coloured_covariance(series, inverse)
+    covariance = np.zeros((problem.layout.shared, problem.layout.shared))
+    places = list(slots.values())
+    covariance[np.ix_(places, places)] = small[: len(places), : len(places)]
+    return x, covariance, signals
+
+
+def median_step(record: Record) -> float:
+    """Return the usual sampling interval in s."""
+    return float(np.median(record.steps))
+
+
+@dataclass(frozen=True, slots=True)
+class Stacked:
+    """All runs' rows: matrix (m, P) over base parameters and each run's start terms, target (m,), each run's part.
+
+    `maps` (runs of (4, P)) take a run's own four columns to the stack's.
+    """
+
+    matrix: FloatArray
+    target: FloatArray
+    parts: tuple[slice, ...]
+    maps: tuple[FloatArray, ...]
+
+    @classmethod
+    def of(cls, problem: Problem, blocks: list[Equation], slots: dict[str, int]) -> Stacked:
+        """Stack the regressions of a joint problem's runs."""
+        width = len(slots) + sum(b.start.shape[1] for b in blocks)
+        matrix = np.zeros((sum(b.target.size for b in blocks), width))
+        parts, maps, top, left = [], [], 0, len(slots)
+        for run, block in enumerate(blocks):
+            part = slice(top, top + block.target.size)
+            own = column_map(problem, run, slots, width)
+            matrix[part] = block.columns @ own
+            matrix[part, left : left + block.start.shape[1]] = block.start
+            parts.append(part)
+            maps.append(own)
+            top, left = part.stop, left + block.start.shape[1]
+        return cls(matrix, np.concatenate([b.target for b in blocks]), tuple(parts), tuple(maps))
+
+
+def column_map(problem: Problem, run: int, slots: dict[str, int], width: int) -> FloatArray:
+    """Return how a run's damping, stiffness, authority and trim follow from the shared parameters, (4, width)."""
+    names, groups = NAMES[problem.layout.axis], problem.layout.groups
+    order, out = list(slots), np.zeros((4, width))
+    ones = problem.start()
+    ones[list(slots.values())] = 1.0
+    unit = problem.base_of(ones, run)
+    out[0, order.index(names.damping)] = unit.damping
+    if names.stiffness is not None:
+        out[1, order.index(names.stiffness)] = 1.0
+    out[2, order.index(group_name(names.authority, groups, groups.of_run[run]))] = unit.authority
+    out[3, order.index(names.trim)] = 1.0
+    return out
+
+
+def without_noise_bias(
+    problem: Problem, rows: Stacked, found: FloatArray, signals: list[Measured], bandwidth: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the estimate (P,) with the bias of white sample noise taken out, and its inverse normal matrix (P, P).
+
+    Where noise makes up more than half of a direction, the estimate is returned as it is: nothing can mend it.
+    """
+    normal = rows.matrix.T @ rows.matrix
+    gram, cross = np.zeros_like(normal), np.zeros(normal.shape[0])
+    for record, s, part, own in zip(problem.records, signals, rows.parts, rows.maps, strict=True):
+        floor = floor_of([record])
+        share = noise_share(s.order, bandwidth, median_step(record), floor.angle, floor.rate)
+        count = part.stop - part.start
+        gram += count * own.T @ share.gram @ own
+        cross += count * own.T @ share.cross
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    clean = (normal - gram) * np.outer(scale, scale)
+    if float(np.linalg.eigvalsh(clean)[0]) < 0.5 * float(np.linalg.eigvalsh(normal * np.outer(scale, scale))[0]):
+        return found, np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-13, hermitian=True) * np.outer(scale, scale)
+    inverse = np.linalg.pinv(clean, rcond=1e-13, hermitian=True) * np.outer(scale, scale)
+    return np.asarray(found + inverse @ (gram @ found - cross)), inverse
+
+
+def base_slots(problem: Problem) -> dict[str, int]:
+    """Return the position of every base parameter that is estimated, in the order of the regression's columns."""
+    names, layout = NAMES[problem.layout.axis], problem.layout
+    wanted = [names.damping, *([] if names.stiffness is None else [names.stiffness])]
+    wanted += [group_name(names.authority, layout.groups, g) for g in range(len(layout.groups.speeds))] + [names.trim]
+    return {n: layout.names.index(n) for n in wanted}
+
+
+def least_squares(rows: Stacked, wanted: int) -> FloatArray:
+    """Return the solution (P,); raises DataError where fewer than the `wanted` first columns can be told apart."""
+    matrix, target = rows.matrix, rows.target
+    scale = np.linalg.norm(matrix, axis=0)
+    dead = np.flatnonzero(scale[:wanted] == 0.0)
+    if target.size < matrix.shape[1] or dead.size:
+        raise DataError(
+            "the filtered data cannot carry a least squares",
+            found=f"{target.size} usable samples, {dead.size} parameters without any signal",
+            hint="widen `--from` and `--to` so that the fin moves within them",
+        )
+    solution: FloatArray = np.linalg.lstsq(matrix / np.maximum(scale, 1e-300), target, rcond=1e-12)[0]
+    return np.asarray(solution / np.maximum(scale, 1e-300))
+
+
+def theta_of(problem: Problem, x: FloatArray, run: int) -> Theta:
+    """Return a run's own base parameters."""
+    base = problem.base_of(x, run)
+    return Theta(base.damping, base.stiffness, base.authority, base.trim)
+
+
+def finished(problem: Problem, x: FloatArray, covariance: FloatArray, method: str, notes: tuple[Note, ...]) -> Solution:
+    """Return the solution with every run's initial state at its best and the noise of its free run.
+
+    Raises ModelError when the motion that was found grows without bound.
+    """
+    layout = problem.layout
+    x = np.clip(x, layout.low, layout.high)
+    for run, record in enumerate(problem.records):
+        x = refit_own(problem, x, run, floor_of([record]))
+    noise = residual_noise(problem, x, len(base_slots(problem)))
+    if not np.isfinite([noise.angle, noise.rate]).all():
+        raise ModelError(
+            f"the equation-error fit of `{method}` grows without bound when simulated",
+            found=", ".join(f"{n} = {x[i]:.3g}" for n, i in base_slots(problem).items()),
+            hint="use `--method output_error --effects quadratic_damping`",
+        )
+    return Solution(x, covariance, noise, method, notes)
+
+
+def bandwidth_notes(signals: list[Measured], bandwidth: float) -> tuple[Note, ...]:
+    """Return the remark on a filter too wide for a log without a rate."""
+    if bandwidth <= WIDEST_BY_ANGLE or all(s.order == 1 for s in signals):
+        return ()
+    message = (
+        f"no rate was measured and the filter is wide (lambda = {bandwidth:g}, limit {WIDEST_BY_ANGLE:g} rad/s): "
+        "noise of the angle biases the damping; use `--method srivc` or a smaller lambda"
+    )
+    return (Note("wide_filter_angle_only", message, {"lambda": bandwidth, "limit": WIDEST_BY_ANGLE}),)
+
+
+ESTIMATOR = Estimator(
+    name="svf_ls",
+    says="the paper's state variable filter with least squares over the whole record; no simulation, biased by a disturbance",
+    source="the paper, state variable filter and block least squares; Garnier and Wang 2008, chapter 1",
+    solve=solve,
+    takes_effects=False,
+)

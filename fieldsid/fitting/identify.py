@@ -1,0 +1,37 @@
+"""From runs to fits, one each or one for all: the function behind `sysid identify`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from fieldsid.fitting.fit import AUTO, Fit, fit
+from fieldsid.fitting.method import Options
+from fieldsid.logs import Run, segment
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+
+
+def identify(
+    runs: Sequence[Run],
+    axis: Axis,
+    *,
+    method: str = AUTO,
+    effects: Sequence[str] = (),
+    joint: bool = False,
+    whole: bool = False,
+    options: Options | None = None,
+    done: Callable[[], None] = lambda: None,
+) -> tuple[Fit, ...]:
+    """Return one fit per run, or a single one over all of them when joint; `done` is called after each.
+
+    Of each run the part is used that excites the axis (logs/segments.py), or all of it when `whole`.
+    Raises DataError for runs that do not allow the fit, UsageError for a method that cannot do what is asked.
+    """
+    parts = runs if whole else [segment(run, axis).of(run) for run in runs]
+    records = [record_of(part, axis) for part in parts]
+    groups = [records] if joint else [[record] for record in records]
+    fits = []
+    for group in groups:
+        fits.append(fit(group, axis, method=method, effects=effects, options=options))
+        done()
+    return tuple(fits)

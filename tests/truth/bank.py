@@ -1,0 +1,251 @@
+"""The blind bank: cases with a hidden effect, two, none, one of another shape, or a cause no catalogue has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from truth import kernel
+from truth.basefit import Sample, fit_base, left_over, responses, start_removed
+from truth.logbook import write_log
+from truth.scene import TRAINING, calibrated, draw_scene
+from truth.simple import fly, replay
+from truth.strengths import LARGEST, PITCH, RESHAPED, YAW, reshaped
+from truth.uncatalogued import CAUSES
+
+KINDS = ("single", "imperfect", "none", "pair", "uncatalogued")
+SHARES = (0.5, 0.13, 0.13, 0.12, 0.12)
+VISIBLE = 1.35
+LEARNABLE = 1.2
+"""Least base error over the floor on the runs that are judged, and on those that are learned from."""
+TRIES = 4
+WANTS = {
+    "current": ("circle", "zigzag"), "compass_deviation": ("circle", "zigzag"), "sway_coupling": ("zigzag",),
+    "crossflow_drag": ("circle", "zigzag"), "quadratic_damping": ("circle", "zigzag"), "large_angle_righting": ("stairs",),
+    "heave_coupling": ("stairs", "zigzag"), "stall": ("pulses",), "speed_varying": ("zigzag",),
+}  # fmt: skip
+APART = (
+    {"delay", "servo_lag", "rate_limit", "clock_offset"}, {"deadband", "backlash", "stall", "asymmetric_fin"},
+    {"quadratic_damping", "crossflow_drag", "stall", "sway_coupling", "heave_coupling", "speed_varying", "gyro_scale"},
+    {"trim_drift", "step_change", "prop_moment", "speed_moment", "depth_buoyancy", "wave", "roll_coupling", "gyro_bias"},
+    {"current", "compass_deviation", "trim_drift"}, {"large_angle_righting", "step_change", "depth_buoyancy"},
+)  # fmt: skip
+"""Sets of which a pair takes at most one member: telling those apart is a matter for singles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One blind case. `training` and `validation` are logs with canonical columns.
+
+    `floor` is the rms, per channel over the validation runs, of the measurement less the truth's own answer without
+    noise and disturbance (start refitted); `ratio` the base model's error over it, both channels pooled, on the
+    validation runs, `ratio_training` on the others; `visible` whether it exceeds 1.35 (and 1.2 on the training runs, or
+    nothing could be learned). `effects` holds the catalogue's names of what is hidden, `accepts` those that count as right.
+    """
+
+    name: str
+    axis: str
+    kind: str
+    effects: tuple[str, ...]
+    accepts: frozenset[str]
+    expected: str
+    training: list[dict[str, np.ndarray]]
+    validation: list[dict[str, np.ndarray]]
+    floor: dict[str, float]
+    floor_training: dict[str, float]
+    base: dict[str, float]
+    ratio: float
+    ratio_training: float
+    visible: bool
+    details: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Hidden:
+    """Causes of a case: (name, apply, events, strength) each."""
+
+    causes: list[list]
+
+    def updates(self, ratio, run, index=None):
+        """Fields of Physics and of the scene for one run, of one cause or of all."""
+        out: dict[str, float] = {}
+        for _, apply, _, strength in self.causes if index is None else [self.causes[index]]:
+            new = apply(strength, ratio, run)
+            out |= {k: out.get(k, 0.0) + v if k == "trim" else v for k, v in new.items()}
+        return out
+
+
+def cases(n: int, seed: int, *, kind: str | None = None, first: int = 0) -> Iterator[Case]:
+    """Yield cases first .. first + n - 1 of a bank; each depends on (seed, its index) alone."""
+    for index in range(first, first + n):
+        yield make_case(index, seed, kind=kind)
+
+
+def make_case(index: int, seed: int, *, kind: str | None = None) -> Case:
+    """One case by (seed, index); `kind` overrides what the bank would have drawn."""
+    rng = np.random.default_rng([seed, index])
+    drawn = str(rng.choice(KINDS, p=SHARES))
+    kind = drawn if kind is None else kind
+    pitching = bool(rng.random() < 0.4)
+    names = draw_names(rng, kind, pitching)
+    scene = calibrated(draw_scene(rng, pitching, WANTS.get(names[0], ()) if names else ()))
+    hidden = draw_hidden(rng, kind, names, scene)
+    goal = np.exp(rng.uniform(np.log(1.45), np.log(8.0))) if kind in ("single", "imperfect") else rng.uniform(2.0, 6.0)
+    scene.notes["alone"] = [tune(scene, hidden, i, goal) for i in range(len(hidden.causes))]
+    return assemble(f"{kind}-{seed}-{index}", kind, names, scene, hidden, rng)
+
+
+def draw_names(rng, kind, pitching):
+    """Names of what is hidden."""
+    catalogue = sorted(PITCH if pitching else YAW)
+    if kind == "none":
+        return ()
+    if kind == "single":
+        return (str(rng.choice(catalogue)),)
+    if kind == "imperfect":
+        own = ["heave_coupling"] if pitching else ["sway_coupling", "compass_deviation"]
+        return (str(rng.choice([*RESHAPED, *own])),)
+    if kind == "uncatalogued":
+        return (str(rng.choice(sorted(CAUSES))),)
+    while True:
+        pair = tuple(map(str, rng.choice(catalogue, 2, replace=False)))
+        if not any(set(pair) <= group for group in APART):
+            return pair
+
+
+def draw_hidden(rng, kind, names, scene):
+    """Shapes of the causes, strength not yet set."""
+    catalogue = PITCH if scene.pitching else YAW
+    causes = []
+    for name in names:
+        if kind == "uncatalogued":
+            apply, events = CAUSES[name](rng, scene.setting)
+        else:
+            apply, events = catalogue[name](rng, scene.setting), None
+            apply = reshaped(name, apply, scene.setting) if kind == "imperfect" else apply
+        causes.append([name, apply, events, 0.3])
+    return Hidden(causes)
+
+
+def inputs_of(scene, hidden, leg, i, updates, *, noisy, only=None):
+    """The kernel's inputs for one leg: weather, thrust, roll and events."""
+    inputs = leg.inputs.copy()
+    swing = updates.get("thrust_swing", scene.notes["swing"])
+    inputs[kernel.THRUST] = scene.base.nominal_thrust * (1.0 + swing * inputs[kernel.THRUST])
+    inputs[kernel.ROLL_PUSH] *= updates.get("roll_push", 0.01)
+    scale = 1.0 if noisy else 0.0
+    inputs[kernel.ANGLE_NOISE] *= scene.sigma[0] * scale
+    inputs[kernel.RATE_NOISE] *= scene.sigma[1] * scale
+    inputs[kernel.DISTURBANCE] *= scale
+    for k, (_, _, events, strength) in enumerate(hidden.causes):
+        if events is not None and only in (None, k):
+            events(inputs, scene.clock, strength, i)
+    return inputs
+
+
+def fly_leg(scene, hidden, i, *, noisy, only=None, step=0.002):
+    """Fly leg i with all causes or one; returns (physics, inputs, motion, depth at the start)."""
+    leg = scene.legs[i]
+    updates = hidden.updates(leg.speed / scene.base.nominal_speed, i, only)
+    physics = scene.physics(leg, updates)
+    inputs = inputs_of(scene, hidden, leg, i, updates, noisy=noisy, only=only)
+    depth = 6.0 + updates.get("depth_spread", 0.3) * (leg.depth - 6.0)
+    motion = fly(physics, scene.clock, leg.maneuver, inputs, pitching=scene.pitching, angle=leg.angle, depth=depth, step=step)
+    if physics.speed_varying > 0.0:
+        physics = physics._replace(median_speed=float(np.median(motion.surge)))
+        motion = fly(physics, scene.clock, leg.maneuver, inputs, pitching=scene.pitching, angle=leg.angle, depth=depth, step=step)
+    return physics, inputs, motion, depth
+
+
+def sample_of(scene, i, motion, noise=(0.0, 0.0)):
+    """A run as the base fit sees it."""
+    leg = scene.legs[i]
+    ratio = leg.speed / scene.base.nominal_speed
+    return Sample(motion.command, motion.angle + noise[0], motion.rate + noise[1], scene.clock.sample, ratio, leg.group)
+
+
+def base_errors(scene, samples, floor):
+    """Pooled error over `floor` of the best base fit on the training runs: (training, validation, rms per channel)."""
+    start = (scene.setting.damping, scene.setting.stiffness)[: 2 if scene.pitching else 1]
+    laws = (scene.law,) if len({s.ratio for s in samples}) == 1 else (0.0, 1.0)
+    fit = min((fit_base(samples[:TRAINING], start, floor, exponent=e) for e in laws), key=lambda f: f.cost)
+    left = [np.sqrt(np.mean(left_over(fit, s, floor) ** 2, axis=0)) for s in samples]
+    train, valid = (np.sqrt(np.mean(np.square(part), axis=0)) for part in (left[:TRAINING], left[TRAINING:]))
+    return pooled(train, floor), pooled(valid, floor), valid
+
+
+def pooled(rms, floor):
+    """One number for two channels: root of the mean of the squared ratios."""
+    return float(np.sqrt(np.mean((np.asarray(rms) / np.asarray(floor)) ** 2)))
+
+
+def tune(scene, hidden, i, goal):
+    """Set the strength of cause i so that the base error comes near `goal` times the floor; returns how near it came."""
+    name = hidden.causes[i][0]
+    largest, seen, floor = LARGEST.get(name, 3.0), [], expected_floor(scene)
+    wanted, strength = np.sqrt(goal**2 - 1.0), 0.3
+    for _ in range(TRIES):
+        hidden.causes[i][3] = strength
+        flown = [fly_leg(scene, hidden, k, noisy=False, only=i, step=0.01)[2] for k in range(len(scene.legs))]
+        _, got, _ = base_errors(scene, [sample_of(scene, k, m) for k, m in enumerate(flown)], floor)
+        seen.append((abs(np.log(max(got, 1e-6) / wanted)), strength, np.sqrt(1.0 + got**2)))
+        following = float(np.clip(strength * np.clip(wanted / max(got, 1e-6), 0.1, 8.0), 0.01, largest))
+        if seen[-1][0] < 0.15 or following == strength:
+            break
+        strength = following
+    _, hidden.causes[i][3], alone = min(seen)
+    return float(alone)
+
+
+def expected_floor(scene):
+    """About what the floor will be: sensor noise, and the gust's part in the angle."""
+    gust = scene.notes["gust"] if scene.notes["colour"] == "disturbance" else 0.0
+    return scene.sigma[0] * np.sqrt(1.0 + gust**2), scene.sigma[1] * (1.0 + 0.3 * min(gust, 1.0))
+
+
+def assemble(name, kind, names, scene, hidden, rng):
+    """Fly every leg with its weather, measure floor and base error, write the logs."""
+    logs, noise_left, samples = [], [], []
+    for i, leg in enumerate(scene.legs):
+        physics, inputs, motion, depth = fly_leg(scene, hidden, i, noisy=True)
+        noise = scene.clock.logged(inputs[kernel.ANGLE_NOISE]), scene.clock.logged(inputs[kernel.RATE_NOISE])
+        ideal = replay(physics, scene.clock, motion, inputs, pitching=scene.pitching, angle=leg.angle, depth=depth)
+        error = np.stack([motion.angle + noise[0] - ideal.angle, motion.rate + noise[1] - ideal.rate], axis=1)
+        start = responses(physics.damping, physics.stiffness, motion.command, scene.clock.sample)[:, :, 2:]
+        noise_left.append(np.sqrt(np.mean(start_removed(error, start, scene.sigma) ** 2, axis=0)))
+        samples.append(sample_of(scene, i, motion, noise))
+        logs.append(write_log(rng, scene, motion, samples[-1], inputs))
+    floors = [np.sqrt(np.mean(np.square(part), axis=0)) for part in (noise_left[:TRAINING], noise_left[TRAINING:])]
+    trained, _, _ = base_errors(scene, samples, floors[0])
+    _, judged, base = base_errors(scene, samples, floors[1])
+    return Case(
+        name=name, axis="pitch" if scene.pitching else "yaw", kind=kind,
+        effects=() if kind in ("none", "uncatalogued") else names,
+        accepts=frozenset() if kind in ("none", "uncatalogued") else frozenset(names),
+        expected={"none": "sufficient", "uncatalogued": "unexplained"}.get(kind, "effect"),
+        training=logs[:TRAINING], validation=logs[TRAINING:], floor=_named(floors[1]), floor_training=_named(floors[0]),
+        base=_named(base), ratio=judged, ratio_training=trained, visible=seen(judged, trained, scene),
+        details=_details(scene, hidden),
+    )  # fmt: skip
+
+
+def seen(judged, trained, scene):
+    """Whether the base error stands clear of the floor, each of two causes alone as well."""
+    return judged > VISIBLE and trained > LEARNABLE and min(scene.notes["alone"], default=VISIBLE + 1) > VISIBLE
+
+
+def _named(values):
+    return {"angle_rad": float(values[0]), "rate_rad_s": float(values[1])}
+
+
+def _details(scene, hidden):
+    s = scene.setting
+    return {
+        "causes": {name: strength for name, _, _, strength in hidden.causes},
+        "speeds": [round(leg.speed, 3) for leg in scene.legs],
+        "rate_hz": round(1.0 / scene.clock.sample),
+        "damping": s.damping, "stiffness": s.stiffness, "authority": s.authority, "law": scene.law, **scene.notes,
+        "fields": hidden.updates(1.0, 0),
+    }  # fmt: skip
