@@ -1,0 +1,86 @@
+"""sysid import: a clean Run: SI, one frame, one clock, quality notes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.options import Force, FromS, JsonFlag, MappingFile, ToS, VehicleFile
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.logs.importing import Imported
+
+
+def command(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs: tables of text, Parquet, ROS 1 and ROS 2 bags.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR|FILE", help="Folder for the runs, or the file of a single one.")
+    ],
+    mapping: MappingFile = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option("--channel", metavar="SIGNAL=COLUMN:UNIT", help="Map one signal; counts more than the mapping; may repeat."),
+    ] = None,
+    msg_path: Annotated[
+        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
+    ] = None,
+    vehicle: VehicleFile = None,
+    from_s: FromS = None,
+    to_s: ToS = None,
+    max_gap: Annotated[
+        float, typer.Option("--max-gap", metavar="S", help="Longest gap allowed in a main signal.", min=0.0)
+    ] = 2.0,
+    salvage: Annotated[
+        bool, typer.Option("--salvage", help="Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
+    ] = False,
+    format_: Annotated[
+        str, typer.Option("--format", metavar="parquet|csv|csv.gz", help="Kind of file in the folder.")
+    ] = "parquet",
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> None:
+    """Turn logs into Runs: SI and radians, NED and forward-starboard-down, one clock, gaps left as gaps.
+
+    Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
+    """
+    from fieldsid.cli.console import emit, tracked, warn
+    from fieldsid.logs.importing import Importer
+
+    importer = Importer(mapping, tuple(channel or ()), msg_path, from_s, to_s, max_gap, salvage=salvage)
+    limits = _fin_limits(vehicle)
+    targets = importer.targets(logs, output, format_, force=force)
+    runs = [importer.read(log, limits) for log in tracked(logs, "reading")]
+    done = [importer.write(run, target, force=force) for run, target in zip(runs, targets, strict=True)]
+    emit({"schema": "fieldsid/import/1", "runs": [d.record() for d in done]}, as_json=as_json, render=lambda c: _render(done, c))
+    for item in done:
+        warn(item.warnings, of=item.run.name)
+
+
+def _fin_limits(vehicle: Path | None) -> dict[str, float]:
+    from fieldsid.vehicle import find_vehicle, load_vehicle
+
+    known = load_vehicle(vehicle) if vehicle is not None else find_vehicle(Path())
+    limits = {} if known is None else {"rudder_rad": known.rudder_max_rad, "elevator_rad": known.elevator_max_rad}
+    return {signal: limit for signal, limit in limits.items() if limit is not None}
+
+
+def _render(done: list[Imported], console: Console) -> None:
+    from fieldsid.cli.console import table
+
+    rows: list[Any] = []
+    for item in done:
+        record = item.record()
+        rows.append(
+            (
+                record["file"],
+                str(record["samples"]),
+                f"{record['duration_s']:.2f}",
+                f"{record['rate_hz']:.4g}",
+                str(len(record["signals"])),
+            )
+        )
+    console.print(table("", ("run", "samples", "s", "Hz", "signals"), rows))

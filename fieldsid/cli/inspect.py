@@ -1,0 +1,59 @@
+"""sysid inspect: what is in a log, a proposed mapping, the import doctor's findings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.options import Force, JsonFlag, LogFile, MappingFile
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.logs.inspection import Inspection
+
+
+def command(
+    log: LogFile,
+    mapping: MappingFile = None,
+    msg_path: Annotated[
+        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
+    ] = None,
+    write_mapping: Annotated[
+        Path | None, typer.Option("--write-mapping", metavar="FILE", help="Write the mapping, for `sysid import --mapping`.")
+    ] = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> None:
+    """Say what is in a log, which mapping it may need, and what would spoil an identification.
+
+    Example: sysid inspect run7.mcap --write-mapping mapping.yaml
+    """
+    from fieldsid.cli.console import emit, say
+    from fieldsid.logs.inspection import inspect_log, write_proposal
+
+    found = inspect_log(log, mapping=mapping, msg_path=msg_path)
+    written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
+    emit(found.record(written), as_json=as_json, render=lambda console: _render(found, console))
+    if written is not None:
+        say(f"wrote {written}; check it, then: sysid import {log} --mapping {written} -o runs/")
+
+
+def _render(found: Inspection, console: Console) -> None:
+    from rich.text import Text
+
+    from fieldsid.cli.console import table
+
+    record: dict[str, Any] = found.record(None)
+    console.print(Text(f"{record['path']}: {record['format']}, {record['span']}"))
+    rows = [(c["name"], c["type"], str(c["count"]), c["rate"], c["holds"]) for c in record["shown"]]
+    console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
+    console.print(Text("\nmapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), style="bold"))
+    console.print(Text(found.yaml().rstrip()))
+    console.print(Text("\nfindings", style="bold"))
+    for note in found.notes:
+        console.print(Text(f"- {note.message} [{note.code}]"))
+    if not found.notes:
+        console.print(Text("- none"))

@@ -1,0 +1,9 @@
+"""Logs: a file becomes a Run, clean, in SI and radians, NED and forward-starboard-down, on one clock."""
+
+from fieldsid.logs.channels import ChannelMap, Source
+from fieldsid.logs.load import load_run
+from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.save import save_run
+from fieldsid.logs.segments import Segment, segment
+
+__all__ = ["SIGNALS", "ChannelMap", "Note", "Run", "Segment", "Source", "load_run", "save_run", "segment"]

@@ -1,0 +1,85 @@
+"""Which column or topic of a log is which signal, as plain records: what a mapping says, however it came to be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
+
+from fieldsid.logs.frames import Frame
+
+Stamp = Literal["header", "receive"]
+ATTITUDE = "attitude"
+"""Not a signal but three: a quaternion mapped to it gives yaw, pitch and roll."""
+ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where one signal comes from: a column (name, or index from 0), four columns of a quaternion, or a topic's field.
+
+    value = sign x (number in its unit, as SI), turned into our frames, + offset in SI. `stamp` None means the
+    header's where the message has one. `unit` None means what the column's name or the message type says, else SI.
+    """
+
+    column: str | int | None = None
+    columns: tuple[str | int, ...] = ()
+    order: Literal["xyzw", "wxyz"] = "xyzw"
+    topic: str | None = None
+    path: str = ""
+    unit: str | None = None
+    sign: int = 1
+    offset: float = 0.0
+    frame: Frame | None = None
+    stamp: Stamp | None = None
+
+    @property
+    def label(self) -> str:
+        """The source in words, for messages and notes."""
+        if self.topic is not None:
+            return f"{self.topic}.{self.path}" if self.path else self.topic
+        return ", ".join(map(str, self.columns)) if self.columns else f"column {self.column!r}"
+
+
+@dataclass(frozen=True, slots=True)
+class TableForm:
+    """How a text table is written; None where it is to be found out."""
+
+    separator: str | None = None
+    header: bool | None = None
+    skip: int | None = None
+    encoding: str | None = None
+    decimal: Literal[".", ","] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Pressure:
+    """What turns pressure into depth: density in kg/m^3 and the pressure at the surface in Pa (0 for a gauge)."""
+
+    density: float = 1025.0
+    surface_pa: float = 101325.0
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelMap:
+    """The whole mapping of a log: sources by canonical signal, the time column of a table, frames, clocks, depth."""
+
+    sources: Mapping[str, Source]
+    time: Source | None = None
+    frame: Frame = field(default_factory=Frame)
+    stamp: Stamp | None = None
+    clock: str | None = None
+    gap_factor: float = 2.5
+    pressure: Pressure = field(default_factory=Pressure)
+    table: TableForm = field(default_factory=TableForm)
+    origin: Path | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
+
+    @property
+    def place(self) -> str:
+        """Where the mapping stands, for messages."""
+        return f"`{self.origin}`" if self.origin else "the mapping"

@@ -1,0 +1,120 @@
+"""Findings on one signal at a time: constant, frozen, missing, coarse, spiked, or in a unit that cannot be meant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.logs.run import SIGNALS, FloatArray, Note, Run
+
+PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
+MEASURED = frozenset(SIGNALS) - PROPULSION - {"rudder_rad", "elevator_rad"}
+MISSING_LIMIT = 0.05
+FROZEN_S = 1.0
+COARSE_LIMIT = 0.3
+"""Share of samples equal to the one before, above which a signal is called coarse."""
+SPIKE = 20.0
+"""A spike is off the line through its neighbours by this many times the usual amount."""
+
+LARGEST = {
+    "pitch_rad": (1.6, "deg"), "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
+    "roll_rate_rad_s": (8.0, "deg/s"), "rudder_rad": (1.6, "deg"), "elevator_rad": (1.6, "deg"),
+    "rudder_measured_rad": (1.6, "deg"), "elevator_measured_rad": (1.6, "deg"),
+    "surge_m_s": (8.0, "kn"), "depth_m": (11000.0, "mm"),
+}  # fmt: skip
+"""Largest size of a signal that can be meant, and the unit it is probably in when it is larger."""
+
+
+def signal_findings(run: Run, name: str) -> list[Note]:
+    """Return the findings on one signal of a run."""
+    values = run[name]
+    seen = np.isfinite(values)
+    if not seen.any():
+        return [Note("empty", f"{name} has no sample", {"signal": name})]
+    found = _missing(name, seen)
+    present = values[seen]
+    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION:
+        message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another column"
+        return [*found, Note("constant", message, {"signal": name, "value": float(present[0])})]
+    found += _size(name, present)
+    if name in MEASURED and present.size > 20:
+        found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
+    return found
+
+
+def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Note]:
+    share = 1.0 - float(seen.mean())
+    if share <= MISSING_LIMIT:
+        return []
+    message = f"{name}: {100 * share:.0f} % of the samples are missing (limit {100 * MISSING_LIMIT:.0f} %)"
+    return [Note("missing", message, {"signal": name, "value": share, "limit": MISSING_LIMIT})]
+
+
+def _size(name: str, values: FloatArray) -> list[Note]:
+    if name not in LARGEST:
+        return []
+    limit, unit = LARGEST[name]
+    largest = float(np.percentile(np.abs(values), 99))
+    found = []
+    if largest > limit:
+        message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): set its unit, probably `unit: {unit}`"
+        found.append(Note("unit", message, {"signal": name, "value": largest, "limit": limit}))
+    middle = float(np.median(values))
+    if name == "surge_m_s" and middle < -0.1:
+        message = f"surge_m_s is negative, {middle:.3g} m/s in the middle: set `sign: -1` or the frame in the mapping"
+        found.append(Note("speed_sign", message, {"signal": name, "value": middle, "limit": -0.1}))
+    return found
+
+
+def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
+    """A sensor that repeats one value for long, among values that otherwise change."""
+    same = np.diff(values) == 0.0
+    if same.mean() > COARSE_LIMIT:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2]
+    if not starts.size:
+        return []
+    lengths = time[ends] - time[starts]
+    k = int(np.argmax(lengths))
+    step = float(np.median(np.diff(time)))
+    limit = max(FROZEN_S, 5 * step)
+    if lengths[k] <= limit:
+        return []
+    message = (
+        f"{name} is frozen at {values[starts[k]]:.6g} from {time[starts[k]]:.2f} to {time[ends[k]]:.2f} s "
+        f"(limit {limit:.3g} s); leave it out with `--from` and `--to`"
+    )
+    return [Note("frozen", message, {"signal": name, "value": float(lengths[k]), "limit": limit})]
+
+
+def _coarse(name: str, values: FloatArray) -> list[Note]:
+    steps = np.abs(np.diff(values))
+    share = float(np.mean(steps == 0.0))
+    moved = steps[steps > 0.0]
+    levels = float(np.ptp(values)) / float(moved.min()) if moved.size else 0.0
+    if share <= COARSE_LIMIT or levels > 1000:
+        return []
+    message = (
+        f"{name} comes in steps of {moved.min():.3g} {SIGNALS[name]} and {100 * share:.0f} % of the samples repeat the last "
+        f"one (limit {100 * COARSE_LIMIT:.0f} %); log it with more digits or at its own rate"
+    )
+    return [Note("coarse", message, {"signal": name, "value": share, "limit": COARSE_LIMIT, "step": float(moved.min())})]
+
+
+def _spikes(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
+    off = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
+    usual = float(np.median(off))
+    if usual == 0.0:
+        usual = float(np.mean(off))
+    limit = SPIKE * usual
+    # A spike stands alone: both neighbours lie on the same side, which no step and no ramp does.
+    left, right = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    places = np.flatnonzero((off > limit) & (left * right > 0.0) & (np.minimum(np.abs(left), np.abs(right)) > limit))
+    if usual == 0.0 or not places.size:
+        return []
+    at = int(places[np.argmax(off[places])])
+    message = (
+        f"{name} has {places.size} spikes, the largest of {off[at]:.3g} {SIGNALS[name]} at {time[at + 1]:.2f} s "
+        f"(limit {limit:.3g}); check the sensor"
+    )
+    return [Note("spikes", message, {"signal": name, "value": float(off[at]), "limit": limit, "count": int(places.size)})]

@@ -1,0 +1,140 @@
+"""`sysid inspect` as a function: inventory, proposed mapping and findings of one log."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fieldsid.artifacts import plain, to_yaml, write_text
+from fieldsid.errors import MappingError
+from fieldsid.logs.channels import TableForm
+from fieldsid.logs.propose import Proposal, propose
+from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
+from fieldsid.logs.run import Note, Run
+
+SCHEMA = "fieldsid/inspection/1"
+_COLUMN_EXAMPLE = """# columns are counted from 0:
+# signals:
+#   yaw_rad: {column: 1, unit: deg}
+#   rudder_rad: {column: 2, unit: deg}
+"""
+_TOPIC_EXAMPLE = (
+    "# signals:\n#   yaw_rad: {topic: /heading, field: data, unit: deg}\n#   rudder_rad: {topic: /rudder_cmd, field: data}\n"
+)
+_PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
+_RESERVED = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false", "null"})
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What a log holds, the mapping proposed for it, the Run that gives (None when it gives none), and the findings."""
+
+    inventory: Inventory
+    proposal: Proposal
+    run: Run | None
+    notes: tuple[Note, ...]
+    needs_none: bool
+
+    def yaml(self) -> str:
+        """Return the proposed mapping as the text of a mapping.yaml."""
+        head = f"# Proposed for {self.inventory.path.name} by its names, types and numbers.\n"
+        head += "# Check units, signs and frame before you trust it.\n"
+        body = dict(self.proposal.body)
+        signals = body.pop("signals")
+        if signals:
+            return head + to_yaml(body) + "signals:\n" + "".join(f"  {name}: {_line(item)}\n" for name, item in signals.items())
+        return (
+            head + to_yaml(body) + "signals: {}\n" + (_TOPIC_EXAMPLE if self.inventory.form.endswith("bag") else _COLUMN_EXAMPLE)
+        )
+
+    def record(self, written: Path | None) -> dict[str, Any]:
+        """Return the inspection as plain values, for JSON and for the page."""
+        inventory, run = self.inventory, self.run
+        duration = inventory.duration_s if run is None else float(run.time[-1] - run.time[0])
+        span = f"{duration:.2f} s" if math.isfinite(duration) else "length unknown"
+        return {
+            "schema": SCHEMA,
+            "path": str(inventory.path),
+            "format": inventory.form,
+            "span": span,
+            "duration_s": duration,
+            "channels": [_channel(c) for c in inventory.channels],
+            "shown": [_shown(c) for c in inventory.channels],
+            "mapping_needed": not self.needs_none,
+            "mapping": plain(self.proposal.body),
+            "mapping_file": None if written is None else str(written),
+            "signals": [] if run is None else [s for s in run.signals if run.has(s)],
+            "problem": None if self.proposal.problem is None else str(self.proposal.problem),
+            "findings": [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in self.notes],
+        }
+
+
+def inspect_log(path: Path, *, mapping: Path | None = None, msg_path: Path | None = None) -> Inspection:
+    """Return what is in a log; raises LogError when it cannot be read at all, MappingError for a mapping that does not fit."""
+    from fieldsid.logs.load import load_run
+
+    reader, options = reader_of(path), ReadOptions(msg_path, salvage=True)
+    inventory = reader.inventory(path, options, TableForm())
+    proposal = propose(inventory, reader, options)
+    needs_none = reader.own_map(path, options) is not None
+    run = proposal.run
+    if mapping is not None or needs_none:
+        run = load_run(path, mapping, msg_path=msg_path, salvage=True, max_gap_s=math.inf)
+    notes = list(inventory.notes) + ([] if run is None else list(run.notes))
+    if proposal.problem is not None and run is None:
+        notes.append(
+            Note("not_importable", proposal.problem.what, {"found": proposal.problem.found, "hint": proposal.problem.hint})
+        )
+    if not proposal.body["signals"] and run is None:
+        notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
+    distinct = {(n.code, n.message): n for n in notes if n.code != "ignored_columns"}
+    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none)
+
+
+def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Path:
+    """Write the proposed mapping; raises MappingError when nothing was recognised at all, ArtifactError when the file exists."""
+    if not found.inventory.channels:
+        raise MappingError(
+            f"nothing in `{found.inventory.path}` can be mapped",
+            found="no columns and no topics",
+            hint="check that this is the log you meant",
+        )
+    return write_text(path, found.yaml(), force=force)
+
+
+def _line(item: dict[str, Any]) -> str:
+    """Return one signal's source on one line of YAML; a name that YAML could take for something else is quoted."""
+    return "{" + ", ".join(f"{key}: {_scalar(value)}" for key, value in item.items()) + "}"
+
+
+def _scalar(value: Any) -> str:
+    text = str(value)
+    return (
+        text
+        if isinstance(value, int) or (_PLAIN.match(text) and text.lower() not in _RESERVED)
+        else json.dumps(text, ensure_ascii=False)
+    )
+
+
+def _channel(channel: ChannelInfo) -> dict[str, Any]:
+    fields = [{"path": f.path, "type": f.kind, "first": list(f.first), "span": f.span} for f in channel.fields]
+    return {"name": channel.name, "type": channel.kind, "count": channel.count, "rate_hz": channel.rate_hz, "fields": fields}
+
+
+def _shown(channel: ChannelInfo) -> dict[str, Any]:
+    rate = f"{channel.rate_hz:.4g}" if math.isfinite(channel.rate_hz) else "-"
+    if len(channel.fields) == 1 and not channel.fields[0].path:
+        info = channel.fields[0]
+        first = ", ".join(_short(v) for v in info.first) if info.span is None else " .. ".join(_short(v) for v in info.span)
+    else:
+        names = [f.path for f in channel.fields if "covariance" not in f.path and not f.path.startswith("header.")]
+        first = ", ".join(names[:2]) + (f" +{len(names) - 2}" if len(names) > 2 else "")
+    return {"name": channel.name, "type": channel.kind, "count": channel.count, "rate": rate, "holds": first}
+
+
+def _short(value: Any) -> str:
+    return f"{value:.5g}" if isinstance(value, float) else str(value)[:20]

@@ -1,0 +1,110 @@
+"""Any log file becomes a Run: `load_run` is the one door, for every command that takes a run."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from fieldsid.errors import MappingError
+from fieldsid.logs.assemble import assemble
+from fieldsid.logs.channels import ChannelMap, Source, TableForm
+from fieldsid.logs.conditioning import MAX_GAP_S
+from fieldsid.logs.names import TIME, canonical, canonical_names
+from fieldsid.logs.reader import Reader, ReadOptions, reader_of
+from fieldsid.logs.run import Note, Run
+
+MAPPING_FILE = "mapping.yaml"
+
+
+def load_run(
+    path: Path | str,
+    mapping: ChannelMap | Path | None = None,
+    *,
+    channels: Mapping[str, Source] | None = None,
+    msg_path: Path | None = None,
+    salvage: bool = False,
+    max_gap_s: float = MAX_GAP_S,
+    fin_max_rad: Mapping[str, float] | None = None,
+) -> Run:
+    """Read a log file or bag folder as a Run, with the doctor's findings as notes; `-` reads standard input.
+
+    mapping: a ChannelMap or a mapping.yaml. Without one: the canonical column names, else `mapping.yaml` in the
+    working folder, else in the log's. channels: sources that count more than the mapping's. salvage: take what is
+    left of a damaged log. max_gap_s: longest gap allowed in a main signal. fin_max_rad: fin limits by signal, for the
+    finding of saturation. Raises LogError or MappingError.
+    """
+    if str(path) == "-":
+        return _from_stdin(mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s)
+    path = Path(path)
+    reader, options = reader_of(path), ReadOptions(msg_path, salvage)
+    chosen, notes = map_for(path, reader, options, mapping, channels or {})
+    raw = reader.read(path, chosen, options)
+    run = assemble(raw, chosen, path, salvage=salvage, max_gap_s=max_gap_s)
+    if raw.finished:
+        return run
+    from fieldsid.logs.doctor import examine
+
+    return Run(run.name, run.time, run.signals, path, (*notes, *run.notes, *examine(run, fin_max_rad or {})))
+
+
+def map_for(
+    path: Path, reader: Reader, options: ReadOptions, mapping: ChannelMap | Path | None, channels: Mapping[str, Source]
+) -> tuple[ChannelMap, list[Note]]:
+    """Return the mapping a log is read with, and a note where a file was picked up; raises MappingError when there is none."""
+    notes: list[Note] = []
+    chosen = _loaded(mapping) if mapping is not None else reader.own_map(path, options)
+    if chosen is None:
+        file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file()), None)
+        if file is not None:
+            chosen = _loaded(file)
+            notes.append(Note("mapping", f"read with `{file}`", {"path": str(file)}))
+    if chosen is None and not channels:
+        raise _unmapped(path, reader, options)
+    base = chosen or ChannelMap({})
+    sources = {s: c for s, c in channels.items() if s != TIME}
+    return replace(base, sources={**base.sources, **sources}, time=channels.get(TIME, base.time)), notes
+
+
+def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
+    if isinstance(mapping, ChannelMap):
+        return mapping
+    from fieldsid.logs.mapping import load_mapping
+
+    return load_mapping(mapping)
+
+
+def _unmapped(path: Path, reader: Reader, options: ReadOptions) -> MappingError:
+    names = [c.name for c in reader.inventory(path, options, TableForm()).channels]
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    hint = f"write a mapping: `sysid inspect {path} --write-mapping {MAPPING_FILE}`"
+    if reader.name == "rosbag":
+        return MappingError(f"`{path}` is a bag and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
+    close = _near_names(names)
+    hint += f"; {close}" if close else ""
+    if not any((said := canonical(n)) is not None and said.signal == TIME for n in names):
+        return MappingError(f"`{path}` has no column `{TIME}`", found=f"columns {shown}", hint=hint)
+    return MappingError(f"`{path}` has no column of a signal that is known by its name", found=f"columns {shown}", hint=hint)
+
+
+def _near_names(names: Sequence[str]) -> str:
+    """Say which canonical name a column that is none may mean."""
+    pairs = []
+    for name in names:
+        match = difflib.get_close_matches(name.lower(), canonical_names(), n=1, cutoff=0.55)
+        if match and canonical(name) is None:
+            pairs.append(f"`{name}` may be `{match[0]}`")
+    return ", ".join(pairs[:4])
+
+
+def _from_stdin(
+    mapping: ChannelMap | Path | None, *, channels: Mapping[str, Source] | None, salvage: bool, max_gap_s: float
+) -> Run:
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "stdin"
+        copy.write_bytes(sys.stdin.buffer.read())
+        run = load_run(copy, mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s)
+    return Run("stdin", run.time, run.signals, None, run.notes)

@@ -1,0 +1,77 @@
+"""A Run as a file: Parquet keeps everything, CSV the canonical columns."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import IO
+
+from fieldsid._version import __version__
+from fieldsid.artifacts import plain, replacing, sha256_of
+from fieldsid.errors import UsageError
+from fieldsid.logs.names import TIME
+from fieldsid.logs.run import Run
+
+SCHEMA = "fieldsid/run/1"
+SUFFIXES = (".parquet", ".csv", ".csv.gz")
+
+
+def save_run(run: Run, path: Path, *, force: bool = False) -> Path:
+    """Write a run to .parquet, .csv or .csv.gz and return the path.
+
+    Every number comes back exactly. Parquet also keeps the notes, the schema, the tool's version and the source's
+    sha256. Raises UsageError for another suffix, ArtifactError when the file exists or cannot be written.
+    """
+    if path.name.endswith(".parquet"):
+        return _save_parquet(run, path, force=force)
+    if path.name.endswith((".csv", ".csv.gz")):
+        return _save_csv(run, path, force=force)
+    raise UsageError(
+        f"a run cannot be written to `{path}`", found=f"suffix {path.suffix!r}", hint=f"name it `{path.stem}.parquet`"
+    )
+
+
+def _save_parquet(run: Run, path: Path, *, force: bool) -> Path:
+    pa, pq = import_module("pyarrow"), import_module("pyarrow.parquet")
+    table = pa.table({TIME: run.time, **run.signals}).replace_schema_metadata(
+        {"fieldsid": json.dumps(_head(run), allow_nan=False)}
+    )
+    with replacing(path, force=force) as temporary:
+        pq.write_table(table, temporary)
+    return path
+
+
+def _head(run: Run) -> dict[str, object]:
+    source = run.source
+    inputs = [{"path": str(source), "sha256": sha256_of(source)}] if source is not None and source.exists() else []
+    notes = [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in run.notes]
+    return {
+        "schema": SCHEMA,
+        "tool": f"fieldsid {__version__}",
+        "name": run.name,
+        "inputs": inputs,
+        "parent": None,
+        "notes": notes,
+    }
+
+
+def _save_csv(run: Run, path: Path, *, force: bool) -> Path:
+    with replacing(path, force=force) as temporary, temporary.open("wb") as raw:
+        if path.suffix == ".gz":
+            # Without the time of writing in its head, the same run gives the same bytes.
+            with gzip.GzipFile(filename="", fileobj=raw, mode="wb", mtime=0, compresslevel=6) as packed:
+                _write_rows(run, packed)
+        else:
+            _write_rows(run, raw)
+    return path
+
+
+def _write_rows(run: Run, stream: IO[bytes] | gzip.GzipFile) -> None:
+    """Write every number with as many digits as bring it back exactly, and nothing where there is none."""
+    pa, csv = import_module("pyarrow"), import_module("pyarrow.csv")
+    columns = {TIME: run.time, **run.signals}
+    table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
+    stream.write((",".join(columns) + "\n").encode())
+    csv.write_csv(table, stream, csv.WriteOptions(include_header=False, quoting_style="none"))

@@ -1,0 +1,91 @@
+"""The part of a run worth fitting: steady, excitation, recovery.
+
+From 2 s before the fin first clearly leaves its trim to 10 s after it last came back. A controller's small work on
+the fin around its trim is not excitation: an excursion is above a quarter of the largest one, above half a degree and
+above four times the fin's usual activity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.errors import DataError
+from fieldsid.logs.run import FloatArray, Run
+
+BEFORE_S = 2.0
+AFTER_S = 10.0
+LEAST_RAD = 0.0087
+"""Half a degree: what is below is no excitation."""
+SHARE_OF_LARGEST = 0.25
+ACTIVITY = 4.0
+WHOLE = 0.8
+"""A run whose excitation covers more than this share of it is taken whole."""
+STEADY_S = 1.0
+"""Time at the start over which the trim is read."""
+
+_FINS = {"yaw": ("rudder_measured_rad", "rudder_rad"), "pitch": ("elevator_measured_rad", "elevator_rad")}
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A part of a run, in s, and why it was chosen."""
+
+    start_s: float
+    end_s: float
+    why: str
+
+    def of(self, run: Run) -> Run:
+        """Return the run between the two times."""
+        return run.between(self.start_s, self.end_s)
+
+
+def segment(run: Run, axis: str) -> Segment:
+    """Return the part of a run that excites an axis (`yaw` or `pitch`).
+
+    Raises DataError when the log has no fin for the axis, or the fin never leaves its trim.
+    """
+    signal = next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
+    if signal is None:
+        raise DataError(
+            f"run {run.name!r} has no fin signal for {axis}: `{_FINS[axis][1]}` is missing or empty",
+            found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
+            hint=f"map it on import, or identify the other axis: `--axis {'pitch' if axis == 'yaw' else 'yaw'}`",
+        )
+    fin = run[signal]
+    seen = np.isfinite(fin)
+    time, fin = run.time[seen], fin[seen]
+    away, limit = _excursions(time, fin)
+    if not away.any():
+        raise DataError(
+            f"`{signal}` of run {run.name!r} never leaves its trim: constant within {np.degrees(np.ptp(fin)):.2f} deg",
+            found=f"{np.degrees(fin.min()):.2f} to {np.degrees(fin.max()):.2f} deg (limit {np.degrees(limit):.2f} deg from trim)",
+            hint="choose a run with excitation, or the part to use with `--from` and `--to`",
+        )
+    return _around(run, time, away, signal, limit)
+
+
+def _excursions(time: FloatArray, fin: FloatArray) -> tuple[np.ndarray[tuple[int], np.dtype[np.bool_]], float]:
+    """Return where the fin is clearly away from its trim, and the limit in rad."""
+    trim = float(np.median(fin[time <= time[0] + STEADY_S]))
+    off = np.abs(fin - trim)
+    quiet = off[off < SHARE_OF_LARGEST * off.max()] if off.max() > 0 else off
+    # The median of what is small anyway, so that a long excitation does not raise its own limit.
+    activity = float(np.median(quiet)) if quiet.size else 0.0
+    limit = max(LEAST_RAD, SHARE_OF_LARGEST * float(off.max()), ACTIVITY * activity)
+    return off > limit, limit
+
+
+def _around(run: Run, time: FloatArray, away: np.ndarray[tuple[int], np.dtype[np.bool_]], signal: str, limit: float) -> Segment:
+    moved = np.flatnonzero(away)
+    first, last = float(time[moved[0]]), float(time[moved[-1]])
+    begin, end = float(run.time[0]), float(run.time[-1])
+    if last - first >= WHOLE * (end - begin):
+        return Segment(begin, end, f"the whole run: `{signal}` is away from trim from {first:.2f} to {last:.2f} s")
+    start, stop = max(begin, first - BEFORE_S), min(end, last + AFTER_S)
+    why = (
+        f"{BEFORE_S:g} s before `{signal}` first leaves its trim by {np.degrees(limit):.1f} deg ({first:.2f} s) "
+        f"to {AFTER_S:g} s after it last did ({last:.2f} s)"
+    )
+    return Segment(start, stop, why)

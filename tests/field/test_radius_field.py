@@ -1,0 +1,61 @@
+"""Third-party vehicle (not ours, not in the repository): radius, measured circles and honest bands."""
+
+from __future__ import annotations
+
+import pytest
+from ruamel.yaml import YAML
+
+from fieldsid.fitting.identify import identify
+from fieldsid.logs import load_run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import save_model
+from fieldsid.turning.measured import measure_turn
+from fieldsid.turning.radius import turn_radius
+from fieldsid.turning.source import load_source
+
+pytestmark = pytest.mark.field
+
+SPEEDS = ("1.00", "1.25", "1.50", "1.70", "1.90")
+EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
+
+
+@pytest.fixture(scope="module")
+def truth(shared_data):
+    return YAML(typ="safe").load((shared_data / "lauv" / "truth.yaml").read_text())
+
+
+def models(folder, shared_data, kinds, effects):
+    paths, runs = [], []
+    for v in SPEEDS:
+        logs = [load_run(shared_data / "lauv" / f"{k}_v{v}.csv.gz") for k in kinds]
+        (fit,) = identify(logs, Axis.YAW, effects=effects, joint=len(logs) > 1)
+        paths.append(save_model(fit.model, folder / f"m{v}.yaml"))
+        runs += logs
+    return load_source(paths), runs
+
+
+def test_pulses_and_zigzag_predict_full_rudder_within_five_percent_both_sides(tmp_path, shared_data, truth):
+    source, runs = models(tmp_path, shared_data, ("rudder", "zigzag"), EFFECTS)
+    prediction = turn_radius(source, [float(v) for v in SPEEDS], truth["delta_max_rad"], runs=runs)
+    for row in prediction.rows:
+        side = "circle_stbd" if row.side == "starboard" else "circle_port"
+        wanted = truth["speeds"][f"{row.speed:.2f}"][side]["R_circle_m"]
+        assert row.radius == pytest.approx(wanted, rel=0.05), (row.speed, row.side)
+        assert row.interval95[0] <= wanted <= row.interval95[1], (row.speed, row.side)
+
+
+@pytest.mark.parametrize("effects", [(), EFFECTS], ids=["plain", "effects"])
+def test_pulses_alone_are_extrapolated_and_their_band_holds_the_truth(tmp_path, shared_data, truth, effects):
+    source, runs = models(tmp_path, shared_data, ("rudder",), effects)
+    for row in turn_radius(source, [float(v) for v in SPEEDS], truth["delta_max_rad"], runs=runs).rows:
+        wanted = truth["speeds"][f"{row.speed:.2f}"]["circle_stbd"]["R_circle_m"]
+        assert row.trust == "extrapolated"
+        assert row.interval95[0] <= wanted <= row.interval95[1], (row.speed, row.side)
+
+
+@pytest.mark.parametrize("kind", ["circle_stbd", "circle_port", "circle_half_stbd"])
+@pytest.mark.parametrize("v", SPEEDS)
+def test_measured_circle_is_the_true_one_within_half_a_percent(shared_data, truth, kind, v):
+    turn = measure_turn(load_run(shared_data / "lauv" / f"{kind}_v{v}.csv.gz"))
+    assert turn.circle.radius == pytest.approx(truth["speeds"][v][kind]["R_circle_m"], rel=0.005)
+    assert turn.side == ("port" if kind == "circle_port" else "starboard")

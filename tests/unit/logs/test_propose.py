@@ -1,0 +1,87 @@
+"""A proposed mapping is one that import takes, and gives the signals that were logged."""
+
+import numpy as np
+import pytest
+from bags import KINDS, write_bag
+
+from fieldsid.errors import ArtifactError
+from fieldsid.logs import load_run
+from fieldsid.logs.inspection import inspect_log, write_proposal
+
+TIME = 0.05 * np.arange(400)
+TRUTH = {
+    "time_s": TIME,
+    "yaw_rad": 0.5 * np.sin(0.5 * TIME),
+    "yaw_rate_rad_s": 0.25 * np.cos(0.5 * TIME),
+    "surge_m_s": 1.5 + 0.1 * np.sin(TIME),
+    "rudder_rad": 0.2 * np.sign(np.sin(0.5 * TIME + 0.01)),
+}
+
+
+def vendor_table(path):
+    rows = zip(
+        1e3 * TIME,
+        np.degrees(TRUTH["yaw_rad"]),
+        np.degrees(TRUTH["yaw_rate_rad_s"]),
+        TRUTH["surge_m_s"],
+        np.degrees(TRUTH["rudder_rad"]),
+        strict=True,
+    )
+    lines = [
+        "Time [ms];Heading;gyro_z;Speed (m/s);rudder cmd;mode",
+        *(";".join(map(repr, map(float, r))) + ";AUTO" for r in rows),
+    ]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_table_of_foreign_names_and_degrees_is_understood(tmp_path):
+    log = vendor_table(tmp_path / "vendor.csv")
+    mapping = write_proposal(inspect_log(log), tmp_path / "m.yaml")
+    run = load_run(log, mapping)
+    np.testing.assert_allclose(run.time, TIME, atol=1e-12)
+    for name in TRUTH.keys() - {"time_s"}:
+        np.testing.assert_allclose(run[name], TRUTH[name], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bag_of_standard_messages_is_understood(tmp_path, kind):
+    log = write_bag(tmp_path / "bag", kind, TRUTH)
+    mapping = write_proposal(inspect_log(log), tmp_path / "m.yaml")
+    run = load_run(log, mapping)
+    for name in TRUTH.keys() - {"time_s"}:
+        np.testing.assert_allclose(run[name], TRUTH[name], atol=1e-12)
+
+
+def test_a_canonical_table_needs_no_mapping_and_its_proposal_still_works(tmp_path):
+    log = tmp_path / "run.csv"
+    log.write_text("time_s,yaw_deg,rudder_rad\n0,1,0.1\n1,2,0.2\n2,3,0.1\n")
+    found = inspect_log(log)
+    assert found.needs_none
+    np.testing.assert_allclose(load_run(log, write_proposal(found, tmp_path / "m.yaml"))["yaw_rad"], load_run(log)["yaw_rad"])
+
+
+def test_columns_without_names_give_a_file_to_fill_in_and_say_so(tmp_path):
+    log = tmp_path / "run.dat"
+    log.write_text("0 1 2\n1 2 3\n2 3 4\n")
+    found = inspect_log(log)
+    assert "nothing_recognised" in {n.code for n in found.notes}
+    assert "signals: {}" in found.yaml()
+    assert "column: 0" in found.yaml()
+
+
+def test_a_mapping_that_exists_is_kept(tmp_path):
+    log = vendor_table(tmp_path / "vendor.csv")
+    mine = tmp_path / "m.yaml"
+    mine.write_text("mine")
+    with pytest.raises(ArtifactError, match="exists"):
+        write_proposal(inspect_log(log), mine)
+    assert mine.read_text() == "mine"
+
+
+def test_the_record_holds_what_the_page_shows(tmp_path):
+    record = inspect_log(vendor_table(tmp_path / "vendor.csv")).record(None)
+    assert record["schema"] == "fieldsid/inspection/1"
+    assert [c["name"] for c in record["channels"]][:2] == ["Time [ms]", "Heading"]
+    assert record["mapping"]["signals"]["yaw_rad"]["unit"] == "deg"
+    assert set(record["signals"]) == TRUTH.keys() - {"time_s"}

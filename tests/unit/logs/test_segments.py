@@ -1,0 +1,77 @@
+"""The part of a run worth fitting is found by the fin alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldsid.errors import DataError
+from fieldsid.logs import Run, segment
+
+TIME = 0.05 * np.arange(1200)
+
+
+def pulses(*, at=20.0, until=30.0, size=0.2, trim=0.0):
+    inside = (at <= TIME) & (until > TIME)
+    return trim + np.where(inside, size * np.sign(np.sin(np.pi * (TIME - at) / 2 + 1e-6)), 0.0)
+
+
+def run(fin, **more):
+    return Run("r", TIME, {"rudder_rad": fin, **more})
+
+
+@pytest.mark.parametrize("trim", [0.0, 0.05, -0.1])
+def test_pulses_are_taken_with_two_seconds_before_and_ten_after(trim):
+    found = segment(run(pulses(trim=trim)), "yaw")
+    assert found.start_s == pytest.approx(18.0)
+    assert found.end_s == pytest.approx(39.95)
+    assert "rudder_rad" in found.why
+
+
+def test_the_small_work_of_a_controller_is_no_excitation():
+    rng = np.random.default_rng(2)
+    busy = pulses() + np.where(TIME > 35, 0.02 * np.sin(3 * TIME), 0.0) + 0.004 * rng.normal(size=TIME.size)
+    found = segment(run(busy), "yaw")
+    assert found.start_s == pytest.approx(18.0, abs=0.1)
+    assert found.end_s == pytest.approx(39.95, abs=0.1)
+
+
+def test_times_are_clipped_to_the_run():
+    found = segment(run(pulses(at=1.2, until=55.0)), "yaw")
+    assert (found.start_s, found.end_s) == (0.0, TIME[-1])
+
+
+def test_a_zig_zag_is_taken_whole():
+    found = segment(run(0.2 * np.sign(np.sin(0.4 * TIME + 1e-6))), "yaw")
+    assert (found.start_s, found.end_s) == (0.0, TIME[-1])
+    assert "whole run" in found.why
+
+
+def test_the_measured_fin_stands_in_for_a_missing_command():
+    only = Run("r", TIME, {"elevator_measured_rad": pulses()})
+    assert segment(only, "pitch").start_s == pytest.approx(18.0)
+
+
+def test_no_fin_and_a_constant_fin_are_errors_that_say_what_was_found():
+    with pytest.raises(DataError, match="no fin signal for pitch") as error:
+        segment(run(pulses()), "pitch")
+    assert "--axis yaw" in error.value.hint
+    with pytest.raises(DataError, match="never leaves its trim") as error:
+        segment(run(np.full(TIME.size, 0.1)), "yaw")
+    assert "5.73" in error.value.found
+
+
+def test_a_segment_cuts_its_run():
+    whole = run(pulses())
+    found = segment(whole, "yaw")
+    part = found.of(whole)
+    assert part.time[0] >= found.start_s - 1e-9
+    assert part.time[-1] <= found.end_s + 1e-9
+
+
+@given(st.floats(5, 30), st.floats(2, 20), st.floats(0.05, 0.5), st.floats(-0.2, 0.2), st.sampled_from([-1, 1]))
+def test_every_pulse_lies_inside_its_segment(at, length, size, trim, side):
+    fin = np.where((at <= TIME) & (at + length > TIME), trim + side * size, trim)
+    found = segment(run(fin), "yaw")
+    assert found.start_s <= at
+    assert found.end_s >= min(at + length, TIME[-1]) - 0.06
