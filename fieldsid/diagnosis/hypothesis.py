@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
-from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.noise import estimate_noise, floor_of
 from fieldsid.fitting.predict import frozen_problem, refit_own
 from fieldsid.fitting.problem import Problem
 from fieldsid.logs.run import FloatArray
@@ -32,6 +32,11 @@ class Hypothesis:
     errors: Pair
     cost: float
     model: Model
+
+    @property
+    def own_model(self) -> Model:
+        """The model of the generalised least squares, the one its likelihood belongs to."""
+        return bare_model(self.judged.trial.problem, self.judged.trial.x, self.judged.noise)
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -53,20 +58,36 @@ def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
     """Return a judged trial with its errors on the runs it was fitted to and on the runs it was not."""
     problem, x = judged.trial.problem, judged.trial.x
     model = bare_model(problem, x, judged.noise)
-    unseen, left = [], []
+    shown, left = [], []
     for record in validation:
         alone, start = frozen_problem(model, record, judged.trial.effects)
         vector = refit_own(alone, start, 0, judged.noise)
-        unseen.append(float(likelihood_by_run(alone, vector, judged.noise)[0]))
+        shown.append((alone, vector))
         left.append(alone.residual(refit_own(alone, vector, 0, floor_of([record])), 0)[0])
     return Hypothesis(
         judged,
         likelihood_by_run(problem, x, judged.noise),
-        np.array(unseen),
+        unseen_likelihood(judged, validation, shown),
         Pair(training_errors(judged.trial), errors_of(validation, left)),
         _price(judged, validation),
         model,
     )
+
+
+def unseen_likelihood(
+    judged: Judged, validation: Sequence[Record], shown: Sequence[tuple[Problem, FloatArray]]
+) -> FloatArray:
+    """Return each validation run's log likelihood under the noise that all of them together ask for.
+
+    The parameters are the training runs'; the noise is not, or a hypothesis that is right where it was fitted
+    and a little wrong elsewhere would be punished for having been right.
+    """
+    if not validation:
+        return np.zeros(0)
+    residuals = [p.residual(x, 0)[0] for p, x in shown]
+    dynamics = [(b.damping, b.stiffness) for b in (p.base_of(x, 0) for p, x in shown)]
+    noise, _ = estimate_noise(validation, dynamics, residuals, judged.family, judged.noise)
+    return np.array([likelihood_by_run(p, x, noise)[0] for p, x in shown])
 
 
 def with_free_run(h: Hypothesis, validation: Sequence[Record], floor: Noise) -> Hypothesis:
@@ -96,13 +117,17 @@ def training_errors(trial: Trial) -> Errors:
 
 
 def _price(judged: Judged, validation: Sequence[Record]) -> float:
-    """Return 1/2 k log N: shared coefficients once, nuisances once for every run they are fitted to."""
+    """Return 1/2 k log N: shared coefficients once, nuisances once for every run they are fitted to.
+
+    The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
+    """
     layout, records = judged.trial.problem.layout, judged.trial.problem.records
-    own = sum(len(e.nuisance) for e in layout.effects) + (1 if any(e.extra_states for e in layout.effects) else 0)
+    own = sum(len(e.nuisance) for e in layout.effects)
+    hidden = sum(1 for e in layout.effects if e.extra_states)
     count = sum(len(e.shared) for e in layout.effects)
     price = sum(e.handicap for e in layout.effects) + 0.5 * count * np.log(samples(records))
     for record in (*records, *validation):
-        price += 0.5 * own * np.log(max(samples([record]), 2))
+        price += 0.5 * own * np.log(max(samples([record]), 2)) + hidden
     return float(price)
 
 

@@ -23,7 +23,7 @@ NOISES = ("disturbance", "coloured")
 FREE_RUNS = 3
 PROMISING = 5
 """Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise."""
-LARGEST = 3
+LARGEST = 4
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
 MATTERS = 0.985
@@ -39,19 +39,27 @@ class Search:
     axis: Axis
     catalogue: tuple[Effect, ...]
     floor: Noise
+    known: tuple[str, ...] = ()
     tried: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     family: str = NOISES[0]
     grown_from: set[frozenset[str]] = field(default_factory=set)
+    report: Callable[[str], None] = lambda _text: None
+
+    @property
+    def root(self) -> frozenset[str]:
+        """The effects of the base."""
+        return frozenset(self.known)
 
     def base(self) -> Hypothesis:
-        """Return the hypothesis without effects."""
-        if frozenset() not in self.tried:
+        """Return the hypothesis of the known effects alone."""
+        if self.root not in self.tried:
+            self.report("base model")
             trial = min((self._base_trial(snapped=s) for s in self._laws()), key=lambda t: t.weights.angle * t.weights.rate)
             judged = max((judge(trial.problem, trial.x, self.floor, f) for f in NOISES), key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)
-            self.tried[frozenset()] = with_free_run(self.tried[frozenset()], self.validation, self.floor)
-        return self.tried[frozenset()]
+            self.tried[self.root] = with_free_run(self.tried[self.root], self.validation, self.floor)
+        return self.tried[self.root]
 
     def _laws(self) -> tuple[bool, ...]:
         """Whether runs of one speed group share their parameters as they are, besides by the scaling with speed."""
@@ -59,7 +67,8 @@ class Search:
         return (False, True) if len(groups.speeds) < len(self.records) else (False,)
 
     def _base_trial(self, *, snapped: bool) -> Trial:
-        layout = layout_of(self.records, self.axis, (), speed_groups(self.records, snapped=snapped))
+        parts = tuple(e for e in self.catalogue if e.name in self.known)
+        layout = layout_of(self.records, self.axis, parts, speed_groups(self.records, snapped=snapped))
         problem = Problem(self.records, layout)
         return refine(problem, start_vector(self.records, layout), self.floor)
 
@@ -76,6 +85,7 @@ class Search:
         if key not in self.grown_from:
             self.grown_from.add(key)
             for promise in self._promising(parent):
+                self.report("+".join((*parent.names, promise.effect.name)))
                 child = judge(promise.problem, promise.start, parent.judged.noise, self.family)
                 self._keep(child)
                 self._try_twin(child, promise.effect)
@@ -134,6 +144,8 @@ class Search:
         """Drop each effect in turn and add the best other one; keep what scores higher."""
         best = found
         for gone in found.effects[:-1]:
+            if gone.name in self.known:
+                continue
             rest = frozenset(n for n in found.names if n != gone.name)
             if rest not in self.tried:
                 continue
@@ -145,7 +157,7 @@ class Search:
     def _pruned(self, found: Hypothesis) -> Hypothesis:
         """Return the smallest tried subset that loses nothing worth having."""
         for key in sorted(self.tried, key=len):
-            if key < frozenset(found.names) and not self.pays(self.tried[key], found):
+            if self.root <= key < frozenset(found.names) and not self.pays(self.tried[key], found):
                 return self.tried[key]
         return found
 
@@ -179,6 +191,15 @@ def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tupl
     return tuple(kept), skipped
 
 
-def search(records: Sequence[Record], validation: Sequence[Record], axis: Axis, catalogue: Sequence[Effect]) -> Search:
-    """Return a search ready to go."""
-    return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor_of([*records, *validation]))
+def search(
+    records: Sequence[Record],
+    validation: Sequence[Record],
+    axis: Axis,
+    catalogue: Sequence[Effect],
+    *,
+    known: Sequence[str] = (),
+    report: Callable[[str], None] = lambda _text: None,
+) -> Search:
+    """Return a search ready to go; known effects are part of its base."""
+    floor = floor_of([*records, *validation])
+    return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor, tuple(known), report=report)

@@ -30,8 +30,8 @@ def pick_effect(name: str) -> Effect:
 def add_effects(effects: Iterable[Effect]) -> None:
     """Make a user's own effects known by name for the rest of the process.
 
-    Adding the same file again replaces it. Raises FieldsidError where the name is taken by an installed
-    effect, EffectError where a coefficient's name is taken on the same axis: a model keeps them in one table.
+    Adding the same file again replaces it. Raises EffectError where the name is taken by another effect, or
+    a coefficient's name on the same axis: a model keeps all coefficients in one table.
     """
     for effect in effects:
         _refuse_clash(effect)
@@ -45,6 +45,10 @@ def forget_effects() -> None:
 
 def _refuse_clash(effect: Effect) -> None:
     for other in all_effects().values():
+        if other.name == effect.name and other.origin != effect.origin:
+            raise EffectError(
+                f"the name {effect.name!r} is taken", found=f"{other.origin} and {effect.origin}", hint="rename yours"
+            )
         if other.name == effect.name or not set(other.axes) & set(effect.axes):
             continue
         taken = {c.name for c in other.coefficients} & {c.name for c in effect.coefficients}

@@ -48,7 +48,9 @@ EFFECT = Effect(
     stage=Stage.ACTUATOR,
     axes=(Axis.YAW, Axis.PITCH),
     equation="delta = play(command, gap): |delta - command| <= gap/2, and delta rests inside",
-    coefficients=(Coefficient("gap", "rad", 0.0, 0.3, 0.05, scan=(0.02, 0.06, 0.12), step=5e-4, says="full width of the play"),),
+    coefficients=(
+        Coefficient("gap", "rad", 0.0, 0.3, 0.05, scan=(0.005, 0.02, 0.06, 0.12), step=5e-4, says="full width of the play"),
+    ),
     telltale="the same command gives two different rates, by whether it was reached from port or from starboard",
     excited_by=("stairs", "multisine", "chirp", "three_two_one_one", "square_pulses"),
     mistaken_for=("deadband", "servo_lag", "asymmetric_fin", "stall"),

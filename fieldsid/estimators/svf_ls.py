@@ -128,12 +128,23 @@ def without_noise_bias(
         count = part.stop - part.start
         gram += count * own.T @ share.gram @ own
         cross += count * own.T @ share.cross
+    inverse = inverse_of_normal(normal, gram)
+    return np.asarray(found + inverse @ (gram @ found - cross)) if noise_can_go(normal, gram) else found, inverse
+
+
+def noise_can_go(normal: FloatArray, gram: FloatArray) -> bool:
+    """Whether noise, with its share gram (P, P) of a normal matrix (P, P), makes up less than half of every direction."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    clean = (normal - gram) * np.outer(scale, scale)
-    if float(np.linalg.eigvalsh(clean)[0]) < 0.5 * float(np.linalg.eigvalsh(normal * np.outer(scale, scale))[0]):
-        return found, np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-13, hermitian=True) * np.outer(scale, scale)
-    inverse = np.linalg.pinv(clean, rcond=1e-13, hermitian=True) * np.outer(scale, scale)
-    return np.asarray(found + inverse @ (gram @ found - cross)), inverse
+    least = [float(np.linalg.eigvalsh(m * np.outer(scale, scale))[0]) for m in (normal - gram, normal)]
+    return least[0] > 0.5 * least[1]
+
+
+def inverse_of_normal(normal: FloatArray, gram: FloatArray) -> FloatArray:
+    """Return the inverse of a normal matrix (P, P) with the share of noise taken out of it, where that can be done."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    clean = normal - gram if noise_can_go(normal, gram) else normal
+    inverse = np.linalg.pinv(clean * np.outer(scale, scale), rcond=1e-13, hermitian=True)
+    return np.asarray(inverse * np.outer(scale, scale), dtype=np.float64)
 
 
 def base_slots(problem: Problem) -> dict[str, int]:

@@ -1,7 +1,8 @@
 """State variable filter and recursive least squares with forgetting: the paper's on-board estimator, over a record.
 
 The estimate of every sample is kept with its band, and the time from which each parameter stays near its last value.
-Bands are those of the recursion, widened by what the colour of the residuals adds at the end.
+Bands are those of the recursion, scaled by what the colour of the residuals makes of them at the end; the bias of
+white sensor noise is taken out of every estimate.
 Source: the paper, estimator 2 (recursive).
 """
 
@@ -10,13 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.estimators.svf_ls import bandwidth_notes, base_slots, finished, median_step, theta_of
-from fieldsid.fitting.equation import Measured, measured_signals
+from fieldsid.estimators.svf_ls import bandwidth_notes, base_slots, finished, inverse_of_normal, median_step, regress, theta_of
+from fieldsid.fitting.equation import Measured, Theta, measured_signals
 from fieldsid.fitting.method import Estimator, History, Options, Solution
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.recursive import INITIAL, MEMORY, sweep
-from fieldsid.fitting.sample_noise import noise_share, transfer_of
+from fieldsid.fitting.recursive import MEMORY, A, B, C, K, fresh, noise_of, sweep
+from fieldsid.fitting.sample_noise import NoiseShare, noise_share, transfer_of
 from fieldsid.fitting.series_errors import Series, coloured_covariance
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.record import Record
@@ -34,7 +35,8 @@ def solve(problem: Problem, options: Options) -> Solution:
             "the forgetting factor must be in (0, 1]", found=f"{options.forgetting:g}", hint="use `--forgetting 0.998`"
         )
     signals = measured_signals(record, options.bandwidth)
-    values, spread, rows = run(record, signals, options, stiff=len(slots) == 4)
+    block, _, _ = regress(problem, options.bandwidth)
+    values, spread, rows = run(record, signals, options, theta_of(problem, block, 0), stiff=len(slots) == 4)
     used = np.isfinite(rows[:, -1])
     if used.sum() <= 2 * len(slots):
         raise DataError(
@@ -49,24 +51,37 @@ def solve(problem: Problem, options: Options) -> Solution:
     history = history_of(record, list(slots), values, spread * wider)
     covariance = np.zeros((problem.layout.shared, problem.layout.shared))
     covariance[np.ix_(list(slots.values()), list(slots.values()))] = small
-    notes = (*bandwidth_notes([signals], options.bandwidth), *bias_notes(problem, x, rows[used], signals, options, small))
-    notes = (*notes, *settle_notes(record, history))
+    notes = (*bandwidth_notes([signals], options.bandwidth), *settle_notes(record, history))
     done = finished(problem, x, covariance, ESTIMATOR.name, notes)
     return Solution(done.x, done.covariance, done.noise, done.method, done.notes, history=history)
 
 
-def run(record: Record, signals: Measured, options: Options, *, stiff: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return estimates and plain standard deviations after every sample (n, p), and rows of phi and target (n, p + 1)."""
-    count, size = len(record), 4 if stiff else 3
-    path = record.commanded
+def share_of(record: Record, signals: Measured, bandwidth: float) -> NoiseShare:
+    """Return the share of the record's own white noise in one row's products."""
+    floor = floor_of([record])
+    return noise_share(signals.order, bandwidth, median_step(record), floor.angle, floor.rate)
+
+
+def run(
+    record: Record, signals: Measured, options: Options, theta: Theta, *, stiff: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return estimates and plain standard deviations after every sample (n, p), and rows of phi and target (n, p + 1).
+
+    theta gives the curvature between samples until the recursion's own estimate does.
+    """
+    count, path = len(record), record.commanded
     samples = np.zeros((count, 6))
     samples[:, 0] = record.time
     samples[1:, 1], samples[1:, 2] = path.start, path.end
     samples[:, 3], samples[:, 4], samples[:, 5] = signals.angle, signals.rate, signals.use
-    settings = np.array([options.bandwidth, options.forgetting, float(signals.order), float(stiff)])
-    values, spread, rows = np.zeros((count, size)), np.full((count, size), np.nan), np.full((count, size + 1), np.nan)
-    sweep(np.zeros(MEMORY), np.zeros(size), np.eye(size) * INITIAL, np.zeros((2, 4)), settings, samples, values, spread, rows)
-    return values, spread, rows
+    values, spread, rows = np.empty((count, 4)), np.empty((count, 4)), np.empty((count, 5))
+    noise = noise_of(share_of(record, signals, options.bandwidth))
+    settings = (options.bandwidth, options.forgetting, signals.order)
+    memory = np.zeros(MEMORY)
+    memory[[A, K, B, C]] = theta.damping, theta.stiffness, theta.authority, theta.trim
+    sweep(memory, fresh(stiff=stiff), *settings, 4 if stiff else 3, noise, samples, values, spread, rows)
+    keep = [0, 1, 2, 3] if stiff else [0, 2, 3]
+    return values[:, keep], spread[:, keep], rows[:, [*keep, 4]]
 
 
 def errors_of(
@@ -76,34 +91,14 @@ def errors_of(
     record, theta = problem.records[0], x[list(base_slots(problem).values())]
     weight = np.array(options.forgetting ** np.arange(rows.shape[0] - 1.0, -1.0, -1.0), dtype=np.float64)
     columns, residual = rows[:, :-1], rows[:, -1] - rows[:, :-1] @ theta
-    inverse = np.asarray(np.linalg.pinv((columns * weight[:, None]).T @ columns, rcond=1e-13, hermitian=True), dtype=np.float64)
-    h = median_step(record)
+    weighted, h = columns * weight[:, None], median_step(record)
+    keep = [0, 1, 2, 3] if theta.size == 4 else [0, 2, 3]
+    gram = share_of(record, signals, options.bandwidth).gram[np.ix_(keep, keep)] * weight.sum()
+    plain_inverse, inverse = inverse_of_normal(weighted.T @ columns, 0.0 * gram), inverse_of_normal(weighted.T @ columns, gram)
     transfer = transfer_of(signals.order, options.bandwidth, h, theta_of(problem, x, 0))
-    small = coloured_covariance([Series(columns * weight[:, None], residual, transfer, h)], inverse)
     power = float(weight @ residual**2) / max(float(weight.sum()) - theta.size, 1.0)
-    return small, inverse * (power * float((weight**2).sum() / weight.sum()))
-
-
-def bias_notes(
-    problem: Problem, x: FloatArray, rows: FloatArray, signals: Measured, options: Options, covariance: FloatArray
-) -> tuple[Note, ...]:
-    """Return the remark on parameters that white sensor noise biases by more than a standard error."""
-    record, slots = problem.records[0], base_slots(problem)
-    floor, columns = floor_of([record]), rows[:, :-1]
-    share = noise_share(signals.order, options.bandwidth, median_step(record), floor.angle, floor.rate)
-    keep = [0, 1, 2, 3] if len(slots) == 4 else [0, 2, 3]
-    theta = x[list(slots.values())]
-    push = share.gram[np.ix_(keep, keep)] @ theta - share.cross[keep]
-    bias = -np.linalg.pinv(columns.T @ columns, rcond=1e-13, hermitian=True) @ push * rows.shape[0]
-    error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    worst = {n: float(b) for n, b, e in zip(slots, bias, error, strict=True) if abs(b) > e}
-    if not worst:
-        return ()
-    which = ", ".join(f"{n} by {b:+.2g}" for n, b in worst.items())
-    message = (
-        f"sensor noise biases the recursion by more than its standard error: {which}; use a smaller lambda or `--method svf_ls`"
-    )
-    return (Note("noise_bias", message, {"bias": worst, "lambda": options.bandwidth}),)
+    plain = plain_inverse * (power * float((weight**2).sum() / weight.sum()))
+    return coloured_covariance([Series(weighted, residual, transfer, h)], inverse), plain
 
 
 def history_of(record: Record, names: list[str], values: FloatArray, errors: FloatArray) -> History:

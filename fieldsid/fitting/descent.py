@@ -126,7 +126,8 @@ def _step(
 
 def covariance(normal: FloatArray) -> FloatArray:
     """Return the inverse of a normal matrix, computed in its own scale; a direction without information is infinite."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    # not smaller: the inverse of a direction without information must stay a number
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-60))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     floor = 1e-13 * max(float(values[-1]), 1e-300)
     inverse = (vectors / np.maximum(values, floor)) @ vectors.T

@@ -173,6 +173,9 @@ def tangents(
             for j in range(count):
                 for l in range(3):
                     s[j, l] += h / 6.0 * acc[j, l]
+                    # a start's influence dies out; below the normal numbers it would only cost time, eightfold
+                    if abs(s[j, l]) < 1e-150:
+                        s[j, l] = 0.0
         if not abs(p) < DIVERGED:
             out[i + 1 :] = np.nan
             sens[:, :, i + 1 :] = np.nan

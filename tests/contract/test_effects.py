@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -205,7 +206,7 @@ def test_a_path_cut_in_half_steps_keeps_its_area(effect):
     coarse = record(effect.axes[0], held=False)
     time = np.sort(np.r_[coarse.time, 0.5 * (coarse.time[1:] + coarse.time[:-1])])
     fin = np.interp(time, coarse.time, coarse.fin)
-    fine = Record(**{**{f: getattr(coarse, f) for f in Record.__dataclass_fields__}, "time": time, "fin": fin})
+    fine = replace(coarse, time=time, fin=fin)
     values = effect.starts()
     area = effect.fin(coarse.commanded, values, coarse).mean * coarse.steps
     halves = effect.fin(fine.commanded, values, fine).mean * fine.steps

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from truth import kernel
+from truth.noise import ar1, calm, white
+from truth.simple import fly
 
 DEG = np.pi / 180.0
 
@@ -29,6 +31,25 @@ def write_log(rng, scene, motion, sample, inputs):
     if fitted:
         out["heave_m_s" if scene.pitching else "sway_m_s"] = motion.cross + noise(0.02)
     return out
+
+
+def flown(
+    physics, clock, maneuver, *, pitching=False, angle_noise=0.0, rate_noise=0.0, gust=0.0, gust_s=1.0, seed=0,
+    angle=0.0, depth=2.0,
+):  # fmt: skip
+    """Fly one run and log it: white noise (rad, rad/s), and a disturbance moment of spread gust (rad/s^2) over gust_s."""
+    rng, inputs = np.random.default_rng(seed), calm(clock, physics.nominal_thrust)
+    inputs[kernel.ANGLE_NOISE] = white(rng, clock.total, angle_noise)
+    inputs[kernel.RATE_NOISE] = white(rng, clock.total, rate_noise)
+    inputs[kernel.DISTURBANCE] = ar1(rng, clock.total, gust, gust_s, clock.sample)
+    motion = fly(physics, clock, maneuver, inputs, pitching=pitching, angle=angle, depth=depth)
+    own, fin, cross = ("pitch", "elevator_rad", "heave_m_s") if pitching else ("yaw", "rudder_rad", "sway_m_s")
+    return {
+        "time_s": motion.time, f"{own}_rad": motion.angle + clock.logged(inputs[kernel.ANGLE_NOISE]),
+        f"{own}_rate_rad_s": motion.rate + clock.logged(inputs[kernel.RATE_NOISE]), fin: motion.command.copy(),
+        cross: motion.cross.copy(), "surge_m_s": motion.surge.copy(), "depth_m": motion.depth.copy(),
+        "roll_rad": motion.roll.copy(), "thrust": clock.logged(inputs[kernel.THRUST]).copy(),
+    }  # fmt: skip
 
 
 def write_csv(log, path):

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truth import kernel, maneuvers
-from truth.noise import Clock, calm, white
+from truth import maneuvers
+from truth.logbook import flown
+from truth.noise import Clock
 from truth.physics import Physics
-from truth.simple import fly
 
 DEG = np.pi / 180.0
 
@@ -58,13 +58,7 @@ def physics_of(row: YawRow | PitchRow) -> Physics:
 def paper_run(row: YawRow | PitchRow, *, angle_noise=0.0, rate_noise=0.0, seed=0, rate_hz=20.0, duration=33.0):
     """A log (canonical columns) of the paper's experiment on a row of its tables; noise white, rad and rad/s."""
     pitching, clock = isinstance(row, PitchRow), Clock(1.0 / rate_hz, round(duration * rate_hz))
-    rng, inputs = np.random.default_rng(seed), calm(clock)
-    inputs[kernel.ANGLE_NOISE] = white(rng, clock.total, angle_noise)
-    inputs[kernel.RATE_NOISE] = white(rng, clock.total, rate_noise)
-    start = row.theta0_deg * DEG if pitching else 0.0
     plan = maneuvers.pulses(clock.time, 0.26, 0.15, start=2.0, recovery=9.0)
-    motion = fly(physics_of(row), clock, plan, inputs, pitching=pitching, angle=start)
-    angle, rate = motion.angle + clock.logged(inputs[kernel.ANGLE_NOISE]), motion.rate + clock.logged(inputs[kernel.RATE_NOISE])
-    names = ("pitch_rad", "pitch_rate_rad_s", "elevator_rad") if pitching else ("yaw_rad", "yaw_rate_rad_s", "rudder_rad")
-    log = dict(zip(names, (angle, rate, motion.command.copy()), strict=True))
-    return {"time_s": motion.time, "surge_m_s": np.full(motion.time.size, row.speed), **log}
+    start = row.theta0_deg * DEG if pitching else 0.0
+    noise = {"angle_noise": angle_noise, "rate_noise": rate_noise, "seed": seed}
+    return flown(physics_of(row), clock, plan, pitching=pitching, angle=start, **noise)

@@ -71,16 +71,21 @@ def stall(rng, _k):
     return lambda s, _u, _i: {"stall_angle": angle, "stall_slope": 1.0 - 1.7 * s}
 
 
+def drag_size(k):
+    """Quadratic drag of strength one in 1/rad; that of the REMUS in pitch is 22, and no hull has much more."""
+    return min(3.0 * k.damping / k.rate, 8.0)
+
+
 def quadratic_damping(rng, k):
     if not k.pitching and rng.random() < 0.12:  # an unstable hull that only the quadratic part holds
         values = {"damping": -rng.uniform(0.05, 0.15), "quadratic": rng.uniform(0.5, 1.5) * k.damping / k.rate}
         return lambda _s, _u, _i: dict(values)
-    return _fixed(quadratic=3.0 * k.damping / k.rate)
+    return _fixed(quadratic=drag_size(k))
 
 
 def crossflow_drag(rng, k):
     length, drift, e = rng.uniform(1.2, 2.5), rng.uniform(0.3, 0.8), rng.uniform(0.5, 1.5)
-    size = 3.0 * k.damping / k.rate
+    size = drag_size(k)
 
     def apply(s, u, _i):
         return {"crossflow": size * s, "length": length, "cross_damping": e * u, "cross_rate": drift * length * e * u}
@@ -186,7 +191,7 @@ BOTH = (
 YAW = {f.__name__: f for f in (*BOTH, roll_coupling, current, compass_deviation)} | {"sway_coupling": cross_coupling}
 PITCH = {f.__name__: f for f in (*BOTH, large_angle_righting, depth_buoyancy, speed_moment)} | {"heave_coupling": cross_coupling}
 LARGEST = {
-    "stall": 1.0, "delay": 1.2, "clock_offset": 1.15, "step_change": 1.5, "large_angle_righting": 1.0, "speed_varying": 1.1,
+    "stall": 1.0, "delay": 1.2, "clock_offset": 1.15, "step_change": 1.5, "large_angle_righting": 0.7, "speed_varying": 1.1,
     "sway_coupling": 1.0, "heave_coupling": 1.0, "asymmetric_fin": 1.4, "depth_buoyancy": 1.0,
     "gyro_scale": 1.2, "gyro_bias": 1.5, "servo_lag": 1.2, "rate_limit": 1.5, "backlash": 1.0, "deadband": 1.2,
     "compass_deviation": 1.5, "wave": 1.5,

@@ -78,8 +78,8 @@ def test_moments_that_follow_a_signal(name, role, coefficient, expected):
 
 def test_the_cross_state_scales_with_speed_as_lift_does():
     for name in ("sway_coupling", "heave_coupling"):
-        core = pick_effect(name).core({"cross_damping": 1.0, "cross_rate": 1.0, "cross_fin": 1.0}, 2.0)
-        assert (core.cross_damping, core.cross_rate, core.cross_fin) == (2.0, 4.0, 8.0)
+        core = pick_effect(name).core({"cross_damping": 1.0, "cross_rate": 1.0}, 2.0)
+        assert (core.cross_damping, core.cross_rate) == (2.0, 4.0)
 
 
 def test_each_core_effect_sets_its_own_terms_only():

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from fieldsid.effects import add_effects, all_effects, forget_effects, pick_effect
 from fieldsid.effects._expression import parse
 from fieldsid.effects._user import SIGNAL_OF, effect_of, load_user_effect, load_user_effects
-from fieldsid.errors import EffectError, FieldsidError, UsageError
+from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Motion, Stage
 from fieldsid.models.record import Record
@@ -234,7 +234,7 @@ def test_an_own_effect_is_found_by_name_until_it_is_forgotten():
 
 
 def test_a_taken_name_is_refused():
-    with pytest.raises(FieldsidError, match="'stall' is taken"):
+    with pytest.raises(EffectError, match="'stall' is taken"):
         add_effects([effect_of(spec() | {"name": "stall"}, origin="test")])
     lag = {"name": "own", "moment": "lag * r", "coefficients": {"lag": K["k"]}}
     with pytest.raises(EffectError, match="a name of effect 'servo_lag'") as caught:

@@ -1,0 +1,82 @@
+"""The program: finds the command, runs it, and is the one place where errors are caught and become exit codes."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+DONE, GATE_FAILED, BAD_INPUT, OUR_BUG, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command line and return its exit code; data go to stdout, all else to stderr."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        code = _dispatch(arguments)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader went away (`| head`): point stdout elsewhere so that the interpreter's last flush is quiet.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return DONE
+    except Exception as error:  # noqa: BLE001 - the one boundary: every error becomes a message and an exit code
+        from fieldsid.cli.failure import explain
+
+        return explain(error, arguments)
+    return code
+
+
+def run(arguments: Sequence[str]) -> Any:
+    """Run one command in this process and return what it returns, its errors raised as they are.
+
+    Raises UsageError for an unknown command, and whatever the command raises.
+    """
+    from importlib import import_module
+
+    from fieldsid.cli.catalogue import entries
+
+    known = entries()
+    name = arguments[0]
+    if name not in known:
+        raise _unknown(name, tuple(known))
+    import typer
+
+    from fieldsid.cli.own import load_own_effects
+
+    load_own_effects()
+    module = import_module(known[name].module)
+    program = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    if isinstance(module.command, typer.Typer):
+        program.add_typer(module.command, name=name)
+        return program(list(arguments), prog_name="sysid", standalone_mode=False)
+    program.command(name)(module.command)
+    return program(list(arguments[1:]), prog_name=f"sysid {name}", standalone_mode=False)
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in {"--help", "-h", "help"}:
+        from fieldsid.cli.catalogue import entries
+        from fieldsid.cli.front import front_page
+
+        sys.stdout.write(front_page(entries()))
+        return DONE
+    if arguments[0] in {"--version", "-V"}:
+        from fieldsid._version import __version__
+
+        sys.stdout.write(f"fieldsid {__version__}\n")
+        return DONE
+    result = run(arguments)
+    return result if isinstance(result, int) else DONE
+
+
+def _unknown(name: str, known: tuple[str, ...]) -> Exception:
+    from fieldsid.errors import UsageError
+    from fieldsid.registry import near
+
+    return UsageError(f"there is no command {name!r}", found=", ".join(known), hint=near(name, known))

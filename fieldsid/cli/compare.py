@@ -1,0 +1,151 @@
+"""sysid compare: a model against measurement, and where it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, table
+from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, ModelFile, OutputDir, RunFiles, ToS
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.comparison.compare import Comparison
+    from fieldsid.models.model import Model
+
+MOST_SHOWN = 6
+
+MinFit = Annotated[
+    float | None,
+    typer.Option("--min-fit", metavar="PERCENT", help="Gate: exit 1 when a run's rate fit is below this.", show_default=False),
+]
+Top = Annotated[int, typer.Option("--top", min=1, help="Conditions to show for each run.")]
+
+
+def command(
+    model: ModelFile,
+    runs: RunFiles,
+    start: FromS = None,
+    end: ToS = None,
+    mapping: MappingFile = None,
+    min_fit: MinFit = None,
+    top: Top = MOST_SHOWN,
+    output: OutputDir = None,
+    figures: Figures = True,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Compare a model with runs by free simulation, and show where it fails.
+
+    The model is simulated from the run's fin alone; only the initial state is refitted. The error is divided by phase, fin angle,
+    rate, speed, heading, side, depth and time. With `-o` one figure per run is drawn.
+
+    Example: sysid compare models/run7_yaw.yaml runs/zigzag.parquet
+    """
+    from fieldsid.cli.inputs import read_runs
+    from fieldsid.comparison.compare import compare
+    from fieldsid.models.model import load_model
+
+    known = load_model(model)
+    found = compare(known, read_runs(runs, mapping=mapping, start=start, end=end))
+    drawn = _drawn(known, model, found, output if figures else None, force=force)
+    entries = [_entry(c, figure) for c, figure in zip(found, drawn, strict=True)]
+    body = {"schema": "fieldsid/compare/1", "model": str(model), "axis": known.axis, "runs": entries}
+    emit(body, as_json=as_json, render=lambda to: _render(to, entries, top))
+    _gate(entries, min_fit)
+    return body
+
+
+def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
+    failed = [e for e in entries if least is not None and not e["rate_fit_percent"] >= least]
+    for e in failed:
+        messages().print(
+            f"gate failed: {e['run']} has a rate fit of {e['rate_fit_percent']:.1f} %, below {least:g} %", soft_wrap=True
+        )
+    if failed:
+        raise typer.Exit(1)
+
+
+def _drawn(model: Model, name: Path, found: Sequence[Comparison], folder: Path | None, *, force: bool) -> list[str | None]:
+    if folder is None:
+        return [None] * len(found)
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.compare import figure
+
+    return [str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force)) for c in found]
+
+
+def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
+    return {
+        "run": c.run,
+        "speed_m_s": c.shown.record.speed,
+        "angle_rms_rad": c.merit.angle_rms,
+        "rate_rms_rad_s": c.merit.rate_rms,
+        "angle_fit_percent": c.merit.angle_fit,
+        "rate_fit_percent": c.merit.rate_fit,
+        "noise_floor": {"angle_rad": c.floor.angle, "rate_rad_s": c.floor.rate},
+        "judged_by": c.channel,
+        "theil": c.metrics.theil,
+        "r2": c.metrics.r2,
+        "whiteness_p": c.metrics.whiteness_p,
+        "where": [
+            {
+                "condition": p.condition,
+                "share_of_error": p.share_of_error,
+                "share_of_samples": p.share_of_samples,
+                "rms_ratio": p.rms_ratio,
+                "t_start_s": p.start_s,
+                "t_end_s": p.end_s,
+            }
+            for p in c.where
+        ],
+        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in c.worst],
+        "moves_with": [{"signal": m.signal, "explained": m.explained} for m in c.moves_with],
+        "figure": figure,
+    }
+
+
+def _render(to: Console, entries: Sequence[Mapping[str, Any]], top: int) -> None:
+    from fieldsid.rounding import number
+
+    rows = [
+        (
+            e["run"],
+            number(e["speed_m_s"], 3),
+            number(e["angle_rms_rad"], 2),
+            number(e["noise_floor"]["angle_rad"], 2),
+            number(e["angle_fit_percent"], 3),
+            number(e["rate_rms_rad_s"], 2),
+            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(e["rate_fit_percent"], 3),
+        )
+        for e in entries
+    ]
+    to.print(table("", ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %"), rows))
+    for e in entries:
+        _render_where(to, e, top)
+    for e in entries:
+        if e["figure"]:
+            to.print(f"figure: {e['figure']}", soft_wrap=True)
+
+
+def _render_where(to: Console, e: Mapping[str, Any], top: int) -> None:
+    rows = [
+        (
+            w["condition"],
+            f"{100 * w['share_of_error']:.0f} %",
+            f"{100 * w['share_of_samples']:.0f} %",
+            f"{w['rms_ratio']:.2f}",
+            f"{w['t_start_s']:.1f} .. {w['t_end_s']:.1f}",
+        )
+        for w in e["where"][:top]
+    ]
+    to.print()
+    to.print(table(f"{e['run']}: where the {e['judged_by']} fails", ("", "of error", "of time", "rms ratio", "worst, s"), rows))
+    if e["moves_with"]:
+        said = ", ".join(f"{m['signal']} ({100 * m['explained']:.0f} %)" for m in e["moves_with"][:3])
+        to.print(f"the missing moment moves with {said}")

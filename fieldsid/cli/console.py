@@ -1,0 +1,93 @@
+"""What commands print: data to stdout, messages to stderr, one JSON object on demand, tables that fit 80 columns."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from rich.console import Console, RenderableType
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from fieldsid.artifacts import plain
+from fieldsid.logs.run import Note
+
+T = TypeVar("T")
+WIDTH = 80
+
+
+def out() -> Console:
+    """Return the console of the data; made anew so that it follows a redirected stdout."""
+    return _console(stderr=False)
+
+
+def messages() -> Console:
+    """Return the console of everything else."""
+    return _console(stderr=True)
+
+
+def emit(body: Mapping[str, Any], *, as_json: bool, render: Callable[[Console], None]) -> Mapping[str, Any]:
+    """Print the body as one JSON object, or let `render` print it for a reader; return the body."""
+    if as_json:
+        sys.stdout.write(json.dumps(plain(body), allow_nan=False) + "\n")
+    else:
+        render(out())
+    return body
+
+
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, left: int = 1) -> Table:
+    """Return a table whose first `left` columns are words and whose others are numbers."""
+    made = Table(
+        title=title or None,
+        title_justify="left",
+        title_style="bold",
+        box=None,
+        pad_edge=False,
+        padding=(0, 2, 0, 0),
+        show_header=any(columns),
+    )
+    for i, column in enumerate(columns):
+        made.add_column(column, justify="left" if i < left else "right", header_style="dim", overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def say(text: str) -> None:
+    """Print a message on stderr."""
+    messages().print(Text(text), soft_wrap=True)
+
+
+def warn(notes: Iterable[Note], *, of: str = "") -> None:
+    """Print warnings on stderr, each with its code."""
+    where = f"{of}: " if of else ""
+    for note in notes:
+        messages().print(Text(f"warning: {where}{note.message} [{note.code}]", style="yellow"), soft_wrap=True)
+
+
+@contextmanager
+def progress(says: str, total: int) -> Iterator[Callable[[], None]]:
+    """Yield a function that moves a bar on by one; the bar is drawn on stderr, and only on a terminal."""
+    console = messages()
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(says, total=total)
+        yield lambda: bar.advance(task)
+
+
+def tracked(items: Sequence[T], says: str) -> Iterator[T]:
+    """Yield the items while a bar on a terminal shows how many are done."""
+    with progress(says, len(items)) as step:
+        for item in items:
+            yield item
+            step()
+
+
+def _console(*, stderr: bool) -> Console:
+    stream = sys.stderr if stderr else sys.stdout
+    width = None if stream.isatty() else WIDTH
+    return Console(file=stream, width=width, highlight=False, soft_wrap=False, emoji=False)

@@ -1,0 +1,126 @@
+"""sysid demo: all of it on a trial that it makes itself, with a hidden effect."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from textwrap import fill
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.app import run
+from fieldsid.cli.console import WIDTH, emit
+from fieldsid.cli.options import Force, JsonFlag, OutputDir
+from fieldsid.errors import ArtifactError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.demo.steps import Step
+
+HIDDEN = "servo_lag"
+FOLDER = "sysid-demo"
+
+EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The effect to hide: see `sysid effects list`.")]
+
+
+def command(
+    effect: EffectName = HIDDEN, output: OutputDir = None, force: Force = False, as_json: JsonFlag = False
+) -> Mapping[str, Any]:
+    """Take a tour: every command as you would type it, with its result and what it means.
+
+    The program flies a trial with a vehicle whose dynamics hold one effect more than the textbook's, writes the logs, and works
+    on them like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
+    """
+    from fieldsid.demo.steps import STEPS, places
+    from fieldsid.demo.trial import make_trial
+    from fieldsid.demo.vehicle import hidden_vehicle
+
+    began = perf_counter()
+    folder = _folder(output, force=force)
+    vehicle = hidden_vehicle(effect)
+    make_trial(vehicle, folder / "trial", force=force)
+    known = places(folder, vehicle.axis)
+    if not as_json:
+        sys.stdout.write(_opening(folder))
+    steps = [step for step in STEPS if vehicle.axis in step.axes]
+    done = [_taken(i, step, known, force=force, quiet=as_json) for i, step in enumerate(steps, start=1)]
+    body = {
+        "schema": "fieldsid/demo/1",
+        "folder": str(folder),
+        "hidden": {"effect": effect, "axis": vehicle.axis, "values": dict(vehicle.values)},
+        "steps": done,
+        "files": sorted(str(p) for p in folder.rglob("*") if p.is_file()),
+        "seconds": perf_counter() - began,
+    }
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+
+
+def _folder(asked: Path | None, *, force: bool) -> Path:
+    """Return the folder to work in: the one asked for, or the first of sysid-demo, sysid-demo-2, ... that is free."""
+    if asked is None:
+        numbered = (Path(f"{FOLDER}-{i}") for i in range(2, 10_000))
+        return next(p for p in (Path(FOLDER), *numbered) if not p.exists())
+    if asked.is_dir() and any(asked.iterdir()) and not force:
+        raise ArtifactError(
+            f"`{asked}` is not empty",
+            found=f"{sum(1 for _ in asked.iterdir())} entries",
+            hint="add `--force`, or name another folder",
+        )
+    return asked
+
+
+def _taken(place: int, step: Step, known: Mapping[str, str], *, force: bool, quiet: bool) -> dict[str, Any]:
+    from fieldsid.demo.steps import expanded, words_of
+
+    words = words_of(step.line, known)
+    if not quiet:
+        sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
+    began = perf_counter()
+    with _silence() if quiet else _aloud():
+        result = run([*expanded(words), *(["--force"] if force else [])])
+    meaning = step.means(result)
+    if not quiet:
+        sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ')}\n")
+        sys.stdout.flush()
+    return {"command": "sysid " + " ".join(words), "seconds": perf_counter() - began, "means": meaning, "result": result}
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):  # noqa: PTH123
+        yield
+
+
+@contextmanager
+def _aloud() -> Iterator[None]:
+    sys.stdout.flush()
+    yield
+    sys.stderr.flush()
+
+
+def _opening(folder: Path) -> str:
+    text = (
+        f"A small vehicle has flown rudder or elevator pulses at three speeds and zig-zags at two others. Its logs are in "
+        f"{folder}/trial. Its dynamics hold one effect more than the textbook's model; the commands below do not know which."
+    )
+    return fill(text, WIDTH) + "\n"
+
+
+def _render(to: Console, body: Mapping[str, Any]) -> None:
+    from fieldsid.models.axis import NAMES, Axis
+
+    hidden = body["hidden"]
+    own = {n: v for n, v in hidden["values"].items() if n not in NAMES[Axis(hidden["axis"])].base}
+    numbers = ", ".join(f"{n} = {v:.3g}" for n, v in own.items())
+    figures = [f for f in body["files"] if f.endswith(".png")]
+    to.print(f"\nHidden in the trial was {hidden['effect']} ({numbers}).")
+    to.print(f"{len(body['files'])} files are in {body['folder']}, {len(figures)} of them figures:", soft_wrap=True)
+    for file in figures:
+        to.print(f"  {file}", soft_wrap=True)
+    to.print(f"The tour took {body['seconds']:.1f} s. `sysid --help` lists every command.")

@@ -1,0 +1,125 @@
+"""sysid effects: list the physical effects, show one, start one of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.own import OWN_EFFECTS
+from fieldsid.models.axis import Axis
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.models.effect import Coefficient, Effect
+
+command = typer.Typer(help="List the physical effects, show one, start one of your own.")
+
+EffectName = Annotated[str, typer.Argument(metavar="NAME", help="Name of an effect, as in `sysid effects list`.")]
+OneAxis = Annotated[Axis | None, typer.Option("--axis", help="Only the effects of this plane.", show_default=False)]
+NewFile = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="File to write; effects/NAME.yaml if not given.", show_default=False),
+]
+
+
+@command.command("list", short_help="List every effect by stage.")
+def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor."""
+    from fieldsid.effects import all_effects
+
+    known = all_effects(axis).values()
+    body = {"schema": "fieldsid/effects/1", "axis": axis, "effects": [_described(e) for e in known]}
+    return emit(body, as_json=as_json, render=lambda to: _render_list(to, known))
+
+
+@command.command("show", short_help="Show all that is known of one effect.")
+def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source."""
+    from fieldsid.effects import pick_effect
+
+    effect = pick_effect(name)
+    body = {"schema": "fieldsid/effect/1", **_described(effect)}
+    return emit(body, as_json=as_json, render=lambda to: _render_one(to, effect))
+
+
+@command.command("new", short_help="Start an effect of your own.")
+def new(name: EffectName, axis: OneAxis = None, output: NewFile = None, force: Force = False) -> None:
+    """Write a file for an effect of your own, to be edited; it takes part in diagnose, extend and compare."""
+    from fieldsid.artifacts import write_text
+    from fieldsid.templates import template_path
+
+    text = template_path("effect.yaml").read_text(encoding="utf-8")
+    for old, own in _changes(name, axis or Axis.YAW):
+        text = text.replace(old, own)
+    path = write_text(output or Path(OWN_EFFECTS) / f"{name}.yaml", text, force=force)
+    say(f"wrote {path}: edit it, then `sysid effects show {name}`")
+
+
+def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
+    """What of the template is the user's: its name, its axis, and a coefficient's name that no other effect has."""
+    return (
+        ("roll_rate_drag", name),
+        ("axes: [yaw]", f"axes: [{axis}]"),
+        ('moment: "-k * r * abs(phi)"', f'moment: "-{name}_k * rate * abs(roll)"'),
+        ("  k: {unit", f"  {name}_k: {{unit"),
+    )
+
+
+def _described(effect: Effect) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "says": effect.says,
+        "stage": effect.stage,
+        "axes": effect.axes,
+        "equation": effect.equation,
+        "coefficients": [_coefficient(c) for c in effect.coefficients],
+        "needs": effect.needs,
+        "extra_states": effect.extra_states,
+        "telltale": effect.telltale,
+        "excited_by": effect.excited_by,
+        "mistaken_for": effect.mistaken_for,
+        "source": effect.source,
+        "origin": effect.origin,
+    }
+
+
+def _coefficient(c: Coefficient) -> dict[str, Any]:
+    return {"name": c.name, "unit": c.unit, "low": c.low, "high": c.high, "start": c.start, "per_run": c.per_run, "says": c.says}
+
+
+def _render_list(to: Console, known: Iterable[Effect]) -> None:
+    from fieldsid.models.effect import Stage
+
+    for stage in Stage:
+        rows = [(e.name, "+".join(e.axes), e.says) for e in known if e.stage is stage]
+        if rows:
+            to.print(table(stage.capitalize(), ("effect", "axes", "in plain words"), rows, left=3))
+            to.print()
+    to.print("`sysid effects show NAME` tells the equation, the telltale and what excites it.")
+
+
+def _render_one(to: Console, effect: Effect) -> None:
+    facts = [
+        ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
+        ("equation", effect.equation),
+        ("telltale", effect.telltale),
+        ("excited by", ", ".join(effect.excited_by)),
+        ("mistaken for", ", ".join(effect.mistaken_for) or "-"),
+        ("log must have", ", ".join(effect.needs) or "nothing more"),
+        ("source", effect.source),
+        ("origin", effect.origin),
+    ]
+    to.print(f"{effect.name}: {effect.says}\n")
+    to.print(table("", ("", ""), facts, left=2))
+    rows = [
+        (c.name, c.unit, f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
+        for c in effect.coefficients
+    ]
+    to.print()
+    to.print(table("", ("coefficient", "unit", "range", "is"), rows, left=4))

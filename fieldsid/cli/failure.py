@@ -1,0 +1,51 @@
+"""What the user reads when something went wrong: three parts on stderr, or where the trace of our bug is."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from fieldsid._version import __version__
+from fieldsid.cli.app import BAD_INPUT, INTERRUPTED, OUR_BUG
+from fieldsid.errors import FieldsidError, UsageError
+
+
+def explain(error: Exception, arguments: Sequence[str]) -> int:
+    """Print an error on stderr and return its exit code."""
+    if isinstance(error, typer.Abort):
+        sys.stderr.write("interrupted\n")
+        return INTERRUPTED
+    if isinstance(error, typer.TyperException):
+        error = _as_usage(error, arguments)
+    if isinstance(error, FieldsidError):
+        sys.stderr.write(f"error: {error}\n")
+        return BAD_INPUT
+    trace = _save_trace(error, arguments)
+    sys.stderr.write(
+        f"error: this is a bug of fieldsid: {type(error).__name__}: {error}\n"
+        f"  found: the trace is in `{trace}`\n\nhint: send us that file with the log that caused it\n"
+    )
+    return OUR_BUG
+
+
+def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageError:
+    """Give an error of the option parser our three parts; its own sentence already names the option."""
+    words = error.format_message().strip().removesuffix(".")
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else f"sysid {arguments[0]}"
+    return UsageError(words[:1].lower() + words[1:], found=shlex.join(["sysid", *arguments]), hint=f"see `{path} --help`")
+
+
+def _save_trace(error: Exception, arguments: Sequence[str]) -> Path:
+    handle, name = tempfile.mkstemp(prefix="fieldsid-trace-", suffix=".txt")
+    head = f"fieldsid {__version__}\nPython {sys.version}\n{shlex.join(['sysid', *arguments])}\n\n"
+    with os.fdopen(handle, "w", encoding="utf-8") as stream:
+        stream.write(head + "".join(traceback.format_exception(error)))
+    return Path(name)

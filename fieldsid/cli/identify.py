@@ -1,0 +1,237 @@
+"""sysid identify: the parameters of the yaw or pitch model, with honest error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, progress, table
+from fieldsid.cli.options import (
+    AxisOption,
+    EffectNames,
+    Figures,
+    Force,
+    FromS,
+    JsonFlag,
+    MappingFile,
+    OutputDir,
+    RunFiles,
+    ToS,
+    names_of,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.fitting.fit import Fit
+    from fieldsid.fitting.merit import Merit
+    from fieldsid.fitting.predict import Prediction
+    from fieldsid.logs import Note, Run
+    from fieldsid.models.axis import Axis
+
+NO_WARNING = ("mapping", "noise_model")
+"""Notes that tell how it went, not what is wrong."""
+
+Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
+Joint = Annotated[bool, typer.Option("--joint", help="One model for all runs: damping and trim shared, authority by speed.")]
+Whole = Annotated[bool, typer.Option("--whole", help="Use whole runs, not only the part that excites the axis.")]
+Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
+Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor of svf_rls.")]
+
+
+def command(
+    runs: RunFiles,
+    axis: AxisOption,
+    method: Method = "auto",
+    effects: EffectNames = None,
+    joint: Joint = False,
+    whole: Whole = False,
+    start: FromS = None,
+    end: ToS = None,
+    bandwidth: Bandwidth = 4.0,
+    forgetting: Forgetting = 1.0,
+    mapping: MappingFile = None,
+    output: OutputDir = None,
+    figures: Figures = True,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Identify the yaw or pitch model of each run, or one model of all of them.
+
+    With `-o` each model is written to DIR/RUN_AXIS.yaml with its figure beside it. `auto` is output error, and prediction error
+    (pem) where the residuals show a disturbance.
+
+    Example: sysid identify runs/*.parquet --axis yaw -o models/
+    """
+    from fieldsid.cli.inputs import files_of, read_runs
+    from fieldsid.fitting.identify import identify
+    from fieldsid.fitting.method import Options
+
+    known = read_runs(runs, mapping=mapping, start=start, end=end)
+    with progress("fitting", 1 if joint else len(known)) as step:
+        fits = identify(
+            known,
+            axis,
+            method=method,
+            effects=names_of(effects),
+            joint=joint,
+            whole=whole or start is not None or end is not None,
+            options=Options(bandwidth, forgetting),
+            done=step,
+        )
+    groups = [known] if joint else [[run] for run in known]
+    models = _written(fits, [files_of(group) for group in groups], output, figures=figures, force=force)
+    entries = [_entry(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True)]
+    body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries}
+    return emit(body, as_json=as_json, render=lambda to: _render(to, entries))
+
+
+def _written(
+    fits: Sequence[Fit], sources: Sequence[list[Path]], folder: Path | None, *, figures: bool, force: bool
+) -> list[Path | None]:
+    if folder is None:
+        return [None] * len(fits)
+    from fieldsid.models.model import save_model
+
+    paths: list[Path | None] = []
+    for fit, inputs in zip(fits, sources, strict=True):
+        stem = _stem(fit)
+        paths.append(save_model(fit.model, folder / f"{stem}.yaml", inputs=inputs, force=force))
+        if figures:
+            _draw(fit, folder, stem, force=force)
+    return paths
+
+
+def _draw(fit: Fit, folder: Path, stem: str, *, force: bool) -> None:
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.identify import figure, history_figure
+
+    for i, shown in enumerate(fit.predictions):
+        name = stem if len(fit.predictions) == 1 else f"{stem}_{shown.record.name}"
+        save(figure(fit, i), folder / f"{name}.png", force=force)
+    if fit.history is not None:
+        save(history_figure(fit, fit.history), folder / f"{stem}_over_time.png", force=force)
+
+
+def _stem(fit: Fit) -> str:
+    run = fit.model.runs[0] if len(fit.model.runs) == 1 else "joint"
+    return f"{run}_{fit.model.axis.value}"
+
+
+def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
+    from fieldsid.fitting.merit import merit
+
+    m, model = merit(fit.predictions), fit.model
+    notes = [n for n in (*fit.notes, *(n for run in logs for n in run.notes)) if _matters(n, model.axis)]
+    return {
+        "run": "+".join(model.runs),
+        "model": None if path is None else str(path),
+        "speed_m_s": model.law.reference,
+        "method": model.method,
+        "effects": list(model.effects),
+        "parameters": _parameters(fit),
+        **_merit(m),
+        "noise_floor": {"angle_rad": fit.floor.angle, "rate_rad_s": fit.floor.rate},
+        "warnings": [{"code": n.code, "message": n.message, "data": dict(n.data)} for n in notes],
+        "whiteness_p": model.info.get("whiteness_p"),
+        "runs": [_of_run(p) for p in fit.predictions],
+        "settled_s": None if fit.history is None else dict(fit.history.settled_s),
+    }
+
+
+def _matters(note: Note, axis: Axis) -> bool:
+    """Whether a note is a warning, and about a signal that this axis uses where it is about a signal."""
+    from fieldsid.models.axis import NAMES
+
+    names = NAMES[axis]
+    used = {names.angle, names.rate, names.fin, names.fin_measured, names.cross, "surge_m_s"}
+    return note.code not in NO_WARNING and note.data.get("signal", names.angle) in used
+
+
+def _of_run(p: Prediction) -> dict[str, Any]:
+    from fieldsid.fitting.merit import merit
+
+    time = p.record.time
+    return {"run": p.record.name, "speed_m_s": p.record.speed, "segment_s": [time[0], time[-1]], **_merit(merit([p]))}
+
+
+def _merit(m: Merit) -> dict[str, float]:
+    return {
+        "angle_rms_rad": m.angle_rms,
+        "rate_rms_rad_s": m.rate_rms,
+        "angle_fit_percent": m.angle_fit,
+        "rate_fit_percent": m.rate_fit,
+    }
+
+
+def _parameters(fit: Fit) -> dict[str, dict[str, Any]]:
+    from fieldsid.fitting.offset import offset_of
+
+    out: dict[str, dict[str, Any]] = {}
+    for name, value in fit.model.values.items():
+        out[name] = _parameter(value, fit.model.std_error(name), fit.model.units.get(name, ""))
+    for name, known in dict(fit.model.info.get("law_parameters", {})).items():
+        out[name] = _parameter(known["value"], known["std_error"], "1/s^2" if "@" in name else "1")
+    offset = offset_of(fit.model)
+    out[offset.name] = _parameter(offset.value, offset.std_error, "rad")
+    return out
+
+
+def _parameter(value: float, error: float, unit: str) -> dict[str, Any]:
+    return {"value": value, "std_error": error, "interval95": [value - 1.96 * error, value + 1.96 * error], "unit": unit}
+
+
+def _render_warnings(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Say each kind of warning once, with the numbers of the first run that has it."""
+    seen: dict[str, list[str]] = {}
+    first: dict[str, str] = {}
+    for e in entries:
+        for w in e["warnings"]:
+            seen.setdefault(w["code"], []).append(_label(e))
+            first.setdefault(w["code"], w["message"])
+    for code, runs in seen.items():
+        others = "" if len(runs) == 1 else f" (and {len(runs) - 1} more like it)"
+        to.print(f"warning: {runs[0]}: {first[code]} \\[{code}]{others}", soft_wrap=True)
+
+
+def _label(entry: Mapping[str, Any]) -> str:
+    """Return the run's name, or how many runs a joint fit has."""
+    return str(entry["run"]) if len(entry["runs"]) == 1 else f"{len(entry['runs'])} runs"
+
+
+def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
+    from fieldsid.rounding import interval, number, with_error
+
+    _render_warnings(to, entries)
+    rows = [
+        (_label(e) if i == 0 else "", name, with_error(p["value"], p["std_error"]), p["unit"], interval(*p["interval95"]))
+        for e in entries
+        for i, (name, p) in enumerate(e["parameters"].items())
+    ]
+    to.print(table("", ("run", "parameter", "value", "unit", "95 % interval"), rows, left=2))
+    to.print()
+    merits = [
+        (
+            r["run"],
+            number(r["speed_m_s"], 3),
+            number(r["angle_rms_rad"], 2),
+            number(e["noise_floor"]["angle_rad"], 2),
+            number(r["angle_fit_percent"], 3),
+            number(r["rate_rms_rad_s"], 2),
+            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(r["rate_fit_percent"], 3),
+        )
+        for e in entries
+        for r in e["runs"]
+    ]
+    columns = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
+    to.print(table("", columns, merits))
+    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in rad, rate in rad/s")
+    for e in entries:
+        if e["model"]:
+            to.print(f"model: {e['model']}", soft_wrap=True)
+    if not any(e["model"] for e in entries):
+        messages().print("nothing was written: add `-o DIR` to keep the models and their figures")

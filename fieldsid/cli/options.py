@@ -1,0 +1,51 @@
+"""Options that several commands share, each written once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fieldsid.models.axis import Axis
+
+RunFiles = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RUN...", help="Runs or log files: .parquet, .csv, .csv.gz, a bag; `-` reads CSV from standard input."
+    ),
+]
+RunFile = Annotated[Path, typer.Argument(metavar="RUN", help="A run or a log file; `-` reads CSV from standard input.")]
+LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="A log: CSV, Parquet, ROS 1 or ROS 2 bag.")]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file written by `sysid identify` or `sysid extend`.")]
+ModelFiles = Annotated[list[Path], typer.Argument(metavar="MODEL...", help="Model files, or one table of parameters over speed.")]
+ValidateRuns = Annotated[
+    list[Path] | None,
+    typer.Option("--validate", metavar="RUN", help="A run the fit does not see; may repeat.", show_default=False),
+]
+AxisOption = Annotated[Axis, typer.Option("--axis", help="The plane to identify.")]
+MappingFile = Annotated[
+    Path | None,
+    typer.Option("--mapping", "-m", metavar="YAML", help="Which column or topic is which signal.", show_default=False),
+]
+VehicleFile = Annotated[
+    Path | None, typer.Option("--vehicle", metavar="YAML", help="The vehicle's description and limits.", show_default=False)
+]
+EffectNames = Annotated[
+    str | None,
+    typer.Option("--effects", metavar="A,B", help="Effects in the model: see `sysid effects list`.", show_default=False),
+]
+FromS = Annotated[float | None, typer.Option("--from", metavar="S", help="Use samples from this time on.", show_default=False)]
+ToS = Annotated[float | None, typer.Option("--to", metavar="S", help="Use samples up to this time.", show_default=False)]
+OutputDir = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for what is written.", show_default=False)
+]
+OutputFile = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False)]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures beside what is written.")]
+
+
+def names_of(text: str | None) -> tuple[str, ...]:
+    """Return the names in a comma-separated list, without blanks."""
+    return tuple(n.strip() for n in (text or "").split(",") if n.strip())

@@ -1,0 +1,36 @@
+"""Speeds as a user writes them: `0.5:2.5:0.1` (low, high, step) or `1.0,1.5,2.0`."""
+
+from __future__ import annotations
+
+import math
+
+from fieldsid.errors import UsageError
+
+MOST = 2000
+
+
+def speeds_of(text: str | None) -> list[float]:
+    """Return the speeds in m/s, rising in a range; empty where nothing is given. Raises UsageError."""
+    if text is None or not text.strip():
+        return []
+    try:
+        if ":" in text:
+            low, high, step = (float(part) for part in text.split(":"))
+            if not (0 < low <= high and step > 0):
+                raise _wrong(text, "low, high and step must be above zero, low below high")
+            count = math.floor((high - low) / step + 1e-9) + 1
+            if count > MOST:
+                raise _wrong(text, f"{count} speeds, at most {MOST}")
+            return [round(low + i * step, 9) for i in range(count)]
+        speeds = [float(part) for part in text.split(",") if part.strip()]
+    except ValueError as error:
+        raise _wrong(text, str(error)) from error
+    if not speeds or not all(math.isfinite(s) and s > 0 for s in speeds):
+        raise _wrong(text, "every speed must be above zero")
+    return speeds
+
+
+def _wrong(text: str, found: str) -> UsageError:
+    return UsageError(
+        f"`--speeds {text}` is not a list of speeds", found=found, hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5,2.0`"
+    )

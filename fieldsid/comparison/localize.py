@@ -1,0 +1,80 @@
+"""Where a model fails: the share of the squared error under each condition, and the worst stretches of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.comparison.conditions import Condition, Mask
+from fieldsid.logs.run import FloatArray
+
+SMALLEST_SHARE = 0.02
+"""Share of the samples below which a condition says nothing."""
+WINDOW_S = 2.0
+JOIN_S = 0.5
+MOST_STRETCHES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where: the condition, its share of the squared error and of the samples, its rms over the run's, its worst time."""
+
+    condition: str
+    share_of_error: float
+    share_of_samples: float
+    rms_ratio: float
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A stretch of time and its share of the squared error."""
+
+    start_s: float
+    end_s: float
+    share_of_error: float
+
+
+def places(time: FloatArray, square: FloatArray, ok: Mask, conditions: Sequence[Condition]) -> tuple[Place, ...]:
+    """Return where squared residuals (n,) fall, most above its share of the samples first; ok (n,) marks measured ones."""
+    total, count = float(square[ok].sum()), int(ok.sum())
+    found = []
+    for condition in conditions:
+        here = condition.mask & ok
+        share_of_samples = here.sum() / max(count, 1)
+        if share_of_samples < SMALLEST_SHARE or total == 0.0:
+            continue
+        share = float(square[here].sum()) / total
+        start, end = worst_run(time, square, here)
+        found.append(Place(condition.words, share, float(share_of_samples), float(np.sqrt(share / share_of_samples)), start, end))
+    return tuple(sorted(found, key=lambda p: p.share_of_samples - p.share_of_error))
+
+
+def worst_run(time: FloatArray, square: FloatArray, here: Mask) -> tuple[float, float]:
+    """Return start and end (s) of the unbroken part of a set of samples with the most error; short breaks are bridged."""
+    index = np.flatnonzero(here)
+    breaks = np.flatnonzero(np.diff(time[index]) > JOIN_S)
+    parts = np.split(index, breaks + 1)
+    worst = max(parts, key=lambda part: float(square[part].sum()))
+    return float(time[worst[0]]), float(time[worst[-1]])
+
+
+def stretches(time: FloatArray, square: FloatArray, ok: Mask) -> tuple[Stretch, ...]:
+    """Return the worst stretches of two seconds that do not overlap, the worst first."""
+    left = np.where(ok, square, 0.0)
+    total = float(left.sum())
+    found: list[Stretch] = []
+    while total > 0.0 and len(found) < MOST_STRETCHES:
+        sums = np.concatenate([[0.0], np.cumsum(left)])
+        ends = np.searchsorted(time, time + WINDOW_S, side="right")
+        inside = sums[ends] - sums[:-1]
+        first = int(np.argmax(inside))
+        last = int(ends[first]) - 1
+        if inside[first] <= 0.0:
+            break
+        found.append(Stretch(float(time[first]), float(time[last]), float(inside[first]) / total))
+        left[first : last + 1] = 0.0
+    return tuple(found)

@@ -1,0 +1,74 @@
+"""What the residual moves with: the moment a model misses, against every signal of the run.
+
+The residual of the rate obeys e' + a e = missing moment to first order; quarter-second means keep the sensor's noise out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.predict import Prediction
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.record import Record
+
+BLOCK_S = 0.25
+FEWEST_BLOCKS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Companion:
+    """A signal, and the share (0..1) of the missing moment's variance that it and its square with sign explain."""
+
+    signal: str
+    explained: float
+
+
+def missing_moment(shown: Prediction, damping: float) -> tuple[FloatArray, FloatArray]:
+    """Return block times (m,) s and the missing moment (m,) rad/s^2; empty where the rate was not measured."""
+    record = shown.record
+    if not record.rate_ok.all() or len(record) < 3:
+        return np.zeros(0), np.zeros(0)
+    residual = record.rate - shown.rate
+    width = _width(record)
+    time, slow = block_means(record.time, width), block_means(residual, width)
+    if time.size < FEWEST_BLOCKS:
+        return np.zeros(0), np.zeros(0)
+    return time, np.gradient(slow, time) + damping * slow
+
+
+def companions(shown: Prediction, damping: float) -> tuple[Companion, ...]:
+    """Return the signals the missing moment moves with, the closest first."""
+    _, moment = missing_moment(shown, damping)
+    if moment.size == 0 or float(np.var(moment)) == 0.0:
+        return ()
+    width = _width(shown.record)
+    found = [Companion(name, _explained(moment, block_means(values, width))) for name, values in _signals(shown).items()]
+    return tuple(sorted(found, key=lambda c: -c.explained))
+
+
+def block_means(values: FloatArray, width: int) -> FloatArray:
+    """Return the means of successive blocks of `width` samples, (n // width,)."""
+    count = values.size // width
+    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
+
+
+def _width(record: Record) -> int:
+    return max(1, round(BLOCK_S / float(np.median(record.steps))))
+
+
+def _signals(shown: Prediction) -> Mapping[str, FloatArray]:
+    change = np.diff(shown.fin, prepend=shown.fin[0])
+    return {"fin": shown.fin, "fin movement": change, "rate": shown.rate, "angle": shown.angle, **shown.record.signals}
+
+
+def _explained(moment: FloatArray, signal: FloatArray) -> float:
+    centred = signal - np.median(signal)
+    if float(np.ptp(centred)) == 0.0:
+        return 0.0
+    columns = np.stack([np.ones(centred.size), centred, centred * np.abs(centred)], axis=1)
+    columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
+    left = moment - columns @ np.linalg.lstsq(columns, moment, rcond=None)[0]
+    return max(0.0, 1.0 - float(np.var(left)) / float(np.var(moment)))

@@ -1,0 +1,156 @@
+"""The steps of the tour: each a command as a user would type it, and what its result means, in words with its numbers.
+
+A line is a template over the names of `places`; a word with `*` stands for the files it matches. A later step is one more
+entry in STEPS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fieldsid.models.axis import Axis
+from fieldsid.rounding import number, with_error
+
+Result = Mapping[str, Any]
+NEAR_NOISE = 1.15
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step: its heading, its command line after `sysid`, what the result means, and the axes it makes sense for."""
+
+    title: str
+    line: str
+    means: Callable[[Result], str]
+    axes: tuple[Axis, ...] = tuple(Axis)
+
+
+def places(folder: Path, axis: str) -> dict[str, str]:
+    """Return what the lines' templates stand for."""
+    return {
+        "trial": str(folder / "trial"),
+        "mapping": str(folder / "mapping.yaml"),
+        "runs": str(folder / "runs"),
+        "models": str(folder / "models"),
+        "turning": str(folder / "turning"),
+        "axis": axis,
+    }
+
+
+def words_of(line: str, known: Mapping[str, str]) -> list[str]:
+    """Return the words of a line, templates filled in, still with their patterns."""
+    return [word.format(**known) for word in line.split()]
+
+
+def expanded(words: Sequence[str]) -> list[str]:
+    """Return the words with every pattern replaced by the files it matches, in order, as a shell does."""
+    out: list[str] = []
+    for word in words:
+        matches = sorted(str(p) for p in Path(word).parent.glob(Path(word).name)) if "*" in word else []
+        out += matches or [word]
+    return out
+
+
+def _inspected(result: Result) -> str:
+    return (
+        "The logger writes degrees under names of its own. The proposed mapping says which column is which signal and in which "
+        "unit; look it over, then import with it."
+    )
+
+
+def _imported(result: Result) -> str:
+    return "Each log is now a run: SI and radians, headings unwrapped, one clock. From here on no command needs the mapping."
+
+
+def _identified(result: Result) -> str:
+    fits = result["fits"]
+    name = next(iter(fits[0]["parameters"]))
+    parts = "; ".join(
+        f"{number(f['speed_m_s'], 2)} m/s: {with_error(f['parameters'][name]['value'], f['parameters'][name]['std_error'])}"
+        for f in fits
+    )
+    return f"{name} over speed is {parts} 1/s. " + _verdict(max(_over_noise(f, f["noise_floor"]) for f in fits))
+
+
+def _joined(result: Result) -> str:
+    fit = result["fits"][0]
+    return (
+        f"One model for {len(fit['runs'])} speeds: damping shared, authority by speed. "
+        + _verdict(_over_noise(fit, fit["noise_floor"]))
+        + " Its judge are runs it has not seen."
+    )
+
+
+def _compared(result: Result) -> str:
+    run = max(result["runs"], key=lambda r: float(r["rate_rms_rad_s"]))
+    worst = run["where"][0]
+    return (
+        f"On {run['run']}, which the fit has not seen, the rate fit is {number(run['rate_fit_percent'], 3)} %. "
+        f"{100 * worst['share_of_error']:.0f} % of the squared error falls on `{worst['condition']}` "
+        f"({worst['rms_ratio']:.1f} x the run's own rms, worst from {worst['t_start_s']:.1f} to {worst['t_end_s']:.1f} s): "
+        "that is where to look for what the model lacks."
+    )
+
+
+def _simulated(result: Result) -> str:
+    return f"{result['seconds']:.0f} s of the model's own motion, kept as a run: any command that takes a log takes it too."
+
+
+def _lawful(result: Result) -> str:
+    laws = {name: law for name, law in result["laws"].items() if law.get("exponent")}
+    said = "; ".join(f"|{name}| grows as {law['exponent']['says']}" for name, law in laws.items())
+    return f"{said or 'Each parameter has its law over speed'}. The laws carry the model to speeds that were not flown."
+
+
+def _turned(result: Result) -> str:
+    rows = result["rows"]
+    tightest = min(rows, key=lambda row: float(row["radius_m"]))
+    low, high = tightest["interval95"]
+    return (
+        f"The tightest turn is {number(tightest['radius_m'], 3)} m at {number(tightest['speed_m_s'], 2)} m/s "
+        f"to {tightest['side']}, 95 % between {number(low, 3)} and {number(high, 3)} m, and it is {tightest['trust']}: "
+        "two-second pulses never show a settled turn, and a wide band says so."
+    )
+
+
+def _over_noise(fit: Result, floor: Result) -> float:
+    pairs = ((fit["angle_rms_rad"], floor["angle_rad"]), (fit["rate_rms_rad_s"], floor["rate_rad_s"]))
+    return max(float(rms) / float(noise) for rms, noise in pairs if rms and noise)
+
+
+def _verdict(ratio: float) -> str:
+    if ratio <= NEAR_NOISE:
+        return f"What is left is {ratio:.2f} x the sensors' noise: nothing more to explain."
+    return f"What is left is {ratio:.1f} x the sensors' noise: the model's form, not its numbers, lacks something."
+
+
+STEPS: tuple[Step, ...] = (
+    Step("What is in the log?", "inspect {trial}/pulses_1.4.csv --write-mapping {mapping}", _inspected),
+    Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _imported),
+    Step("A model for each speed", "identify {runs}/pulses_*.parquet --axis {axis} -o {models}", _identified),
+    Step("One model for all speeds", "identify {runs}/pulses_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
+    Step(
+        "Does it hold on runs it has not seen?",
+        "compare {models}/joint_{axis}.yaml {runs}/zigzag_*.parquet -o {models}",
+        _compared,
+    ),
+    Step(
+        "The model's own prediction",
+        "simulate {models}/joint_{axis}.yaml --maneuver zigzag -o {runs}/predicted.csv",
+        _simulated,
+    ),
+    Step(
+        "How do the numbers change with speed?",
+        "fit {models}/pulses_*_{axis}.yaml -o {models}/law_{axis}.yaml",
+        _lawful,
+    ),
+    Step(
+        "How tight does it turn?",
+        "turn-radius {models}/pulses_*_yaw.yaml --speeds 1.0,1.4,1.8 -o {turning}",
+        _turned,
+        (Axis.YAW,),
+    ),
+)

@@ -1,0 +1,77 @@
+"""The trial of the tour: pulses at three speeds to learn from and zig-zags to judge by, as the vehicle's own logger writes them.
+
+The files are semicolon-separated text in degrees, with the logger's own column names: nothing the program knows beforehand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.artifacts import write_text
+from fieldsid.demo.vehicle import flown, training_maneuver
+from fieldsid.logs.run import FloatArray, Run
+from fieldsid.maneuvers import pick_maneuver
+from fieldsid.models.model import Model
+
+TRAIN_SPEEDS = (1.0, 1.4, 1.8)
+CHECK_SPEEDS = (1.2, 1.6)
+SEED = 1848
+
+COLUMNS: Mapping[str, tuple[str, float, int]] = MappingProxyType(
+    {
+        "yaw_rad": ("heading [deg]", np.degrees(1.0), 3),
+        "yaw_rate_rad_s": ("yaw rate [deg/s]", np.degrees(1.0), 4),
+        "pitch_rad": ("pitch [deg]", np.degrees(1.0), 3),
+        "pitch_rate_rad_s": ("pitch rate [deg/s]", np.degrees(1.0), 4),
+        "rudder_rad": ("rudder command [deg]", np.degrees(1.0), 3),
+        "elevator_rad": ("elevator command [deg]", np.degrees(1.0), 3),
+        "surge_m_s": ("speed [m/s]", 1.0, 4),
+        "sway_m_s": ("sway [m/s]", 1.0, 4),
+        "heave_m_s": ("heave [m/s]", 1.0, 4),
+        "roll_rad": ("roll [deg]", np.degrees(1.0), 3),
+        "depth_m": ("depth [m]", 1.0, 3),
+        "thrust": ("thrust [%]", 1.0, 1),
+    }
+)
+"""The logger's name of each signal, the factor from SI, and its decimals."""
+WRAPPED = "yaw_rad"
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """The files of a trial: to learn from, and to judge by."""
+
+    train: tuple[Path, ...]
+    check: tuple[Path, ...]
+
+
+def make_trial(model: Model, folder: Path, *, force: bool = False) -> Trial:
+    """Fly the trial with a vehicle and write its logs; raises ArtifactError where a file exists."""
+    lesson = training_maneuver(model)
+    train = [(f"pulses_{u:.1f}", flown(model, lesson, u, SEED + i)) for i, u in enumerate(TRAIN_SPEEDS)]
+    zigzag = pick_maneuver("zigzag")
+    check = [(f"zigzag_{u:.1f}", flown(model, zigzag, u, SEED + 10 + i)) for i, u in enumerate(CHECK_SPEEDS)]
+    return Trial(tuple(_save(train, folder, force=force)), tuple(_save(check, folder, force=force)))
+
+
+def _save(runs: list[tuple[str, Run]], folder: Path, *, force: bool) -> Iterator[Path]:
+    for i, (name, run) in enumerate(runs):
+        yield write_text(folder / f"{name}.csv", _text(run, heading=0.7 + 0.9 * i), force=force)
+
+
+def _text(run: Run, heading: float) -> str:
+    """Return a run as the logger writes it: its heading between 0 and 360 deg, set off to where the run was headed."""
+    known = [(COLUMNS[name], _logged(name, values, heading)) for name, values in run.signals.items()]
+    rows = ["time [s];" + ";".join(column for (column, _, _), _ in known)]
+    for i, time in enumerate(run.time):
+        rows.append(f"{time:.3f};" + ";".join(f"{values[i] * factor:.{decimals}f}" for (_, factor, decimals), values in known))
+    return "\n".join(rows) + "\n"
+
+
+def _logged(name: str, values: FloatArray, heading: float) -> FloatArray:
+    return np.remainder(values + heading, 2 * np.pi) if name == WRAPPED else values

@@ -1,0 +1,197 @@
+"""Which physical effect is missing: the function behind `sysid diagnose`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fieldsid.comparison.localize import Place, places
+from fieldsid.comparison.conditions import conditions
+from fieldsid.diagnosis.advise import next_maneuver
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.records import Candidate, Diagnosis
+from fieldsid.diagnosis.remainder import remainder_of
+from fieldsid.diagnosis.search import Search, search, usable
+from fieldsid.diagnosis.split import held_back
+from fieldsid.diagnosis.verdict import Verdict, explained, probabilities, verdict_of
+from fieldsid.diagnosis.words import evidence, headline
+from fieldsid.effects import all_effects
+from fieldsid.errors import DataError
+from fieldsid.fitting.descent import covariance, normal_equations
+from fieldsid.fitting.fit import check, model_of
+from fieldsid.fitting.method import Solution, shared_covariance
+from fieldsid.fitting.predict import predict
+from fieldsid.logs.run import Note, Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record, record_of
+
+SHOWN = 8
+
+
+def diagnose(
+    training: Sequence[Run],
+    axis: Axis,
+    validation: Sequence[Run] = (),
+    *,
+    known: Sequence[str] = (),
+    report: Callable[[str], None] = lambda _text: None,
+) -> Diagnosis:
+    """Return which catalogued effect the base model lacks on some runs, judged on runs it was not fitted to.
+
+    known names effects the model has already: they are part of the base. report is told what is being tried.
+    Raises DataError when a run cannot be fitted on the axis, EffectError for a user's effect that fails.
+    """
+    records = [record_of(r, axis) for r in training]
+    unseen = tuple(record_of(r, axis) for r in validation)
+    check([*records, *unseen], axis)
+    _refuse_constant(records, axis)
+    learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
+    catalogue, skipped = usable(all_effects(axis).values(), [*learned, *judged])
+    missing = [n for n in known if n in skipped]
+    if missing:
+        raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
+    work = search(learned, judged, axis, catalogue, known=known, report=report)
+    found = work.best()
+    left = remainder_of(found, judged)
+    verdict = verdict_of(work, found, left)
+    return _said(work, found, verdict, headline(work, verdict, found, left), skipped, notes)
+
+
+def _said(
+    work: Search, found: Hypothesis, verdict: Verdict, says: str, skipped: Mapping[str, str], notes: tuple[Note, ...]
+) -> Diagnosis:
+    base = work.base()
+    named = found if verdict.word in ("effect", "undecided") else base
+    candidates = _candidates(work, found)
+    model = named_model(named)
+    added = tuple(n for n in named.names if n not in work.known)
+    return Diagnosis(
+        axis=work.axis,
+        verdict=verdict.word,
+        effects=added,
+        says=says,
+        base=base.errors,
+        final=named.errors,
+        noise_floor=shown_floor(work.floor, found.judged.noise),
+        candidates=candidates,
+        model=model,
+        base_model=named_model(base),
+        where=where_of(base, work.validation or work.records),
+        next_maneuver=next_maneuver(work, verdict, found, skipped),
+        skipped=skipped,
+        notes=notes,
+    )
+
+
+def _candidates(work: Search, found: Hypothesis) -> tuple[Candidate, ...]:
+    """Return the leading hypotheses, the one found first, then by evidence."""
+    base = work.base()
+    others = [h for h in work.ranked() if h is not found and h is not base]
+    shown = [*([found] if found is not base else []), *others]
+    p = dict(zip(map(id, [*shown, base]), probabilities([*shown, base]), strict=True))
+    return tuple(
+        Candidate(
+            effects=tuple(n for n in h.names if n not in work.known),
+            probability=p[id(h)],
+            parameters=dict(h.model.values),
+            errors=h.errors,
+            explained=explained(work, h),
+            score=h.score - base.score,
+            evidence=evidence(work, h),
+            confusable_with=confusable(work, h, shown),
+        )
+        for h in shown[:SHOWN]
+    )
+
+
+def confusable(work: Search, h: Hypothesis, others: Sequence[Hypothesis]) -> tuple[str, ...]:
+    """Return the other hypotheses of the same size that take away nearly as much of the error on these data."""
+    mine = explained(work, h)
+    return tuple(
+        "+".join(n for n in o.names if n not in work.known)
+        for o in others
+        if o is not h and len(o.names) == len(h.names) and mine > 0.0 and explained(work, o) > 0.8 * mine
+    )[:4]
+
+
+def named_model(h: Hypothesis) -> Model:
+    """Return a hypothesis's model with the covariance of its generalised least squares."""
+    trial, noise = h.judged.trial, h.judged.noise
+    slots = tuple(range(len(trial.x)))
+    _, normal, _, _ = normal_equations(trial.problem, trial.x, noise, slots)
+    solution = Solution(trial.x, shared_covariance(trial.problem, covariance(normal), slots), noise, "pem")
+    return model_of(trial.problem, solution)
+
+
+def shown_floor(floor: Noise, noise: Noise) -> Noise:
+    """Return the sensor noise of both channels, its coloured part included."""
+    return Noise(float(np.hypot(floor.angle, noise.coloured_angle)), float(np.hypot(floor.rate, noise.coloured_rate)))
+
+
+def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[Place, ...]:
+    """Return where a hypothesis's free run fails, over the run it fails most on."""
+    shown = [predict(h.model, r) for r in records]
+    channel = 1 if records[0].rate_ok.any() else 0
+    worst = max(shown, key=lambda s: float(np.mean(s.residual[channel] ** 2)))
+    ok = (worst.record.angle_ok, worst.record.rate_ok)[channel]
+    return places(worst.record.time, worst.residual[channel] ** 2, ok, conditions(worst.record, worst.rate, 0.0))
+
+
+def _refuse_constant(records: Sequence[Record], axis: Axis) -> None:
+    for r in records:
+        if float(np.ptp(r.fin)) < 1e-4:
+            raise DataError(
+                f"run {r.name!r} does not excite {axis.value}",
+                found=f"the fin moves by {float(np.ptp(r.fin)):.2g} rad",
+                hint=f"fly an excitation: `sysid plan --axis {axis.value}`",
+            )
+
+
+def body_of(d: Diagnosis) -> dict[str, Any]:
+    """Return a diagnosis as the JSON object of the contract, without its schema."""
+    return {
+        "axis": d.axis.value,
+        "verdict": d.verdict,
+        "says": d.says,
+        "effects": list(d.effects),
+        "base": _pair(d.base),
+        "final": _pair(d.final),
+        "noise_floor": {"angle_rad": d.noise_floor.angle, "rate_rad_s": d.noise_floor.rate},
+        "candidates": [
+            {
+                "effect": c.effect,
+                "probability": c.probability,
+                "parameters": dict(c.parameters),
+                **_pair(c.errors),
+                "explained": c.explained,
+                "log_evidence": c.score,
+                "evidence": c.evidence,
+                "confusable_with": list(c.confusable_with),
+            }
+            for c in d.candidates
+        ],
+        "where": [
+            {
+                "condition": w.condition,
+                "share_of_error": w.share_of_error,
+                "rms_ratio": w.rms_ratio,
+                "t_start_s": w.start_s,
+                "t_end_s": w.end_s,
+            }
+            for w in d.where
+        ],
+        "next_maneuver": d.next_maneuver,
+        "skipped": dict(d.skipped),
+        "notes": [{"code": n.code, "message": n.message} for n in d.notes],
+        "speed_law": {"reference_m_s": d.model.law.reference},
+    }
+
+
+def _pair(p: Any) -> dict[str, Any]:
+    return {
+        side: {"angle_rms_rad": e.angle_rms_rad, "rate_rms_rad_s": e.rate_rms_rad_s}
+        for side, e in (("train", p.train), ("validation", p.validation))
+    }

@@ -1,0 +1,183 @@
+"""What is left after the last hypothesis: a disturbance of the sea, or something that is not in the catalogue?
+
+A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted
+noise model are white, of even size throughout, and not related to the fin or the motion. Three tests look for what
+is not so: colour (Ljung-Box), relation to fin and motion (F test), and bursts or uneven size (windowed energy).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.fitting.colour import LAGS, ljung_box
+from fieldsid.fitting.predict import frozen_problem, refit_own
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import whiten
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.record import Record
+
+WINDOW_S = 2.0
+HISTORY_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """p-values of the three tests, and where the energy is largest: run, start and end in s, times the average."""
+
+    colour: float
+    relation: float
+    bursts: float
+    worst_run: str
+    worst_start_s: float
+    worst_end_s: float
+    worst_ratio: float
+    moves_with: str
+
+    @property
+    def p(self) -> float:
+        """The smallest of the three p-values, allowing for there being three."""
+        return min(1.0, 3.0 * min(self.colour, self.relation, self.bursts))
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """Innovations (2, n) of one run and the simulated motion they belong to."""
+
+    record: Record
+    white: FloatArray
+    rate: FloatArray
+
+
+def remainder_of(h: Hypothesis, validation: Sequence[Record]) -> Remainder:
+    """Return the tests of what a hypothesis leaves on training and validation runs."""
+    runs = [*_training(h), *_unseen(h, validation)]
+    colour = _colour(runs)
+    relation, name = _relation(runs)
+    bursts, run, window, ratio = _bursts(runs)
+    start = runs[run].record.time[0] + window * WINDOW_S
+    return Remainder(colour, relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
+
+
+def _training(h: Hypothesis) -> list[Left]:
+    problem = h.judged.trial.problem
+    return [_left(problem, h.judged.trial.x, run, h) for run in range(len(problem.records))]
+
+
+def _unseen(h: Hypothesis, validation: Sequence[Record]) -> list[Left]:
+    out = []
+    for record in validation:
+        alone, start = frozen_problem(h.own_model, record, h.effects)
+        out.append(_left(alone, refit_own(alone, start, 0, h.judged.noise), 0, h))
+    return out
+
+
+def _left(problem: Problem, x: FloatArray, run: int, h: Hypothesis) -> Left:
+    record = problem.records[run]
+    motion, base = problem.simulate(x, run)
+    residual, _ = problem.residual(x, run)
+    white, _ = whiten(record, h.judged.noise, base.damping, base.stiffness, residual[None])
+    return Left(record, white[0], motion.rate)
+
+
+def _colour(runs: Sequence[Left]) -> float:
+    smallest = 1.0
+    for channel in range(2):
+        statistic, freedom = 0.0, 0
+        for run in runs:
+            ok = (run.record.angle_ok, run.record.rate_ok)[channel]
+            if ok.sum() > 4 * LAGS:
+                statistic += ljung_box(run.white[channel][ok])
+                freedom += LAGS
+        if freedom:
+            smallest = min(smallest, float(stats.chi2.sf(statistic, freedom)))
+    return min(1.0, 2.0 * smallest)
+
+
+def _features(run: Left, width: int) -> dict[str, FloatArray]:
+    """Return block means of what a missing effect could move with, by name."""
+    fin, rate = run.record.fin - run.record.fin.mean(), run.rate
+    lags = max(1, round(HISTORY_S / WINDOW_S * 4))
+    parts: dict[str, FloatArray] = {"rate x |rate|": rate * np.abs(rate), "rate cubed": rate**3, "fin x rate": fin * rate}
+    parts |= {"rate": rate, "fin x |fin|": fin * np.abs(fin), "fin squared": fin**2, "rate squared": rate**2}
+    blocks = {name: _blocks(v, width) for name, v in parts.items()}
+    mean = _blocks(fin, width)
+    for lag in range(lags):
+        blocks[f"fin {lag} blocks before"] = np.concatenate([np.zeros(lag), mean[: mean.size - lag]])
+    return blocks
+
+
+def _relation(runs: Sequence[Left]) -> tuple[float, str]:
+    """Return the p-value of an F test of innovations, and of their size, against fin and motion; and the best feature."""
+    best, name = 1.0, ""
+    for power in (1, 2):
+        target, columns, names = [], [], []
+        for run in runs:
+            width = max(1, round(WINDOW_S / 4 / float(np.median(run.record.steps))))
+            channel = 1 if run.record.rate_ok.any() else 0
+            e = run.white[channel]
+            # the slow part of the innovations is where a disturbance stands out from sensor noise
+            e = (_blocks(e, width) * np.sqrt(width)) ** power
+            features = _features(run, width)
+            names = list(features)
+            block = np.column_stack([np.abs(f) if power == 2 else f for f in features.values()])
+            target.append(e)
+            columns.append(block)
+        y, x = np.concatenate(target), np.concatenate(columns)
+        p, index = _f_test(y - y.mean(), x - x.mean(axis=0))
+        if 2 * p < best:
+            best, name = 2 * p, names[index]
+    return min(best, 1.0), name
+
+
+def _f_test(y: FloatArray, x: FloatArray) -> tuple[float, int]:
+    size = np.linalg.norm(x, axis=0)
+    x = x[:, size > 1e-12] / size[size > 1e-12]
+    if y.size <= 3 * x.shape[1] or x.shape[1] == 0:
+        return 1.0, 0
+    solved, _, rank, _ = np.linalg.lstsq(x, y, rcond=1e-9)
+    left = y - x @ solved
+    freedom = y.size - 1 - int(rank)
+    f = ((float(y @ y) - float(left @ left)) / int(rank)) / (float(left @ left) / freedom)
+    single = np.abs(x.T @ y)
+    return float(stats.f.sf(f, int(rank), freedom)), int(np.flatnonzero(size > 1e-12)[int(np.argmax(single))])
+
+
+def _bursts(runs: Sequence[Left]) -> tuple[float, int, int, float]:
+    """Return the p-value of the largest windowed energy, and its run, window and ratio to the average."""
+    smallest, where = 1.0, (0, 0, 1.0)
+    count = 0
+    for channel in range(2):
+        for slow in (False, True):
+            energies = [(i, *e) for i, run in enumerate(runs) if (e := _energy(run, channel, slow=slow)) is not None]
+            if not energies:
+                continue
+            average = float(np.mean(np.concatenate([e / w for _, w, e in energies])))
+            for i, width, energy in energies:
+                count += energy.size
+                index = int(np.argmax(energy))
+                p = float(stats.chi2.sf(energy[index] / average, width))
+                if p < smallest:
+                    smallest, where = p, (i, index, float(energy[index] / average / width))
+    return min(1.0, smallest * max(count, 1)), *where
+
+
+def _energy(run: Left, channel: int, *, slow: bool) -> tuple[int, FloatArray] | None:
+    """Return the degrees of freedom and energies of a run's windows, of all innovations or of their slow part."""
+    if not (run.record.angle_ok, run.record.rate_ok)[channel].any():
+        return None
+    sample = float(np.median(run.record.steps))
+    block = max(1, round(WINDOW_S / 8 / sample)) if slow else 1
+    e = _blocks(run.white[channel], block) * np.sqrt(block)
+    width = max(4, round(WINDOW_S / sample / block))
+    energy = _blocks(e**2, width) * width
+    return (width, energy) if energy.size else None
+
+
+def _blocks(values: FloatArray, width: int) -> FloatArray:
+    count = values.size // width
+    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))

@@ -1,0 +1,62 @@
+"""Which runs are learned from and which are kept to judge, when the user gave none to judge by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.logs.run import Note
+from fieldsid.models.record import Record
+
+SHARE = 0.65
+SHORTEST_S = 12.0
+
+
+def held_back(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[Record, ...], tuple[Note, ...]]:
+    """Return training and validation records from one set, and what was done.
+
+    With three runs or more the run whose speed is nearest the middle is held back whole; with fewer the last third
+    of each run's excitation. Where that leaves too little, nothing is held back, and the note says so.
+    """
+    if len(records) >= 3:
+        speeds = np.array([r.speed for r in records])
+        middle = int(np.argsort(speeds)[len(records) // 2]) if np.isfinite(speeds).all() else len(records) - 1
+        rest = tuple(r for i, r in enumerate(records) if i != middle)
+        text = f"no validation run was given: {records[middle].name} was held back to judge by"
+        return rest, (records[middle],), (Note("held_back", text, {"run": records[middle].name}),)
+    parts = [_cut(r) for r in records]
+    if any(p is None for p in parts):
+        text = "no validation run was given and the runs are too short to hold a part back: judged on the runs fitted to"
+        return tuple(records), (), (Note("nothing_held_back", text, {"shortest_s": SHORTEST_S, "hint": "--validate RUN"}),)
+    whole = [p for p in parts if p is not None]
+    text = f"no validation run was given: the last part of {', '.join(r.name for r in records)} was held back to judge by"
+    return tuple(a for a, _ in whole), tuple(b for _, b in whole), (Note("held_back", text, {"share": 1 - SHARE}),)
+
+
+def _cut(record: Record) -> tuple[Record, Record] | None:
+    """Return both parts of a record, cut where the fin's activity has reached SHARE of its whole."""
+    activity = np.cumsum(np.abs(record.fin - np.median(record.fin)))
+    index = int(np.searchsorted(activity, SHARE * activity[-1])) if activity[-1] > 0 else 0
+    first, last = record.time[index] - record.time[0], record.time[-1] - record.time[index]
+    if first < SHORTEST_S or last < 0.5 * SHORTEST_S or float(np.ptp(record.fin[index:])) == 0.0:
+        return None
+    return part_of(record, slice(0, index)), part_of(record, slice(index, None))
+
+
+def part_of(record: Record, samples: slice) -> Record:
+    """Return a part of a record."""
+    return Record(
+        name=record.name,
+        axis=record.axis,
+        time=record.time[samples],
+        fin=record.fin[samples],
+        fin_is_held=record.fin_is_held,
+        fin_is_measured=record.fin_is_measured,
+        angle=record.angle[samples],
+        rate=record.rate[samples],
+        angle_ok=record.angle_ok[samples],
+        rate_ok=record.rate_ok[samples],
+        signals={k: v[samples] for k, v in record.signals.items()},
+        speed=record.speed,
+    )

@@ -1,0 +1,73 @@
+"""From ranked hypotheses to a verdict: effect, sufficient, undecided or unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.remainder import Remainder
+from fieldsid.diagnosis.search import Search
+
+TEMPER = 2.0
+"""Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
+RIVAL = 3.0
+"""Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering)."""
+ALIKE = 1.03
+"""Rivals predict unseen runs within this factor of each other."""
+BEYOND_CHANCE = 1e-6
+"""p-value below which what is left is not a disturbance."""
+VISIBLE = 1.15
+"""Free-run error over the noise floor below which nothing worth naming is left."""
+MOSTLY = 0.7
+"""Share of the excess error an effect must explain to be named where something else is left as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The word, the effects named, and the rivals where it is undecided."""
+
+    word: str
+    effects: tuple[str, ...]
+    rivals: tuple[Hypothesis, ...] = ()
+
+
+def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
+    """Return the verdict on the hypothesis a search ended at."""
+    strange = left.p < BEYOND_CHANCE and search.error(found) > VISIBLE
+    if not found.names:
+        return Verdict("unexplained" if strange else "sufficient", ())
+    if strange and explained(search, found) < MOSTLY:
+        return Verdict("unexplained", ())
+    rivals = rivals_of(search, found)
+    if rivals:
+        return Verdict("undecided", found.names, rivals)
+    return Verdict("effect", found.names)
+
+
+def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
+    """Return hypotheses of the same size that the data cannot tell from the one found."""
+    return tuple(
+        h
+        for h in search.ranked()
+        if h is not found
+        and len(h.names) == len(found.names)
+        and abs(found.score - h.score) < RIVAL
+        and search.error(h) < ALIKE * search.error(found)
+    )
+
+
+def explained(search: Search, h: Hypothesis) -> float:
+    """Return the share of the base model's excess over the noise floor that a hypothesis takes away, 0..1."""
+    base, now = search.error(search.base()), search.error(h)
+    excess = base**2 - 1.0
+    return float(np.clip((base**2 - now**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
+
+
+def probabilities(hypotheses: Sequence[Hypothesis]) -> list[float]:
+    """Return the probability of each of some hypotheses among themselves, from their tempered evidence."""
+    scores = np.array([h.score for h in hypotheses]) / TEMPER
+    weights = np.exp(scores - scores.max())
+    return [float(w) for w in weights / weights.sum()]

@@ -1,0 +1,49 @@
+"""The evidence in words, every one with its number."""
+
+from __future__ import annotations
+
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.remainder import Remainder
+from fieldsid.diagnosis.search import Search
+from fieldsid.diagnosis.verdict import Verdict, explained
+from fieldsid.models.effect import effect_named
+
+
+def evidence(search: Search, h: Hypothesis) -> str:
+    """Return what speaks for or against a hypothesis, in one sentence."""
+    base = search.base()
+    if h is base:
+        return f"base model: error {search.error(h):.2f} x noise floor on unseen runs"
+    gain = h.score - base.score
+    kind = "unseen runs" if search.validation else "the runs it was fitted to"
+    runs = sum(1 for a, b in zip((*h.by_run, *h.unseen), (*base.by_run, *base.unseen), strict=True) if a > b)
+    total = len(h.by_run) + len(h.unseen)
+    return (
+        f"error on {kind} {search.error(base):.2f} -> {search.error(h):.2f} x noise floor "
+        f"({100 * explained(search, h):.0f} % of the excess); log evidence {gain:+.1f}; better on {runs} of {total} runs"
+    )
+
+
+def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder) -> str:
+    """Return the verdict as an engineer would say it."""
+    error, base = search.error(found), search.error(search.base())
+    if verdict.word == "sufficient":
+        tail = f"; a disturbance of {found.judged.noise.disturbance:.2g} rad/s^2 is there" if _disturbed(found) else ""
+        return f"nothing to add: the base model predicts unseen runs at {error:.2f} x the noise floor{tail}"
+    if verdict.word == "unexplained":
+        return (
+            f"something is there that is not in the catalogue: error {base:.2f} x the noise floor, most of it in {left.worst_run} at "
+            f"{left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), it moves with {left.moves_with}"
+        )
+    names = " and ".join(verdict.effects)
+    says = "; ".join(effect_named(n).says for n in verdict.effects)
+    fall = f"the error on unseen runs falls from {base:.2f} to {error:.2f} x the noise floor"
+    if verdict.word == "undecided":
+        others = ", ".join("+".join(r.names) for r in verdict.rivals)
+        return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
+    return f"{names} ({says}): {fall}"
+
+
+def _disturbed(h: Hypothesis) -> bool:
+    noise = h.judged.noise
+    return noise.disturbance > 1e-5

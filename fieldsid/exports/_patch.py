@@ -1,0 +1,211 @@
+"""Put a schedule under a key of an existing YAML file: comments and order kept, nothing else touched, the difference shown.
+
+The file is round-tripped with the indentation that gives back its own text byte for byte; where no indentation does, the lines
+of the key's block alone are replaced. The result is read again and must differ under that key alone.
+"""
+
+from __future__ import annotations
+
+import difflib
+import io
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import YAMLError
+
+from fieldsid.artifacts import replacing
+from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.exports._target import decimal
+from fieldsid.registry import near
+
+INDENTS = tuple(product((2, 4), ((2, 0), (4, 2), (2, 2), (6, 4), (4, 4)), (True, False)))
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """A change of one file: its text before and after, and the unified difference."""
+
+    path: Path
+    before: str
+    after: str
+
+    @property
+    def difference(self) -> str:
+        """The change as a unified difference, empty where there is none."""
+        name = self.path.name
+        lines = difflib.unified_diff(
+            self.before.splitlines(keepends=True), self.after.splitlines(keepends=True), f"{name} (now)", f"{name} (new)", n=2
+        )
+        return "".join(line if line.endswith("\n") else line + "\n" for line in lines)
+
+
+def patch_yaml(path: Path, key: str, columns: Mapping[str, Sequence[float]]) -> Patch:
+    """Return the change that puts columns of numbers under a dotted key; nothing is written.
+
+    Raises UsageError when the key is not in the file, ArtifactError when the file cannot be read or kept intact.
+    """
+    before = _text(path)
+    yaml, tree, regular = _parsed(path, before)
+    parent, last = _find(path, tree, key)
+    if regular:
+        _put(parent, last, columns)
+        stream = io.StringIO()
+        yaml.dump(tree, stream)
+        after = stream.getvalue()
+    else:
+        after = _spliced(path, before.replace("\r\n", "\n"), parent, last, columns)
+    if "\r\n" in before:
+        after = after.replace("\r\n", "\n").replace("\n", "\r\n")
+    patch = Patch(path, before, after)
+    _check(patch, key, columns)
+    return patch
+
+
+def write_patch(patch: Patch) -> Path:
+    """Write a change in place and return the backup's path; raises ArtifactError where the file is read-only."""
+    path = patch.path
+    mode = path.stat().st_mode
+    if not mode & 0o222 or not os.access(path, os.W_OK):
+        raise ArtifactError(
+            f"`{path}` is read-only",
+            found=f"mode {mode & 0o777:o}",
+            hint=f"`chmod u+w {path}`, or export to a file of its own with `-o`",
+        )
+    if _text(path) != patch.before:
+        raise ArtifactError(f"`{path}` changed meanwhile", found="other text than was compared", hint="run the export again")
+    backup = _free(path)
+    shutil.copy2(path, backup)
+    with replacing(path, force=True) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(patch.after)
+    path.chmod(mode & 0o777)
+    return backup
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            return stream.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ArtifactError(f"`{path}` cannot be read", found=str(error), hint="check the path given to `--into`") from error
+
+
+def _parsed(path: Path, text: str) -> tuple[YAML, CommentedMap, bool]:
+    """Return a parser, the tree, and whether the parser's indentation gives the text back; raises ArtifactError."""
+    source = text.replace("\r\n", "\n")
+    for mapping, (sequence, offset), quotes in INDENTS:
+        yaml = _parser(mapping, sequence, offset, quotes=quotes)
+        try:
+            tree = yaml.load(source)
+        except YAMLError as error:
+            place = str(getattr(error, "problem_mark", "") or error).strip()
+            raise ArtifactError(f"`{path}` is not valid YAML", found=place, hint="mend the line named above") from error
+        if not isinstance(tree, CommentedMap):
+            raise ArtifactError(f"`{path}` holds no `key: value` lines", found=type(tree).__name__, hint="give a YAML mapping")
+        stream = io.StringIO()
+        yaml.dump(tree, stream)
+        if stream.getvalue() == source:
+            return _parser(mapping, sequence, offset, quotes=quotes), yaml.load(source), True
+    yaml = _parser(2, 2, 0, quotes=True)
+    return yaml, yaml.load(source), False
+
+
+def _spliced(path: Path, text: str, parent: CommentedMap, last: str, columns: Mapping[str, Sequence[float]]) -> str:
+    """Return the text with the lines of the key's block replaced; raises ArtifactError inside a flow mapping."""
+    if parent.fa.flow_style():
+        raise ArtifactError(
+            f"`{path}`: `{last}` stands inside braces and cannot be replaced alone",
+            found=f"line {parent.lc.line + 1}",
+            hint="write that mapping in block style, one key per line",
+        )
+    row, column = parent.lc.key(last)
+    lines = text.splitlines(keepends=True)
+    end = row + 1
+    for i in range(row + 1, len(lines)):
+        words = lines[i].strip()
+        if not words or words.startswith("#"):
+            continue
+        depth = len(lines[i]) - len(lines[i].lstrip())
+        if depth < column or (depth == column and not words.startswith("- ")):
+            break
+        end = i + 1
+    head = lines[row][: lines[row].index(":", column) + 1] + "\n"
+    own = [f"{' ' * (column + 2)}{n}: [{', '.join(decimal(v) for v in vs)}]\n" for n, vs in columns.items()]
+    return "".join([*lines[:row], head, *own, *lines[end:]])
+
+
+def _parser(mapping: int, sequence: int, offset: int, *, quotes: bool) -> YAML:
+    yaml = YAML()
+    yaml.preserve_quotes = quotes
+    yaml.width = 100_000
+    yaml.indent(mapping=mapping, sequence=sequence, offset=offset)
+    # plain floats are only ours (the file's own are ScalarFloat): a decimal point and no exponent
+    yaml.representer.add_representer(float, lambda r, v: r.represent_scalar("tag:yaml.org,2002:float", decimal(v)))
+    return yaml
+
+
+def _find(path: Path, tree: CommentedMap, key: str) -> tuple[CommentedMap, Any]:
+    here: Any = tree
+    parts = _parts(key)
+    for depth, part in enumerate(parts):
+        if not isinstance(here, CommentedMap) or part not in here:
+            known = [str(k) for k in here] if isinstance(here, CommentedMap) else []
+            place = ".".join(parts[:depth]) or "the top"
+            raise UsageError(
+                f"key `{key}` is not in `{path}`: nothing named `{part}` under {place}",
+                found=", ".join(known) or "no keys there",
+                hint=near(part, known) if known else "name a key that holds a mapping",
+            )
+        if depth == len(parts) - 1:
+            return here, part
+        here = here[part]
+    raise UsageError("`--key` is empty", found=repr(key), hint="write `--key control.heading.gains`")
+
+
+def _parts(key: str) -> list[str]:
+    return [p for p in key.split(".") if p]
+
+
+def _put(parent: CommentedMap, last: str, columns: Mapping[str, Sequence[float]]) -> None:
+    """Set the columns under the key; keys that are there already keep their place and comments."""
+    held = parent[last]
+    if not isinstance(held, CommentedMap) or held.fa.flow_style():
+        held = CommentedMap()
+        parent[last] = held
+    for name in [k for k in held if k not in columns]:
+        del held[name]
+    for name, values in columns.items():
+        row = CommentedSeq([float(v) for v in values])
+        row.fa.set_flow_style()
+        held[name] = row
+
+
+def _check(patch: Patch, key: str, columns: Mapping[str, Sequence[float]]) -> None:
+    """Refuse a change that says something else than the columns under the key, or anything else elsewhere."""
+    old, new = (YAML(typ="safe").load(text) for text in (patch.before, patch.after))
+    parts = _parts(key)
+    for tree in (old, new):
+        here = tree
+        for part in parts[:-1]:
+            here = here[part]
+        found = here.pop(parts[-1])
+    if old != new or {k: [float(v) for v in vs] for k, vs in found.items()} != {k: list(v) for k, v in columns.items()}:
+        raise ArtifactError(
+            f"`{patch.path}` could not be patched safely", found="other keys would change", hint="export with `-o FILE` instead"
+        )
+
+
+def _free(path: Path) -> Path:
+    """Return the first backup name that is not taken: FILE.bak, FILE.bak2, ..."""
+    backup = path.with_name(f"{path.name}.bak")
+    number = 1
+    while backup.exists():
+        number += 1
+        backup = path.with_name(f"{path.name}.bak{number}")
+    return backup

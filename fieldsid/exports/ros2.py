@@ -1,0 +1,29 @@
+"""ROS 2 parameters: flat float arrays of equal length, since a parameter file has no lists of maps.
+
+Every number has a decimal point and none an exponent: rcl takes `1` for an integer and refuses a mixed array.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fieldsid.exports._target import NAMES, Target, columns_of, decimal, notes_of
+from fieldsid.schedule.record import Schedule
+
+
+def render(schedule: Schedule, node: str, template: Path | None) -> str:
+    """Return a parameter file for `node` (`/**` for every node)."""
+    name = f"{NAMES[schedule.axis]}_schedule"
+    lines = [f"# {line}" for line in notes_of(schedule)]
+    lines += [f"{_key(node)}:", "  ros__parameters:", f"    {name}:", f'      controller: "{schedule.kind}"']
+    lines += [f"      {column}: [{', '.join(decimal(v) for v in values)}]" for column, values in columns_of(schedule).items()]
+    return "\n".join(lines) + "\n"
+
+
+def _key(node: str) -> str:
+    return f'"{node}"' if "*" in node and not node.startswith("/") else node
+
+
+EXPORT = Target(
+    name="ros2", says="ROS 2 parameter YAML, flat float arrays of equal length", suffix=".yaml", render=render, node="/**"
+)

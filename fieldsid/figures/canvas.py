@@ -1,0 +1,79 @@
+"""The sheet every figure is drawn on: size, colours that a colour-blind reader tells apart, and saving as PNG.
+
+Colours are those of Okabe and Ito 2008. No global state: figures are made without pyplot, so that drawing in a library
+call leaves a notebook's own settings as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from fieldsid.artifacts import replacing
+from fieldsid.logs.run import FloatArray
+
+MEASURED = "0.45"
+SIMULATED = "#D55E00"
+SECOND = "#0072B2"
+THIRD = "#009E73"
+FOURTH = "#CC79A7"
+WARM = "#E69F00"
+QUIET = "0.75"
+SERIES = (SIMULATED, SECOND, THIRD, FOURTH, WARM, "#56B4E9", "0.2")
+DPI = 120
+MOST_DOTS = 4000
+
+
+def sheet(width: float = 9.0, height: float = 7.0) -> Figure:
+    """Return an empty figure of a size in inches, with a canvas of its own."""
+    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def dress(ax: Axes, *, x: str = "", y: str = "", title: str = "") -> Axes:
+    """Give a plot its labels, a light grid and open sides; return it."""
+    if x:
+        ax.set_xlabel(x)
+    if y:
+        ax.set_ylabel(y)
+    if title:
+        ax.set_title(title, loc="left", fontsize=10)
+    ax.grid(visible=True, color="0.9", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.tick_params(labelsize=9)
+    return ax
+
+
+def legend_above(ax: Axes, columns: int = 4) -> None:
+    """Put the legend above the plot, at its right, where it hides no data."""
+    ax.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, frameon=False, fontsize=9, handlelength=1.6,
+        borderaxespad=0.2, columnspacing=1.2,
+    )  # fmt: skip
+
+
+def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> None:
+    """Draw measured samples as dots, thinned evenly where there are more than the eye can tell apart."""
+    step = max(1, int(np.ceil(x.size / MOST_DOTS)))
+    ax.plot(x[::step], y[::step], linestyle="none", marker=".", markersize=2.6, color=MEASURED, label=label, rasterized=True)
+
+
+def save(figure: Figure, path: Path, *, force: bool = False) -> Path:
+    """Write a figure as PNG, whole or not at all; raises ArtifactError."""
+    with replacing(path, force=force) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": "fieldsid"})
+    return path
+
+
+def one(draw: Callable[[Axes], None], path: Path, *, width: float = 8.0, height: float = 5.0, force: bool = False) -> Path:
+    """Draw one plot on a sheet of its own and save it; raises ArtifactError."""
+    figure = sheet(width, height)
+    draw(figure.add_subplot())
+    return save(figure, path, force=force)

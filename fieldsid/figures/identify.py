@@ -1,0 +1,50 @@
+"""The figure of a fit: measured and simulated angle, rate, fin and residual of one run, with the parameters above."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from matplotlib.figure import Figure
+
+from fieldsid.figures import motion, rls
+from fieldsid.fitting.fit import Fit
+from fieldsid.fitting.merit import merit
+from fieldsid.fitting.method import History
+from fieldsid.fitting.predict import Prediction
+from fieldsid.models.axis import NAMES
+from fieldsid.models.model import Model
+from fieldsid.rounding import with_error
+
+
+def figure(fit: Fit, index: int = 0) -> Figure:
+    """Return the figure of one of the fit's runs."""
+    shown = fit.predictions[index]
+    return motion.panels(view_of(shown, fit), heading(fit.model, shown.record.name), facts(fit, shown))
+
+
+def history_figure(fit: Fit, history: History) -> Figure:
+    """Return the recursive estimates over time."""
+    view = rls.TrackView(history.time, history.names, fit.model.units, history.values, history.std_errors, history.settled_s)
+    return rls.panels(view, f"{', '.join(fit.model.runs)}, {fit.model.axis.value}: {fit.model.method} over time")
+
+
+def view_of(shown: Prediction, fit: Fit) -> motion.MotionView:
+    """Return the panels' view of a run: residuals are shown over the noise floor of the fit."""
+    return motion.MotionView(shown.record, shown.angle, shown.rate, shown.fin, fit.floor.angle, fit.floor.rate)
+
+
+def heading(model: Model, run: str) -> str:
+    """Return the first line: run, axis and base parameters with their errors."""
+    names = NAMES[model.axis]
+    parts = (f"{n} = {with_error(model.values[n], model.std_error(n))} {model.units.get(n, '')}".rstrip() for n in names.base)
+    at = f" at {model.law.reference:.2f} m/s" if len(model.runs) > 1 and isfinite(model.law.reference) else ""
+    return f"{run}, {model.axis.value}: " + ", ".join(parts) + at
+
+
+def facts(fit: Fit, shown: Prediction) -> str:
+    """Return the second line: speed, method, effects, and how well the free run follows."""
+    m, speed = merit([shown]), shown.record.speed
+    words = [f"{speed:.2f} m/s" if isfinite(speed) else "speed unknown", fit.model.method]
+    words += list(fit.model.effects)
+    fits = ((f"{n} fit {v:.1f} %") for n, v in (("angle", m.angle_fit), ("rate", m.rate_fit)) if isfinite(v))
+    return ", ".join((*words, *fits))

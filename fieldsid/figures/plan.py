@@ -1,0 +1,92 @@
+"""A plan: for every leg the fin command, the predicted angle with its band inside the envelope, and the track."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from fieldsid.figures import canvas
+from fieldsid.models.axis import Axis
+from fieldsid.planning.picture import LegView
+
+LIMIT: dict[str, Any] = {"color": "#B2182B", "linewidth": 1.1, "linestyle": (0, (4, 2))}
+MOST_LEGS = 6
+
+
+def draw(view: LegView, axes: Sequence[Axes]) -> None:
+    """Draw one leg on three plots: command, angle with band, track."""
+    draw_command(view, axes[0])
+    draw_angle(view, axes[1])
+    draw_track(view, axes[2])
+
+
+def draw_command(view: LegView, ax: Axes) -> None:
+    """Draw the fin in deg, solid where it is commanded, thin where the autopilot is expected to have it."""
+    canvas.dress(ax, y=f"{'rudder' if view.axis is Axis.YAW else 'elevator'} [deg]", title=view.title)
+    fin, ours = np.degrees(view.fin), view.autopilot < 0.5
+    ax.step(view.time, fin, where="post", color="0.6", linewidth=0.9, label="autopilot")
+    ax.step(view.time, np.where(ours, fin, np.nan), where="post", color=canvas.SECOND, linewidth=1.6, label="commanded")
+    most = float(np.degrees(view.envelope.fin))
+    for side in (-most, most):
+        ax.axhline(side, **LIMIT)
+    ax.set_ylim(-1.2 * most, 1.2 * most)
+    ax.set_xlim(view.time[0], view.time[-1])
+
+
+def draw_angle(view: LegView, ax: Axes) -> None:
+    """Draw the predicted angle in deg with the 68 and 95 % bands over the prior, and the envelope."""
+    yaw = view.axis is Axis.YAW
+    canvas.dress(ax, y=f"{'heading' if yaw else 'pitch'} [deg]", title=_errors(view))
+    low, inner_low, inner_high, high = np.degrees(view.band)
+    ax.fill_between(view.time, low, high, color=canvas.SIMULATED, alpha=0.15, linewidth=0, label="95 %")
+    ax.fill_between(view.time, inner_low, inner_high, color=canvas.SIMULATED, alpha=0.3, linewidth=0, label="68 %")
+    ax.plot(view.time, np.degrees(view.angle), color=canvas.SIMULATED, linewidth=1.4, label="expected")
+    limit = view.envelope.heading if yaw else view.envelope.pitch
+    if limit is not None and view.bounded:
+        for side in (-limit, limit):
+            ax.axhline(np.degrees(side), **LIMIT)
+        reach = 1.15 * float(np.degrees(limit))
+        ax.set_ylim(min(-reach, float(low.min()) * 1.05), max(reach, float(high.max()) * 1.05))
+    ax.set_xlim(view.time[0], view.time[-1])
+
+
+def draw_track(view: LegView, ax: Axes) -> None:
+    """Draw the track in m, seen from above for yaw and from the side for pitch, with draws of the prior behind it."""
+    yaw = view.axis is Axis.YAW
+    canvas.dress(ax, y="across [m]" if yaw else "depth change [m]")
+    for along, across in zip(view.tracks[0], view.tracks[1], strict=True):
+        ax.plot(along, across, color=canvas.QUIET, linewidth=0.6)
+    ax.plot(view.along, view.across, color=canvas.SIMULATED, linewidth=1.5)
+    ax.plot(view.along[:1], view.across[:1], marker="o", color=canvas.SECOND, markersize=5)
+    room = view.envelope.track if yaw else view.envelope.depth_room()
+    if room is not None and view.bounded:
+        for side in (-room, room):
+            ax.axhline(side, **LIMIT)
+    if yaw:
+        ax.set_aspect("equal", adjustable="datalim")
+    ax.invert_yaxis()
+
+
+def save_plan_figure(views: Sequence[LegView], path: Path, *, force: bool = False) -> Path:
+    """Draw up to six legs, one row each, and save; raises ArtifactError."""
+    shown = views[:MOST_LEGS]
+    figure = canvas.sheet(13.0, 0.9 + 2.3 * len(shown))
+    grid = figure.subplots(len(shown), 3, squeeze=False, width_ratios=(1.15, 1.15, 1.0))
+    for view, row in zip(shown, grid, strict=True):
+        draw(view, row)
+    for ax, label in zip(grid[-1], ("time [s]", "time [s]", "along [m]"), strict=True):
+        ax.set_xlabel(label)
+    handles = [h for ax in grid[0][:2] for h in ax.get_legend_handles_labels()[0]]
+    handles.append(Line2D([], [], label="limit", **LIMIT))
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=9)
+    return canvas.save(figure, path, force=force)
+
+
+def _errors(view: LegView) -> str:
+    """Return the expected relative errors in words."""
+    return "   ".join(f"{n} {100 * relative:.1f}%" for n, (relative, _) in view.errors.items() if np.isfinite(relative))

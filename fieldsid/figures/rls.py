@@ -1,0 +1,79 @@
+"""Recursive estimates over time: one panel per parameter with its 95 % band and the time from which it stayed settled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fieldsid.figures import canvas
+from fieldsid.logs.run import FloatArray
+
+BAND = 1.96
+START_UP = 0.15
+"""Share of the record whose wild first estimates do not set the scale of a panel."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackView:
+    """Estimates over time: time (n,) s; names; units; values and std_errors (n, p).
+
+    `settled` is the settle time by name, in s after the first sample, NaN if never.
+    """
+
+    time: FloatArray
+    names: Sequence[str]
+    units: Mapping[str, str]
+    values: FloatArray
+    std_errors: FloatArray
+    settled: Mapping[str, float]
+
+
+def draw(view: TrackView, ax: Axes, index: int) -> None:
+    """Draw one parameter (by its place in `names`) over time."""
+    name = view.names[index]
+    value, band = view.values[:, index], BAND * view.std_errors[:, index]
+    unit = view.units.get(name, "")
+    canvas.dress(ax, y=f"{name} [{unit}]" if unit else name)
+    ax.fill_between(view.time, value - band, value + band, color=canvas.SECOND, alpha=0.2, linewidth=0, label="95 % band")
+    ax.plot(view.time, value, color=canvas.SECOND, linewidth=1.3, label="estimate")
+    ax.axhline(float(value[-1]), color="0.3", linewidth=0.8, linestyle=":", label="last value")
+    at = view.settled.get(name, float("nan"))
+    if np.isfinite(at):
+        when = float(view.time[0]) + at
+        ax.axvline(when, color=canvas.SIMULATED, linewidth=1.1, linestyle="--", label="settled")
+        ax.annotate(
+            f"after {at:.1f} s", (when, 1.0), xycoords=("data", "axes fraction"), xytext=(4, -11),
+            textcoords="offset points", color=canvas.SIMULATED, fontsize=9,
+        )  # fmt: skip
+    elif view.settled:
+        ax.annotate("not settled", (0.99, 0.04), xycoords="axes fraction", ha="right", color=canvas.SIMULATED, fontsize=9)
+    ax.set_xlim(view.time[0], view.time[-1])
+    ax.set_ylim(*_scale(value, band))
+
+
+def panels(view: TrackView, title: str) -> Figure:
+    """Return a sheet with one panel per parameter."""
+    count = len(view.names)
+    figure = canvas.sheet(9.0, 1.2 + 1.9 * count)
+    axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    for i, ax in enumerate(axes):
+        draw(view, ax, i)
+    canvas.legend_above(axes[0])
+    axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(list(axes))
+    return figure
+
+
+def _scale(value: FloatArray, band: FloatArray) -> tuple[float, float]:
+    """Return limits that show the estimate after its first wild part, and the band at the end."""
+    late = slice(int(START_UP * value.size), None)
+    shown = np.concatenate([value[late], [value[-1] - 2 * band[-1], value[-1] + 2 * band[-1], 0.0]])
+    shown = shown[np.isfinite(shown)]
+    low, high = float(shown.min()), float(shown.max())
+    spare = 0.08 * max(high - low, 1e-9)
+    return low - spare, high + spare

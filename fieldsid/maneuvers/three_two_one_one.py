@@ -1,0 +1,36 @@
+"""The 3-2-1-1: pulses of alternating side and falling length, a wider band than a doublet's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, levels
+
+LENGTHS = np.array([3.0, 2.0, 1.0, 1.0])
+SIDES = np.array([1.0, -1.0, 1.0, -1.0])
+
+
+def _duration(p: Parameters) -> float:
+    return float(LENGTHS.sum() * p["unit"] * p["repeats"])
+
+
+def _command(p: Parameters, time: FloatArray) -> FloatArray:
+    count = round(p["repeats"])
+    # Every other repeat is mirrored: the pattern leaves a net turn of one unit, two of them leave none.
+    sides = np.concatenate([SIDES * (-1.0) ** i for i in range(count)])
+    return levels(time, np.tile(LENGTHS, count) * p["unit"], p["amplitude"] * sides)
+
+
+MANEUVER = Maneuver(
+    name="three_two_one_one",
+    says="pulses of 3, 2, 1 and 1 units with alternating side, then mirrored: several frequencies in one go",
+    parameters=(
+        amplitude(0.26),
+        Parameter("unit", "s", 0.1, 10.0, 1.0, "length of the shortest pulse"),
+        Parameter("repeats", "", 1, 10, 2, "number of patterns, every other one mirrored", whole=True),
+    ),
+    duration=_duration,
+    command=_command,
+    source="Plaetschke and Schulz 1979, AGARD LS-104; Jategaonkar 2006, section 2.3",
+)

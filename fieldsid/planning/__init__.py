@@ -1,0 +1,1 @@
+"""Planning: which maneuver buys the accuracy that is wanted inside the envelope, and which one tells rivals apart."""

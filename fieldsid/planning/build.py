@@ -1,0 +1,179 @@
+"""Build one leg: search the best maneuver at a speed, keep it inside the envelope, say what it buys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import pick_maneuver
+from fieldsid.models.model import Model
+from fieldsid.planning.candidate import Candidate, Window, fits, flown
+from fieldsid.planning.crowd import Crowd, crowd_of, fly_crowd
+from fieldsid.planning.envelope import Envelope
+from fieldsid.planning.information import information_of
+from fieldsid.planning.judge import Judge, judge_of
+from fieldsid.planning.leg import Expected, Leg, turn_back_s
+from fieldsid.planning.prior import draws_of, scales_of
+from fieldsid.planning.scene import scene_of
+from fieldsid.planning.tune import Effort, Scored, as_switched, catalogue, switching
+
+SURE, SURE_SHARE = 0.7, 0.75
+"""A plan aims at these parts of the accepted probability, so that other draws of the prior keep to it as well."""
+QUICK_DRAWS, DRAWS, ERROR_DRAWS = 200, 500, 12
+FINALISTS = 3
+SMALLEST = 0.02
+EFFORT = Effort(20, 12, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What all legs of a plan share."""
+
+    model: Model
+    envelope: Envelope
+    window: Window
+    want: Mapping[str, float]
+    run_up_s: float = 10.0
+    seed: int = 1
+    effort: Effort = EFFORT
+
+
+def best_leg(setting: Setting, speed: float, known: Sequence[Candidate] = ()) -> Leg:
+    """Return the leg of one speed; `known` are maneuvers that were best at other speeds.
+
+    Raises UsageError when nothing stays inside the envelope.
+    """
+    judge = judge_of(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
+    scored = _known_again(judge, known) if known else catalogue(judge, setting.effort)
+    seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
+    scored.append(switching(judge, seeds, setting.effort, setting.seed))
+    scored.sort(key=lambda s: s.cost)
+    crowd = crowd_at(judge, setting)
+    finalists = [kept_inside(judge, setting, crowd, s.candidate) for s in scored[:FINALISTS]]
+    inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists if c is not None]
+    if not inside:
+        raise UsageError(
+            f"no maneuver stays inside the envelope at {speed:g} m/s with a probability of {1 - setting.envelope.share:.0%}",
+            found=", ".join(f"{k} {v:.3g}" for k, v in setting.envelope.rooms().items()),
+            hint="widen the envelope, or narrow the prior with a first model: `--model MODEL`",
+        )
+    best = surely_inside(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate)
+    costs = {s.candidate.spec: float(np.exp(s.cost)) for s in scored[:6]}
+    return replace(leg_of(judge, setting, best, crowd), alternatives=costs)
+
+
+def crowd_at(judge: Judge, setting: Setting) -> Crowd:
+    return crowd_of(setting.model, judge.scene.speed, judge.window, DRAWS, setting.seed + 1)
+
+
+def risk_of(judge: Judge, crowd: Crowd, candidate: Candidate) -> tuple[float, dict[str, float]]:
+    """Return the share of draws that leave the envelope, and each excursion's 95 % quantile."""
+    flights = fly_crowd(crowd, candidate, judge.envelope, judge.autopilot, judge.run_up)
+    return float(np.mean(flights.outside(judge.envelope))), flights.quantiles(0.95)
+
+
+def leg_of(
+    judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | None = None, purpose: str = "parameters"
+) -> Leg:
+    """Return a candidate as a leg: expected errors beside those of the paper's pulses, excursions, risk."""
+    scene = judge.scene
+    response = flown(scene, candidate, judge.window, judge.envelope.limits, judge.autopilot)
+    risk, excursions = risk_of(judge, crowd or crowd_at(judge, setting), candidate)
+    turn = turn_back_s(scene.base.damping, scene.base.authority, judge.envelope.fin)
+    return Leg(
+        speed=scene.speed,
+        candidate=candidate,
+        window=judge.window,
+        run_up_s=setting.run_up_s,
+        turn_s=turn,
+        autopilot=judge.autopilot,
+        expected=expected_errors(judge, setting, candidate),
+        excursions=excursions,
+        break_probability=risk,
+        purpose=purpose,
+        nominal=response.command,
+    )
+
+
+def expected_errors(judge: Judge, setting: Setting, candidate: Candidate) -> dict[str, Expected]:
+    """Return what one pass of a candidate tells about every parameter, with the spread over draws of the prior."""
+    speed = judge.scene.speed
+    mean = judge.expected(candidate)
+    spread = []
+    for drawn in draws_of(setting.model, ERROR_DRAWS, setting.seed + 2):
+        scene = scene_of(drawn, speed)
+        response = flown(scene, candidate, judge.window, judge.envelope.limits, judge.autopilot)
+        spread.append(information_of(scene, response).std_errors())
+    base = pulses(judge)
+    before = {} if base is None else judge.expected(base).std_errors()
+    scales = scales_of(setting.model, judge.scene.base, judge.envelope.fin)
+    values = values_at(judge)
+    high = {n: float(np.quantile([e[n] for e in spread], 5 / 6)) for n in mean.names}
+    errors = mean.std_errors()
+    return {n: Expected(values[n], e, high[n], e / scales[n], before.get(n, float("nan"))) for n, e in errors.items()}
+
+
+def pulses(judge: Judge) -> Candidate | None:
+    """Return the paper's pulses in a window, shortened to fit, within the fin limit; None where there is no room."""
+    maneuver = pick_maneuver("square_pulses")
+    fin = judge.envelope.fin
+    spare = judge.window.excitation - 4.0 * maneuver.defaults["width"]
+    if spare < 0:
+        return None
+    values = {"amplitude": min(0.26, fin), "second": min(0.15, fin), "recovery": min(maneuver.defaults["recovery"], spare)}
+    return Candidate(maneuver.name, maneuver.checked(values))
+
+
+def values_at(judge: Judge) -> dict[str, float]:
+    """Return every shared parameter's value at the judge's speed."""
+    return {**judge.scene.model.values, **judge.scene.model.at_speed(judge.scene.speed)}
+
+
+def _known_again(judge: Judge, known: Sequence[Candidate]) -> list[Scored]:
+    """Return maneuvers that were best elsewhere, times stretched to this speed's damping, scored here."""
+    return sorted((Scored(c, judge.cost(c)) for c in known if fits(c, judge.window)), key=lambda s: s.cost)
+
+
+def kept_inside(judge: Judge, setting: Setting, crowd: Crowd, candidate: Candidate) -> Candidate | None:
+    """Return the candidate with its angles lowered until the envelope is kept often enough, None where none is."""
+    share, high = 1.0, setting.envelope.share * SURE
+    low_share, high_share, few = 0.0, 1.0, crowd.first(QUICK_DRAWS)
+    trial: Candidate | None = candidate
+    for step in range(7):
+        trial = lowered(candidate, share)
+        if trial is None:
+            break
+        risk, _ = risk_of(judge, few, trial)
+        if risk <= high:
+            low_share = share
+            if share == 1.0:
+                break
+        else:
+            high_share = share
+        share = 0.5 * (low_share + high_share) if low_share > 0 or step > 2 else share * 0.7
+    return lowered(candidate, low_share) if low_share > 0 else None
+
+
+def surely_inside(judge: Judge, setting: Setting, crowd: Crowd, candidate: Candidate) -> Candidate:
+    """Return the candidate lowered in small steps until many more draws of the prior agree."""
+    for _ in range(8):
+        risk, _ = risk_of(judge, crowd, candidate)
+        smaller = lowered(candidate, 0.94)
+        if risk <= SURE_SHARE * setting.envelope.share or smaller is None:
+            break
+        candidate = smaller
+    return candidate
+
+
+def lowered(candidate: Candidate, share: float) -> Candidate | None:
+    """Return a candidate with every angle it may choose times `share`; None below its bounds."""
+    changes = {
+        p.name: candidate.parameters[p.name] * share for p in candidate.record.parameters if p.unit == "rad" and p.tuned
+    }
+    bounds = {p.name: p.low for p in candidate.record.parameters}
+    if share < SMALLEST or any(v < bounds[n] for n, v in changes.items()):
+        return None
+    return candidate.with_(**changes)

@@ -1,0 +1,245 @@
+"""The maneuver that decides between rival models: the one whose refitted predictions stay furthest apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import pick_maneuver
+from fieldsid.models.model import Model
+from fieldsid.planning.candidate import Candidate, Window, fits, flown_all
+from fieldsid.planning.duel import ROUNDS, Rival, log_odds, rival_of
+from fieldsid.planning.envelope import Envelope, excursion_of, used
+from fieldsid.planning.loop import Response
+from fieldsid.planning.scene import autopilot_of, scene_of
+from fieldsid.planning.tune import moves_of
+
+WINDOW_S = 60.0
+MOST_LOG_ODDS = 300.0
+TUNED = 3
+FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
+SURE = float(np.log(20.0))
+"""Log odds at which a pair counts as told apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class Separation:
+    """The maneuver that decides: its parameters, speed (m/s), the log odds it is expected to give for the right one.
+
+    `expected_log_odds` is that of the pair and direction it separates least; `pairs` holds all, keyed "right>wrong".
+    """
+
+    maneuver: str
+    parameters: Mapping[str, float]
+    speed: float
+    expected_log_odds: float
+    pairs: Mapping[str, float]
+    window: Window
+    alternatives: Mapping[str, float]
+
+    @property
+    def candidate(self) -> Candidate:
+        """The maneuver as a candidate of a plan."""
+        return Candidate(self.maneuver, self.parameters)
+
+    @property
+    def decides(self) -> bool:
+        """Whether every pair is expected to be told apart at odds of 20 to 1 or better."""
+        return self.expected_log_odds >= SURE
+
+    def plain(self) -> dict[str, Any]:
+        """Return the separation as a mapping for JSON and YAML."""
+        return {
+            "maneuver": self.maneuver,
+            "spec": self.candidate.spec,
+            "parameters": dict(self.parameters),
+            "speed_m_s": self.speed,
+            "duration_s": self.window.length,
+            "expected_log_odds": self.expected_log_odds,
+            "expected_odds": float(np.exp(min(self.expected_log_odds, MOST_LOG_ODDS))),
+            "pairs": dict(self.pairs),
+            "decides": self.decides,
+            "alternatives": dict(self.alternatives),
+        }
+
+    def says(self) -> list[str]:
+        """Return what is expected, in sentences."""
+        lines = [f"`{self.candidate.spec}` at {self.speed:g} m/s tells them apart:"]
+        for key, value in self.pairs.items():
+            right, _, wrong = key.partition(">")
+            lines.append(f"  if it is {right}: odds {_odds(value)} against {wrong}")
+        if not self.decides:
+            lines.append("one pass is not enough for odds of 20 to 1: repeat it, or widen the envelope")
+        return lines
+
+
+@dataclass(frozen=True, slots=True)
+class _Arena:
+    rivals: tuple[Rival, ...]
+    envelope: Envelope
+    window: Window
+    rounds: int
+
+    @property
+    def speed(self) -> float:
+        return self.rivals[0].scene.speed
+
+    def responses(self, candidate: Candidate) -> list[Response] | None:
+        """Return every rival's flight, None where one leaves the envelope."""
+        limits = self.envelope.limits
+        pilot = autopilot_of(self.rivals[0].scene.base, limits)
+        flights: list[Response] = []
+        for rival in self.rivals:
+            flights += flown_all([rival.scene], candidate, self.window, limits, pilot)
+        for rival, flight in zip(self.rivals, flights, strict=True):
+            far = excursion_of(rival.scene.axis, flight, self.speed).over(self.envelope)
+            if not np.isfinite(flight.angle).all() or used(far) > 1.0:
+                return None
+        return flights
+
+    def pairs(self, candidate: Candidate) -> dict[str, float]:
+        """Return the expected log odds of every ordered pair, empty where the envelope is left.
+
+        A model that is part of another cannot be shown to be the right one by fit alone: such pairs are left out.
+        """
+        flights = self.responses(candidate)
+        if flights is None:
+            return {}
+        found = {}
+        for (right, flight), (wrong, _) in permutations(zip(self.rivals, flights, strict=True), 2):
+            if not set(right.scene.model.effects) <= set(wrong.scene.model.effects):
+                found[f"{right.name}>{wrong.name}"] = log_odds(right, wrong, flight, self.rounds)
+        return found
+
+
+def separate(
+    models: Sequence[Model],
+    envelope: Envelope,
+    *,
+    speeds: Sequence[float],
+    rate_hz: float = 20.0,
+    window_s: float = WINDOW_S,
+    fast: bool = False,
+) -> Separation:
+    """Return the maneuver inside the envelope that tells rival models apart best, at the best of the speeds (m/s).
+
+    fast: at most 10 Hz, the maneuvers the rivals' effects name as exciting them, no tuning, and the first that decides
+    beyond doubt is taken. Raises UsageError for fewer than two rivals, rivals of different axes,
+    or when no maneuver stays inside the envelope.
+    """
+    _check(models)
+    if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
+        raise UsageError("the two rivals are the same model", found="+".join(models[0].effects), hint="name two different ones")
+    best: Separation | None = None
+    for speed in speeds:
+        rivals = tuple(rival_of(scene_of(m, speed)) for m in models)
+        rate = min(rate_hz, FAST_HZ) if fast else rate_hz
+        arena = _Arena(rivals, envelope, Window(window_s, rate_hz=rate), FAST_ROUNDS if fast else ROUNDS)
+        found = _at_speed(arena, fast=fast)
+        if found is not None and fast:
+            found = replace(found, window=replace(found.window, rate_hz=rate_hz))
+        if found is not None and (best is None or found.expected_log_odds > best.expected_log_odds):
+            best = found
+    if best is None:
+        raise UsageError(
+            "no maneuver of the catalogue stays inside the envelope for every rival",
+            found=", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()) or "no room",
+            hint="widen the envelope: leave `--max-heading` out, or give a larger `--area`",
+        )
+    return best
+
+
+def _check(models: Sequence[Model]) -> None:
+    if len(models) < 2:
+        raise UsageError("one model has no rival", found=f"{len(models)} model", hint="name two: `--separate delay,servo_lag`")
+    if len({m.axis for m in models}) > 1:
+        raise UsageError("the rivals are of different axes", found=", ".join(m.axis.value for m in models), hint="plan one axis")
+
+
+def _at_speed(arena: _Arena, *, fast: bool) -> Separation | None:
+    scored = _scored(arena, fast=fast)
+    if not scored:
+        return None
+    scored.sort(key=lambda s: -_worth(s[1]))
+    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:TUNED]]
+    candidate, pairs = max(tuned, key=lambda s: _worth(s[1]))
+    window = _shortened(arena.window, arena.responses(candidate))
+    return Separation(
+        candidate.maneuver, candidate.parameters, arena.speed, min(pairs.values()), pairs, window,
+        {c.spec: min(p.values()) for c, p in scored[:5]},
+    )  # fmt: skip
+
+
+def _scored(arena: _Arena, *, fast: bool) -> list[tuple[Candidate, Mapping[str, float]]]:
+    """Return the entrants that stay inside the envelope, with the log odds of their pairs."""
+    named = {m for r in arena.rivals for e in r.scene.effects for m in e.excited_by}
+    scored: list[tuple[Candidate, Mapping[str, float]]] = []
+    for candidate in entrants(arena.window, arena.envelope):
+        if fast and named and candidate.maneuver not in named:
+            continue
+        if pairs := arena.pairs(candidate):
+            scored.append((candidate, pairs))
+            if fast and min(pairs.values()) > BEYOND_DOUBT:
+                break
+    return scored
+
+
+def _worth(pairs: Mapping[str, float]) -> float:
+    """Return the log odds of the worst pair, with a little of the mean so that ties are broken."""
+    values = np.array(list(pairs.values()))
+    return float(values.min() + 0.01 * values.mean())
+
+
+def entrants(window: Window, envelope: Envelope) -> list[Candidate]:
+    """Return the maneuvers that are tried: the catalogue small, large, slow and fast, as far as the window allows."""
+    fin, room = envelope.fin, window.excitation
+    wanted: list[tuple[str, dict[str, float]]] = [
+        ("stairs", {"amplitude": fin, "lowest": 0.12 * fin, "steps": 5, "hold": room / 10.5}),
+        ("stairs", {"amplitude": 0.5 * fin, "lowest": 0.06 * fin, "steps": 6, "hold": room / 12.5}),
+        ("square_pulses", {"amplitude": fin, "second": 0.3 * fin, "width": room / 7.0, "recovery": room / 3.5}),
+        ("square_pulses", {"amplitude": fin, "second": 0.5 * fin, "width": 2.0, "recovery": min(13.0, room / 3)}),
+        ("three_two_one_one", {"amplitude": fin, "unit": room / 14.5, "repeats": 2}),
+        ("prbs", {"amplitude": fin, "bit": 0.5, "order": 7, "duration": room}),
+        ("prbs", {"amplitude": 0.3 * fin, "bit": 0.8, "order": 6, "duration": room}),
+        ("chirp", {"amplitude": fin, "low_hz": 0.05, "high_hz": 1.5, "duration": room}),
+        ("multisine", {"amplitude": fin, "low_hz": 0.05, "high_hz": 1.0, "period": room}),
+        ("zigzag", {"amplitude": fin, "turn": 0.35, "reversals": 6, "duration": room}),
+        ("zigzag", {"amplitude": fin, "turn": 1.2, "reversals": 4, "duration": room}),
+        ("turning_circle", {"amplitude": fin, "turn": 4 * np.pi, "pull_out": 5.0, "duration": room}),
+        ("turning_circle", {"amplitude": 0.5 * fin, "turn": 4 * np.pi, "pull_out": 5.0, "duration": room}),
+    ]
+    made = [Candidate(name, pick_maneuver(name).checked(values)) for name, values in wanted]
+    return [c for c in made if fits(c, window)]
+
+
+def _tuned(arena: _Arena, candidate: Candidate, pairs: Mapping[str, float]) -> tuple[Candidate, Mapping[str, float]]:
+    """Return the candidate improved along each of its parameters in turn."""
+    for parameter in candidate.record.parameters:
+        if not parameter.tuned:
+            continue
+        for value in moves_of(parameter, candidate.parameters[parameter.name], arena.envelope.fin):
+            trial = candidate.with_(**{parameter.name: value})
+            found = arena.pairs(trial) if fits(trial, arena.window) else {}
+            if found and _worth(found) > _worth(pairs):
+                candidate, pairs = trial, found
+                break
+    return candidate, pairs
+
+
+def _shortened(window: Window, flights: Sequence[Response] | None) -> Window:
+    """Return the window cut to the longest flight: a rule may be over before its time."""
+    if not flights:
+        return window
+    longest = max(float(f.time[-1]) for f in flights)
+    return replace(window, length=max(min(window.length, longest), window.lead + window.recover + 2.0))
+
+
+def _odds(log: float) -> str:
+    if log >= np.log(1e6):
+        return "over a million to 1"
+    return f"{np.exp(log):.3g} to 1"

@@ -1,0 +1,104 @@
+"""Fisher information of a flight: what the base parameters and effects will be known to, nuisances profiled out.
+
+The information of a whitened free run is J^T J with J its sensitivities; whitening is the same Kalman filter the
+prediction-error estimator uses, so coloured sensor noise and a disturbance moment count in full (Ljung 1999, 7.4).
+Initial states and per-run coefficients are estimated too; their share is taken out by the Schur complement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from fieldsid.fitting.descent import normal_equations
+from fieldsid.fitting.layout import Layout, layout_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES
+from fieldsid.models.record import Record
+from fieldsid.planning.loop import Response
+from fieldsid.planning.scene import Scene
+
+RIDGE = 1e-12
+SMALLEST_PIVOT = 1e-10
+"""Below this share of its own information a parameter cannot be told from the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Information:
+    """Information matrix (p, p) on `names` at one speed, nuisances taken out; add the matrices of independent runs."""
+
+    names: tuple[str, ...]
+    matrix: FloatArray
+
+    def times(self, repeats: int) -> Information:
+        """Return the information of the same flight flown several times."""
+        return Information(self.names, self.matrix * repeats)
+
+    def plus(self, other: Information) -> Information:
+        """Return the information of two flights of the same parameters."""
+        return Information(self.names, self.matrix + other.matrix)
+
+    def std_errors(self) -> dict[str, float]:
+        """Return the standard error of every parameter, infinite where the flight cannot tell it from others."""
+        scale = np.sqrt(np.diag(self.matrix))
+        if not np.isfinite(self.matrix).all() or (scale <= 0).any():
+            return {n: (float("inf") if not s > 0 else float("nan")) for n, s in zip(self.names, scale, strict=True)} | {
+                n: float("inf") for n in self.names
+            }
+        unit = self.matrix / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(unit)
+        lost = values < SMALLEST_PIVOT
+        variance = (vectors[:, ~lost] ** 2 / values[~lost]).sum(axis=1)
+        hidden = (vectors[:, lost] ** 2).sum(axis=1) > 1e-6
+        errors = np.where(hidden, np.inf, np.sqrt(variance)) / scale
+        return dict(zip(self.names, errors.tolist(), strict=True))
+
+    def log_det(self) -> float:
+        """Return the log determinant of the information, minus infinity where it is singular."""
+        sign, value = np.linalg.slogdet(self.matrix)
+        return float(value) if sign > 0 else float("-inf")
+
+
+def problem_of(scene: Scene, record: Record) -> tuple[Problem, FloatArray]:
+    """Return the estimation problem of a scene's model on one record, and its vector of true values (N,)."""
+    layout, x = _layout(scene)
+    return Problem((record,), layout), x.copy()
+
+
+@lru_cache(maxsize=32)
+def _layout(scene: Scene) -> tuple[Layout, FloatArray]:
+    """Return the slots of a scene's model on one run, referred to the model's own speed, and the true values."""
+    law = scene.model.law
+    reference = law.reference if np.isfinite(law.reference) else scene.speed
+    made = layout_of([scene.record(np.linspace(0.0, 0.2, 3), np.zeros(3))], scene.axis, scene.effects)
+    layout = replace(made, groups=replace(made.groups, speeds=(reference,), reference=0))
+    names, ratio = NAMES[scene.axis], scene.speed / reference
+    at_reference = {names.damping: scene.base.damping / ratio, names.authority: scene.base.authority / ratio**2}
+    known = {**scene.values, names.trim: scene.base.trim, "angle0": 0.0, "rate0": 0.0, "cross0": 0.0, **at_reference}
+    return layout, np.array([float(known.get(s.name, s.start)) for s in layout.slots])
+
+
+def information_of(scene: Scene, response: Response) -> Information:
+    """Return the information of one flight on the shared parameters, in the units they have at the flight's speed."""
+    record = scene.record(response.time, response.command + scene.trim_fin)
+    problem, x = problem_of(scene, record)
+    _, normal, _, _ = normal_equations(problem, x, scene.model.noise, range(len(x)))
+    layout, names = problem.layout, NAMES[scene.axis]
+    shared = layout.shared
+    matrix = _without_nuisances(normal, shared)
+    unit = np.ones(shared)
+    ratio = scene.speed / layout.groups.speeds[0]
+    unit[layout.names.index(names.damping)] = ratio
+    unit[layout.names.index(names.authority)] = ratio**2
+    return Information(tuple(layout.names), matrix / np.outer(unit, unit))
+
+
+def _without_nuisances(normal: FloatArray, shared: int) -> FloatArray:
+    own = normal[shared:, shared:]
+    scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
+    cross = normal[:shared, shared:] / scale
+    unit = own / np.outer(scale, scale) + RIDGE * np.eye(scale.size)
+    return np.asarray(normal[:shared, :shared] - cross @ np.linalg.solve(unit, cross.T))

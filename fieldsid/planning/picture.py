@@ -1,0 +1,62 @@
+"""What the figure of a leg shows: the command, the predicted response with its band, the envelope, the track."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model
+from fieldsid.planning.candidate import flown
+from fieldsid.planning.crowd import crowd_of, fly_crowd
+from fieldsid.planning.envelope import Envelope, track_of
+from fieldsid.planning.leg import Leg, commands_of
+from fieldsid.planning.plan import Plan
+from fieldsid.planning.scene import scene_of
+
+DRAWS = 120
+LEVELS = (0.025, 0.16, 0.84, 0.975)
+TRACKS = 25
+
+
+@dataclass(frozen=True, slots=True)
+class LegView:
+    """One leg over time (n,) s: fin (rad), where the autopilot steers, angle (rad) and its quantiles (4, n).
+
+    `along` and `across` (n,) are the track on the prior's mean, `tracks` (2, m, n) those of some draws, in m.
+    """
+
+    axis: Axis
+    title: str
+    time: FloatArray
+    fin: FloatArray
+    autopilot: FloatArray
+    angle: FloatArray
+    band: FloatArray
+    along: FloatArray
+    across: FloatArray
+    tracks: FloatArray
+    envelope: Envelope
+    bounded: bool
+    errors: Mapping[str, tuple[float, float]]
+
+
+def view_of(plan: Plan, leg: Leg, model: Model) -> LegView:
+    """Return what the figure of a leg shows, the prior's draws flown again."""
+    envelope = plan.envelope
+    crowd = crowd_of(model, leg.speed, leg.window, DRAWS, plan.seed + 9)
+    flights = fly_crowd(crowd, leg.candidate, envelope, leg.autopilot, 0.0)
+    mean = flown(scene_of(model, leg.speed), leg.candidate, leg.window, envelope.limits, leg.autopilot)
+    n = min(flights.time.size, mean.time.size)
+    _, fin, steered = commands_of(leg, envelope)
+    along, across = track_of(plan.axis, mean, leg.speed)
+    tracks = np.stack([flights.along[:n, :TRACKS].T, flights.side[:n, :TRACKS].T])
+    shown = np.where(steered[:n] > 0, mean.command[:n], fin[:n])
+    return LegView(
+        plan.axis, f"{leg.speed:g} m/s  {leg.candidate.maneuver}", mean.time[:n], shown, steered[:n], mean.angle[:n],
+        np.quantile(flights.angle[:n], LEVELS, axis=1), along[:n], across[:n], tracks, envelope,
+        leg.purpose != "turn radius", {k: (e.relative, e.baseline / e.std_error) for k, e in leg.expected.items()},
+    )  # fmt: skip

@@ -1,0 +1,48 @@
+"""A value and its error, rounded together by the rule of the Particle Data Group (Review of Particle Physics, 5.3)."""
+
+from __future__ import annotations
+
+import math
+
+
+def digits_of_error(error: float) -> int:
+    """Return the decimals to keep: two digits of an error whose leading three are 100..354 or 950..999, else one."""
+    exponent = math.floor(math.log10(error))
+    leading = round(error / 10.0 ** (exponent - 2))
+    if leading >= 1000:
+        exponent, leading = exponent + 1, 100
+    if leading >= 950:
+        return -exponent
+    return 1 - exponent if leading <= 354 else -exponent
+
+
+def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
+    """Return `2.281 +/- 0.013`; the value alone, to four digits, where the error is not a positive number."""
+    if not math.isfinite(value):
+        return "-"
+    if not (math.isfinite(error) and error > 0.0):
+        return number(value)
+    decimals = digits_of_error(error)
+    shown = max(decimals, 0)
+    return f"{round(value, decimals) + 0.0:.{shown}f} {sign} {round(error, decimals):.{shown}f}"
+
+
+def interval(low: float, high: float) -> str:
+    """Return `2.256 .. 2.306`, both ends to one digit more than the half width's own rounding shows."""
+    half = 0.5 * (high - low)
+    if not (math.isfinite(half) and half > 0.0):
+        return "-"
+    decimals = max(digits_of_error(half) + 1, 0)
+    return f"{low:.{decimals}f} .. {high:.{decimals}f}"
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Return a number to some significant digits without an exponent where that is short; `-` where there is none."""
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if -5 <= exponent < 7:
+        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    return f"{value:.{digits - 1}e}"

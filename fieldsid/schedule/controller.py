@@ -1,0 +1,74 @@
+"""Controllers of one angle: fin = limit(kp (reference - angle) + ki integral - kd rate + forward + k_ref reference).
+
+`forward` cancels the trim offset of the fin, k_ref the stiffness (pitch): then the loop has nothing steady left to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.schedule.plant import ComplexArray, LinearPlant
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """kp (rad/rad), ki (1/s), kd (s); signed like 1/authority, so that kp b > 0."""
+
+    kp: float
+    ki: float = 0.0
+    kd: float = 0.0
+
+    def times(self, factor: float) -> Gains:
+        """Return all gains multiplied."""
+        return Gains(self.kp * factor, self.ki * factor, self.kd * factor)
+
+    def response(self, omega: FloatArray) -> ComplexArray:
+        """Return fin over angle error at frequencies (w,), the rate taken as the angle's own."""
+        s = 1j * omega
+        return np.asarray(self.kp + self.ki / s + self.kd * s)
+
+    def blended(self, other: Gains, share: float) -> Gains:
+        """Return (1 - share) of these and share of the others."""
+        return Gains(*(a + share * (b - a) for a, b in ((self.kp, other.kp), (self.ki, other.ki), (self.kd, other.kd))))
+
+
+KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        "p": "proportional, kp = a^2 / (4 zeta^2 b): the paper's",
+        "pd": "proportional and rate, poles at a chosen damping and bandwidth",
+        "pi": "proportional and integral: no steady error without knowing the trim",
+        "pid": "all three",
+        "lqr": "proportional and rate from a quadratic cost on angle and fin",
+    }
+)
+
+
+def loop(plant: LinearPlant, gains: Gains, omega: FloatArray) -> ComplexArray:
+    """Return the open loop (d, w), positive for negative feedback."""
+    return plant.response(omega) * gains.response(omega)[None, :]
+
+
+def closed_poles(plant: LinearPlant, gains: Gains) -> ComplexArray:
+    """Return the closed loop's poles at the estimate, the delay by a second-order Pade approximation."""
+    numerator, denominator = plant.polynomials()
+    if plant.delay[0] > 0.0:
+        t = float(plant.delay[0])
+        numerator = np.asarray(np.polymul(numerator, [t * t / 12.0, -t / 2.0, 1.0]), dtype=np.float64)
+        denominator = np.asarray(np.polymul(denominator, [t * t / 12.0, t / 2.0, 1.0]), dtype=np.float64)
+    control, divisor = np.array([gains.kd, gains.kp]), np.array([1.0])
+    if gains.ki != 0.0:
+        control, divisor = np.array([gains.kd, gains.kp, gains.ki]), np.array([1.0, 0.0])
+    whole = np.polyadd(np.polymul(denominator, divisor), np.polymul(numerator, control))
+    return np.asarray(np.roots(whole), dtype=np.complex128)
+
+
+def least_damping(plant: LinearPlant, gains: Gains) -> float:
+    """Return the smallest damping ratio of the closed loop's poles at the estimate, -1 .. 1."""
+    poles = closed_poles(plant, gains)
+    size = np.abs(poles)
+    return float(np.min(np.where(size > 1e-9, -poles.real / np.maximum(size, 1e-9), 1.0)))

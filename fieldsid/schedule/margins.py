@@ -1,0 +1,81 @@
+"""Gain, phase and delay margins: over all draws at once on a frequency grid, and by python-control at the estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import FieldsidError
+from fieldsid.logs.run import FloatArray
+from fieldsid.schedule.controller import Gains, loop
+from fieldsid.schedule.plant import LinearPlant
+
+GRID = np.geomspace(1e-3, 200.0, 1500)
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """Smallest margins (d,): phase deg, gain dB (up), delay s, at crossover rad/s; inf where the loop never crosses."""
+
+    phase_deg: FloatArray
+    gain_db: FloatArray
+    delay_s: FloatArray
+    crossover: FloatArray
+
+    def worst(self) -> tuple[float, float, float]:
+        """Return the smallest phase, gain and delay margin over the draws."""
+        return float(np.min(self.phase_deg)), float(np.min(self.gain_db)), float(np.min(self.delay_s))
+
+
+def margins(plant: LinearPlant, gains: Gains) -> Margins:
+    """Return the margins of every draw, from the grid by interpolation at each crossing."""
+    open_loop = loop(plant, gains, GRID)
+    size = np.log(np.abs(open_loop))
+    phase = np.unwrap(np.angle(open_loop), axis=1)
+    # an unwrapped phase may sit a turn off: a loop with positive gain starts between -360 and 0
+    phase -= 2 * np.pi * np.ceil(phase[:, :1] / (2 * np.pi) - 1e-9)
+    return _read_off(size, phase)
+
+
+def _read_off(size: FloatArray, phase: FloatArray) -> Margins:
+    count = size.shape[0]
+    log_omega = np.log(GRID)
+    phase_margin, delay, crossover = np.full(count, np.inf), np.full(count, np.inf), np.full(count, np.nan)
+    gain_margin = np.full(count, np.inf)
+    for i, j in zip(*np.nonzero((size[:, :-1] > 0) != (size[:, 1:] > 0)), strict=True):
+        share = size[i, j] / (size[i, j] - size[i, j + 1])
+        omega = float(np.exp(log_omega[j] + share * (log_omega[j + 1] - log_omega[j])))
+        margin = float(np.mod(phase[i, j] + share * (phase[i, j + 1] - phase[i, j]) + np.pi, 2 * np.pi))
+        margin = margin if margin <= np.pi else margin - 2 * np.pi
+        if np.degrees(margin) < phase_margin[i]:
+            phase_margin[i], crossover[i] = np.degrees(margin), omega
+        delay[i] = min(delay[i], (margin if margin > 0 else 0.0) / omega)
+    turns = np.floor((phase + np.pi) / (2 * np.pi))
+    for i, j in zip(*np.nonzero(turns[:, :-1] != turns[:, 1:]), strict=True):
+        line = 2 * np.pi * max(turns[i, j], turns[i, j + 1]) - np.pi
+        share = (line - phase[i, j]) / (phase[i, j + 1] - phase[i, j])
+        log_size = size[i, j] + share * (size[i, j + 1] - size[i, j])
+        # a crossing above one is a gain that may not fall below it; whether the loop is stable there, the phase margin says
+        if log_size < 0:
+            gain_margin[i] = min(gain_margin[i], -20 / np.log(10) * log_size)
+    return Margins(phase_margin, gain_margin, delay, crossover)
+
+
+def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
+    """Return phase (deg), gain (dB) and delay (s) margin of the estimate by python-control, from its frequency response.
+
+    Raises FieldsidError when python-control is not installed.
+    """
+    try:
+        control: Any = import_module("control")
+    except ImportError as error:
+        raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
+    response = loop(plant.one(), gains, GRID)[0]
+    system = control.FrequencyResponseData(response, GRID, smooth=True)
+    gain, phase, _, _, phase_crossing, _ = control.stability_margins(system)
+    delay = np.radians(phase) / phase_crossing if np.isfinite(phase_crossing) and phase_crossing > 0 else np.inf
+    gain_db = 20 * np.log10(gain) if gain > 1.0 else np.inf
+    return float(phase), float(gain_db), float(delay)

@@ -1,0 +1,179 @@
+"""The linear plant a controller meets at one speed: fin command to angle, over draws of the identified parameters.
+
+y'' = -a y' - k y + b delta + x,   x' = -c x - c_r y' + c_f delta
+angle/fin = (b (s + c) + c_f) / ((s^2 + a s + k)(s + c) + c_r s),   fin/command = exp(-T s) / (lag s + 1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Core
+from fieldsid.models.model import Model
+from fieldsid.models.simulate import effects_of
+from fieldsid.turning.source import Source, draw_values
+
+ComplexArray = npt.NDArray[np.complex128]
+PARTS = (
+    "damping", "stiffness", "authority", "offset", "quadratic", "cross_damping", "cross_rate", "cross_fin",
+    "lag", "delay", "fin_rate",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class LinearPlant:
+    """Coefficients (d,) over draws at one speed, the estimate first; `quadratic` acts in time simulations only.
+
+    `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited.
+    """
+
+    axis: Axis
+    speed: float
+    damping: FloatArray
+    stiffness: FloatArray
+    authority: FloatArray
+    offset: FloatArray
+    quadratic: FloatArray
+    cross_damping: FloatArray
+    cross_rate: FloatArray
+    cross_fin: FloatArray
+    lag: FloatArray
+    delay: FloatArray
+    fin_rate: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Number of draws."""
+        return int(self.damping.size)
+
+    def one(self, index: int = 0) -> LinearPlant:
+        """Return one draw alone."""
+        return self.pick(np.array([index]))
+
+    def pick(self, index: npt.NDArray[np.int_]) -> LinearPlant:
+        """Return some draws."""
+        parts: dict[str, Any] = {n: getattr(self, n)[index] for n in PARTS}
+        return replace(self, **parts)
+
+    def joined(self, other: LinearPlant) -> LinearPlant:
+        """Return the draws of both."""
+        parts: dict[str, Any] = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in PARTS}
+        return replace(self, **parts)
+
+    def response(self, omega: FloatArray) -> ComplexArray:
+        """Return angle over fin command at frequencies (w,) rad/s, (d, w)."""
+        s = 1j * omega[None, :]
+        a, k, b = self.damping[:, None], self.stiffness[:, None], self.authority[:, None]
+        c, c_r, c_f = self.cross_damping[:, None], self.cross_rate[:, None], self.cross_fin[:, None]
+        hull = (b * (s + c) + c_f) / ((s * s + a * s + k) * (s + c) + c_r * s)
+        return np.asarray(hull * np.exp(-s * self.delay[:, None]) / (self.lag[:, None] * s + 1.0))
+
+    def polynomials(self) -> tuple[FloatArray, FloatArray]:
+        """Return numerator and denominator of angle over command without the delay, draw 0, highest power first."""
+        a, k, b = float(self.damping[0]), float(self.stiffness[0]), float(self.authority[0])
+        c, c_r, c_f = float(self.cross_damping[0]), float(self.cross_rate[0]), float(self.cross_fin[0])
+        numerator, denominator = np.array([b]), np.array([1.0, a, k])
+        if c_r != 0.0 or c_f != 0.0:
+            numerator = np.array([b, b * c + c_f])
+            denominator = np.polyadd(np.polymul(denominator, [1.0, c]), [c_r, 0.0])
+        if self.lag[0] > 0.0:
+            denominator = np.polymul(denominator, [float(self.lag[0]), 1.0])
+        return numerator, np.asarray(denominator)
+
+
+@dataclass(frozen=True, slots=True)
+class FinLimits:
+    """What the fin can do, where the vehicle or the user says so (s, rad/s); None leaves it to the model's effects."""
+
+    lag: float | None = None
+    delay: float | None = None
+    rate: float | None = None
+
+
+def plants_at(source: Source, speed: float, limits: FinLimits, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
+    """Return the plants next to a speed, scaled to it, with weights that sum to one: one per neighbouring model."""
+    if not source.models:
+        return [(_plant_of_points(source, speed, limits, draws, seed), 1.0)]
+    return [(_plant_of_model(source.models[i], speed, limits, draws, seed + i), share) for i, share in source.near(speed)]
+
+
+def family_at(source: Source, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
+    """Return the whole uncertainty set at a speed: the draws of every neighbouring model."""
+    plants = [p for p, _ in plants_at(source, speed, limits, draws, seed)]
+    family = plants[0]
+    for other in plants[1:]:
+        family = family.joined(other)
+    return family
+
+
+def _plant_of_points(source: Source, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
+    names = NAMES[source.axis]
+    base = source.base_draws(speed, draws, np.random.default_rng(seed))
+    stiffness = np.zeros(draws) if names.stiffness is None else base[names.stiffness]
+    authority = _same_sign(base[names.authority])
+    zero = np.zeros(draws)
+    actuator = _actuator({}, limits, draws)
+    return LinearPlant(
+        source.axis, speed, _same_sign(base[names.damping]), stiffness, authority, base[names.trim] / authority,
+        zero, zero + 1.0, zero, zero, *actuator,
+    )  # fmt: skip
+
+
+def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
+    names = NAMES[model.axis]
+    values, exponents = draw_values(model, draws, np.random.default_rng(seed))
+    scale = model.law.scale(speed)
+    at = model.at_speed(speed)
+    ratio = at[names.authority] / model.values[names.authority]
+    parts = effects_of(model)
+    cores = []
+    for v in values:
+        core = Core()
+        for effect in parts:
+            if effect.core is not None:
+                core = core.plus(effect.core(v, scale))
+        cores.append(core)
+
+    def column(name: str) -> FloatArray:
+        return np.array([v[name] for v in values])
+
+    def cored(name: str) -> FloatArray:
+        return np.array([getattr(c, name) for c in cores])
+
+    authority = column(names.authority) * ratio
+    coupled = cored("cross_damping")
+    shared = {n: np.array([v[n] for v in values]) for n in ("lag", "delay", "max_rate") if n in model.values}
+    return LinearPlant(
+        axis=model.axis,
+        speed=speed,
+        damping=column(names.damping) * scale**exponents,
+        stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness),
+        authority=authority,
+        offset=column(names.trim) / authority,
+        quadratic=cored("quadratic") + cored("crossflow"),
+        cross_damping=np.where(coupled > 0, coupled, 1.0),
+        cross_rate=cored("cross_rate"),
+        cross_fin=cored("cross_fin"),
+        **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
+    )
+
+
+def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -> Sequence[FloatArray]:
+    stated = (limits.lag, limits.delay, limits.rate)
+    absent = (0.0, 0.0, np.inf)
+    out = []
+    for name, said, none in zip(("lag", "delay", "max_rate"), stated, absent, strict=True):
+        out.append(np.full(draws, said) if said is not None else shared.get(name, np.full(draws, none)))
+    return out
+
+
+def _same_sign(draws: FloatArray) -> FloatArray:
+    sign = np.sign(draws[0])
+    return np.asarray(sign * np.maximum(sign * draws, 0.05 * abs(draws[0])))

@@ -1,0 +1,159 @@
+"""A gain schedule: rows over speed, what it refers to and where it came from; saved and loaded as `fieldsid/schedule/1`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid.artifacts import load_record, save_record
+from fieldsid.errors import ArtifactError
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.controller import Gains
+
+KIND = "fieldsid/schedule"
+COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad", "depth_gain", "supported")
+"""What every export writes, in this order; depth_gain in pitch only."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Gains at one speed: fin = kp e + ki int e - kd rate + feed_forward + reference_gain ref, limited to fin_limit.
+
+    depth_gain (pitch): pitch reference = depth_gain (depth - depth wanted), rad/m, nose up positive.
+    """
+
+    speed: float
+    gains: Gains
+    feed_forward: float
+    reference_gain: float
+    fin_limit: float
+    depth_gain: float
+    supported: bool
+    slowed: float
+    phase_margin_deg: float
+    gain_margin_db: float
+    delay_margin_s: float
+
+    def record(self) -> dict[str, Any]:
+        """Return the row by the names an export writes, with its margins."""
+        return {
+            "speed_m_s": self.speed,
+            "kp": self.gains.kp,
+            "ki": self.gains.ki,
+            "kd": self.gains.kd,
+            "feed_forward_rad": self.feed_forward,
+            "reference_gain": self.reference_gain,
+            "fin_limit_rad": self.fin_limit,
+            "depth_gain": self.depth_gain,
+            "supported": self.supported,
+            "slowed": self.slowed,
+            "phase_margin_deg": self.phase_margin_deg,
+            "gain_margin_db": self.gain_margin_db,
+            "delay_margin_s": self.delay_margin_s,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions)."""
+
+    axis: Axis
+    kind: str
+    damping: float
+    phase_margin_deg: float
+    depth: bool
+    rows: tuple[Row, ...]
+    actuator: Mapping[str, float | None]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """Speeds of the rows, m/s."""
+        return tuple(r.speed for r in self.rows)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns an export writes for this axis."""
+        return tuple(c for c in COLUMNS if c != "depth_gain" or self.depth)
+
+    def column(self, name: str) -> list[Any]:
+        """Return one column over the rows."""
+        return [row.record()[name] for row in self.rows]
+
+    def at(self, speed: float) -> Row:
+        """Return the row at a speed, linear in speed between knots and held beyond them."""
+        knots = np.array(self.speeds)
+        place = float(np.interp(speed, knots, np.arange(knots.size)))
+        below = min(int(place), knots.size - 1)
+        above, share = min(below + 1, knots.size - 1), place - below
+        a, b = self.rows[below], self.rows[above]
+
+        def mixed(name: str) -> float:
+            return float(getattr(a, name) + share * (getattr(b, name) - getattr(a, name)))
+
+        inside = knots[0] * (1 - 1e-9) <= speed <= knots[-1] * (1 + 1e-9)
+        return Row(
+            speed, a.gains.blended(b.gains, share), mixed("feed_forward"), mixed("reference_gain"), mixed("fin_limit"),
+            mixed("depth_gain"), inside and a.supported and b.supported, min(a.slowed, b.slowed),
+            min(a.phase_margin_deg, b.phase_margin_deg), min(a.gain_margin_db, b.gain_margin_db),
+            min(a.delay_margin_s, b.delay_margin_s),
+        )  # fmt: skip
+
+
+def body_of(schedule: Schedule) -> dict[str, Any]:
+    """Return a schedule as the plain record that `--json` prints and the file holds."""
+    return {
+        "axis": schedule.axis.value,
+        "controller": schedule.kind,
+        "damping_ratio": schedule.damping,
+        "phase_margin_wanted_deg": schedule.phase_margin_deg,
+        "depth": schedule.depth,
+        "actuator": dict(schedule.actuator),
+        "rows": [r.record() for r in schedule.rows],
+        "provenance": dict(schedule.provenance),
+    }
+
+
+def save_schedule(schedule: Schedule, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:
+    """Write a schedule as YAML; raises ArtifactError."""
+    return save_record(path, f"{KIND}/1", body_of(schedule), inputs=inputs, force=force)
+
+
+def load_schedule(path: Path) -> Schedule:
+    """Read a schedule back; raises ArtifactError naming what is missing or wrong."""
+    body = load_record(path, KIND)
+    try:
+        rows = tuple(_row(r) for r in body["rows"])
+        first = rows[0]
+        return Schedule(
+            axis=Axis(body["axis"]),
+            kind=str(body["controller"]),
+            damping=float(body["damping_ratio"]),
+            phase_margin_deg=float(body["phase_margin_wanted_deg"]),
+            depth=bool(body["depth"]),
+            rows=(first, *rows[1:]),
+            actuator=dict(body["actuator"]),
+            provenance={**body["provenance"], "inputs": body.get("inputs", [])},
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise ArtifactError(
+            f"`{path}` is not a complete schedule",
+            found=f"{type(error).__name__}: {error}",
+            hint="design it again, with `--force`",
+        ) from error
+
+
+def _row(r: Mapping[str, Any]) -> Row:
+    def number(name: str) -> float:
+        return float("inf") if r[name] is None else float(r[name])
+
+    gains = Gains(number("kp"), number("ki"), number("kd"))
+    return Row(
+        number("speed_m_s"), gains, number("feed_forward_rad"), number("reference_gain"), number("fin_limit_rad"),
+        number("depth_gain"), bool(r["supported"]), number("slowed"), number("phase_margin_deg"), number("gain_margin_db"),
+        number("delay_margin_s"),
+    )  # fmt: skip

@@ -1,0 +1,152 @@
+"""Is the schedule good: margins and steps over the identified set, at the knots and between, against one constant gain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.margins import control_margins, margins
+from fieldsid.schedule.plant import FinLimits, LinearPlant, family_at
+from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.response import Steps, depth_response, overshoot, settling, steady_error, step_response
+from fieldsid.turning.source import Source
+
+DRAWS = 60
+SEED = 77
+STEP = {Axis.YAW: 0.3490658503988659, Axis.PITCH: 0.17453292519943295}
+"""20 deg of heading, 10 deg of pitch."""
+BENT_FIN = 0.05235987755982988
+"""3 deg: the fin offset a schedule is tried with."""
+STEP_S = 60.0
+DEPTH_STEP_M = 2.0
+DEPTH_STEP_S = 120.0
+PITCH_LIMIT = 0.3490658503988659
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One speed under one set of gains: margins at the estimate (python-control) and the least over the set; the step.
+
+    Overshoot as a share, settling in s (5 %), largest over the set beside that of the estimate; `bent_error` the steady
+    error (rad) of a 3 deg fin offset that the feed-forward knows, `bent_error_unknown` one it does not.
+    """
+
+    speed: float
+    knot: bool
+    supported: bool
+    constant: bool
+    phase_deg: float
+    gain_db: float
+    delay_s: float
+    phase_least_deg: float
+    gain_least_db: float
+    delay_least_s: float
+    overshoot: float
+    overshoot_most: float
+    settling: float
+    settling_most: float
+    bent_error: float
+    bent_error_unknown: float
+    depth_overshoot: float
+    depth_settling: float
+
+    def record(self) -> dict[str, Any]:
+        """Return the check by its fields' names with units."""
+        return {
+            "speed_m_s": self.speed, "knot": self.knot, "supported": self.supported, "constant_gain": self.constant,
+            "phase_margin_deg": self.phase_deg, "gain_margin_db": self.gain_db, "delay_margin_s": self.delay_s,
+            "phase_margin_least_deg": self.phase_least_deg, "gain_margin_least_db": self.gain_least_db,
+            "delay_margin_least_s": self.delay_least_s, "overshoot_percent": 100 * self.overshoot,
+            "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
+            "settling_most_s": self.settling_most, "fin_offset_error_rad": self.bent_error,
+            "fin_offset_error_unknown_rad": self.bent_error_unknown,
+            "depth_overshoot_percent": 100 * self.depth_overshoot, "depth_settling_s": self.depth_settling,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """Checks of the schedule and of the constant gain at the same speeds; the constant row; nominal steps for the figure."""
+
+    scheduled: tuple[Check, ...]
+    constant: tuple[Check, ...]
+    constant_row: Row
+    steps: tuple[tuple[float, Steps, Steps], ...]
+
+    @property
+    def worst(self) -> dict[str, float]:
+        """The least margins and the most overshoot of the schedule, over speeds and the set."""
+        return {
+            "phase_margin_deg": min(c.phase_least_deg for c in self.scheduled),
+            "gain_margin_db": min(c.gain_least_db for c in self.scheduled),
+            "delay_margin_s": min(c.delay_least_s for c in self.scheduled),
+            "overshoot_percent": 100 * max(c.overshoot_most for c in self.scheduled),
+        }
+
+
+def verify_schedule(schedule: Schedule, source: Source, *, draws: int = DRAWS, limits: FinLimits | None = None) -> Verification:
+    """Check a schedule on the parameters it was made from, with their errors, at its knots and midway between them."""
+    limits = limits or _limits(schedule)
+    constant = constant_row(schedule)
+    scheduled, compared, steps = [], [], []
+    for i, (speed, knot) in enumerate(checked_speeds(schedule)):
+        plant = family_at(source, speed, limits, draws, SEED + 10 * i)
+        row = schedule.at(speed)
+        held = replace(constant, speed=speed, feed_forward=row.feed_forward, reference_gain=row.reference_gain)
+        one, steps_of_row = _check(plant, row, schedule, knot=knot, constant=False)
+        other, steps_of_constant = _check(plant, held, schedule, knot=knot, constant=True)
+        scheduled.append(one)
+        compared.append(other)
+        steps.append((speed, steps_of_row, steps_of_constant))
+    return Verification(tuple(scheduled), tuple(compared), constant, tuple(steps))
+
+
+def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
+    """Return the knots (True) and the speeds midway between them (False), rising."""
+    knots = list(schedule.speeds)
+    between = [0.5 * (a + b) for a, b in pairwise(knots)]
+    return sorted([(s, True) for s in knots] + [(s, False) for s in between])
+
+
+def constant_row(schedule: Schedule) -> Row:
+    """Return the one robust gain for all speeds: the row of least proportional gain, which is damped everywhere."""
+    return min(schedule.rows, key=lambda r: abs(r.gains.kp))
+
+
+def nominal_steps(plant: LinearPlant, row: Row, axis: Axis, seconds: float = STEP_S) -> Steps:
+    """Return the estimate's response to the standard step."""
+    return step_response(plant.one(), row, reference=STEP[axis], seconds=seconds)
+
+
+def _limits(schedule: Schedule) -> FinLimits:
+    """Return the actuator the design counted with, unless the models' own effects vary it over their draws."""
+    a = schedule.actuator
+    return FinLimits(a.get("lag_s"), a.get("delay_s"), a.get("fin_rate_rad_s"))
+
+
+def _check(plant: LinearPlant, row: Row, schedule: Schedule, *, knot: bool, constant: bool) -> tuple[Check, Steps]:
+    step = STEP[schedule.axis]
+    phase, gain, delay = control_margins(plant, row.gains)
+    least = margins(plant, row.gains).worst()
+    steps = step_response(plant, row, reference=step, seconds=STEP_S)
+    over, settled = overshoot(steps.angle, step), settling(steps.time, steps.angle, step)
+    known = replace(row, feed_forward=row.feed_forward - BENT_FIN)
+    bent = step_response(plant.one(), known, reference=0.0, seconds=STEP_S, offset=BENT_FIN)
+    unknown = step_response(plant.one(), row, reference=0.0, seconds=STEP_S, offset=BENT_FIN)
+    known_error, unknown_error = (float(steady_error(s.angle, 0.0)[0]) for s in (bent, unknown))
+    depth_over, depth_settled = _depth(plant, row) if schedule.depth else (float("nan"), float("nan"))
+    check = Check(
+        row.speed, knot, row.supported, constant, phase, gain, delay, *least, float(over[0]), float(over.max()),
+        float(settled[0]), float(settled.max()), known_error, unknown_error,
+        depth_over, depth_settled,
+    )  # fmt: skip
+    return check, Steps(steps.time, steps.angle[:, :1], steps.fin[:, :1], steps.depth[:, :1])
+
+
+def _depth(plant: LinearPlant, row: Row) -> tuple[float, float]:
+    one = plant.one()
+    steps = depth_response(one, row, step=DEPTH_STEP_M, seconds=DEPTH_STEP_S, pitch_limit=PITCH_LIMIT)
+    settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
+    return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])

@@ -1,0 +1,99 @@
+"""What a model does not know of the steady turn: how far its data reached, and the model error that is left, as draws.
+
+A model trained on short pulses has seen neither the settled drift (Munk moment), nor the drag that grows with r|r|, nor the
+speed lost; a first-order fit then puts the radius too low. How much was counted on an ensemble of vehicles drawn about
+Prestero's REMUS (2001; every coefficient spread by 30 to 70 %, fins with a servo lag of 0.07 to 0.3 s), identified from
+2 s pulses or from pulses and a zig-zag and then turned at 0.26 to 0.5 rad: the log of true over predicted radius there has
+the means and spreads below, widened so that published turning trials of other vehicles (-43 .. +13 %) lie inside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+
+REACHED = 0.8
+"""Share of the turn's fin, rate or duration from which the data count as having reached it."""
+SHAPES_THE_TURN = frozenset({"sway_coupling", "quadratic_damping", "crossflow_drag"})
+"""Effects that hold what a steady turn adds to a short pulse."""
+SETTLED_SD = 0.04
+"""What was left in the ensemble of a model with these effects from pulses and a zig-zag: -0.03 +/- 0.04."""
+UNSEEN_SWAY_SD = 0.06
+"""More where the fit put a sway mode below what the data could show: its share of the settled turn was never seen."""
+STALL_SD = 0.04
+"""More for a fin angle that was not flown: lift per angle falls by a few per cent before the stall, and by much after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Mean and standard deviation of log(true radius / predicted radius)."""
+
+    mean: float
+    sd: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How far the data went toward the turn, as shares (NaN where not known), and whether the speed was flown."""
+
+    fin: float
+    rate: float
+    hold: float
+    speed_flown: bool
+    sway_settles: bool = True
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Words for what was not reached; empty when all was."""
+        short = {
+            "fin": "a fin angle this large was not flown",
+            "rate": "a yaw rate this high was not reached",
+            "hold": "no turn was held long enough to settle",
+        }
+        words = [says for part, says in short.items() if not getattr(self, part) >= REACHED]
+        sway = () if self.sway_settles else ("the model's sway settles more slowly than any turn was held",)
+        return (*words, *sway, *(() if self.speed_flown else ("this speed was not flown",)))
+
+
+def reach_of(
+    trained: Mapping[str, float], *, fin: float, rate: float, quarter_s: float, speed_flown: bool, sway_settles: bool = True
+) -> Reach:
+    """Return the reach of what a model was trained on toward a turn at `fin` rad, `rate` rad/s, 90 deg after quarter_s."""
+    nan = float("nan")
+    return Reach(
+        fin=trained.get("fin_max", nan) / fin,
+        rate=trained.get("rate_max", nan) / rate if rate > 0 else nan,
+        hold=trained.get("held_s", nan) / quarter_s if quarter_s > 0 else nan,
+        speed_flown=speed_flown,
+        sway_settles=sway_settles,
+    )
+
+
+def doubt_of(effects: tuple[str, ...], reach: Reach, *, formula: bool) -> Doubt:
+    """Return the model error of a radius, the less the further the data reached.
+
+    `formula` is the u-turn formula (speed kept, ramps counted in), else the settled circle. Where the reach is not known
+    (a table), it is taken as a short pulse's.
+    """
+    rate = 1.0 - _share(reach.rate, unknown=0.6)
+    hold = 1.0 - _share(reach.hold, unknown=0.3)
+    fin = 1.0 - _share(reach.fin, unknown=0.5)
+    spread = 0.10 * max(rate, hold) + STALL_SD * fin
+    if formula:
+        return Doubt(0.04 + 0.30 * rate + 0.05 * hold, 0.10 + spread)
+    if not SHAPES_THE_TURN & set(effects):
+        return Doubt(0.12 + 0.50 * rate + 0.10 * hold, 0.10 + spread)
+    return Doubt(0.15 * max(rate, hold), SETTLED_SD + spread + (0.0 if reach.sway_settles else UNSEEN_SWAY_SD))
+
+
+def _share(value: float, *, unknown: float) -> float:
+    return float(np.clip(value, 0.0, 1.0)) if np.isfinite(value) else unknown
+
+
+def doubt_draws(doubt: Doubt, count: int, rng: np.random.Generator) -> FloatArray:
+    """Return draws (count,) of log(true / predicted)."""
+    return np.asarray(doubt.mean + doubt.sd * rng.standard_normal(count))

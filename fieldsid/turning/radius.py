@@ -1,0 +1,298 @@
+"""Turning radius over speed, both sides, with bands: the paper's formula, or the identified model simulated to its circle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fieldsid.errors import ModelError, UsageError
+from fieldsid.logs.run import FloatArray, Note, Run
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.turning.doubt import Reach, doubt_draws, doubt_of, reach_of
+from fieldsid.turning.formulas import (
+    FIN_ZERO_TOLERANCE,
+    counted_offset,
+    refuse_short_fin,
+    refuse_unstable,
+    u_turn,
+    usable_fin,
+)
+from fieldsid.turning.measured import MeasuredTurn, measure_turn
+from fieldsid.turning.prediction import SIDES, MeasuredRow, TurnPrediction, TurnRow
+from fieldsid.turning.settled import SettledTurns, settled_turns
+from fieldsid.turning.source import Source
+from fieldsid.turning.surge import SurgeModel, fit_surge
+
+DRAWS = 500
+SEED = 20240511
+METHODS = ("auto", "u_turn", "steady", "simulated")
+SAME_TURN = 0.05
+
+
+def turn_radius(
+    source: Source,
+    speeds: Sequence[float],
+    rudder_max: float,
+    *,
+    runs: Sequence[Run] = (),
+    measured: Sequence[Run] = (),
+    method: str = "auto",
+    draws: int = DRAWS,
+    fin_zero: float = FIN_ZERO_TOLERANCE,
+) -> TurnPrediction:
+    """Return the turn at every speed (m/s) to both sides with the rudder at rudder_max (rad).
+
+    runs are those the models came from: the loss of speed and the drift in a turn are identified from them. measured
+    are runs of turns to compare with. method "auto" simulates where the models carry effects and takes the u-turn
+    formula elsewhere. An offset of the fin below `fin_zero` (rad) is not counted in the formula. Raises UsageError,
+    ModelError for an unstable model, DataError for a measured run without a circle.
+    """
+    _check(source, speeds, rudder_max, method)
+    source = source.flown_by(runs)
+    chosen = _chosen(source, method)
+    surge = fit_surge(runs) if chosen == "simulated" and runs else None
+    turns = [measure_turn(run) for run in measured]
+
+    def rows_at(at: Sequence[float], rudder: float) -> list[TurnRow]:
+        if chosen == "simulated":
+            return _simulated_rows(source, at, rudder, surge, draws)
+        return _formula_rows(source, at, rudder, chosen, draws, fin_zero)
+
+    rows = rows_at(speeds, rudder_max)
+    compared = [_compared(turn, rows_at) for turn in turns]
+    rows = [_with_measurement(row, compared, rudder_max) for row in rows]
+    return TurnPrediction(tuple(rows), tuple(compared), rudder_max, surge, tuple(_notes(source, rows, chosen, surge, fin_zero)))
+
+
+def _formula_rows(
+    source: Source, speeds: Sequence[float], rudder: float, method: str, draws: int, fin_zero: float
+) -> list[TurnRow]:
+    names = NAMES[Axis.YAW]
+    rows = []
+    rng = np.random.default_rng(SEED)
+    for speed in speeds:
+        base = source.base_draws(speed, draws, rng)
+        a, b, c = base[names.damping], base[names.authority], base[names.trim]
+        where = f"at {speed:.3g} m/s"
+        refuse_unstable(float(a[0]), where)
+        refuse_short_fin(rudder, float(c[0] / b[0]), where)
+        a = np.maximum(a, 0.05 * a[0])
+        b = np.sign(b[0]) * np.maximum(np.abs(b), 0.05 * abs(b[0]))
+        for side, sign in SIDES.items():
+            fin = _usable(rudder, c / b, sign * float(np.sign(b[0])), fin_zero, rng)
+            turn = u_turn(speed, a, b, fin)
+            radius = turn.radius if method == "u_turn" else turn.steady_radius
+            reach = _reach(source, speed, rudder, float(turn.yaw_rate_max[0]), float(turn.time[0]) / 2)
+            doubt = doubt_of((), reach, formula=method == "u_turn")
+            spread = np.exp(doubt_draws(doubt, draws, np.random.default_rng(SEED)))
+            rows.append(
+                _row(
+                    speed, side, method, reach, rudder, radius=radius, spread=spread, time=turn.time,
+                    steady=float(turn.steady_radius[0]), u_turn_radius=float(turn.radius[0]),
+                    rate=float(turn.yaw_rate_max[0]), turn_speed=speed,
+                )
+            )  # fmt: skip
+    return _by_side(rows)
+
+
+def _simulated_rows(
+    source: Source, speeds: Sequence[float], rudder: float, surge: SurgeModel | None, draws: int
+) -> list[TurnRow]:
+    entry = np.array(speeds, dtype=np.float64)
+    both = settled_turns(source, entry, rudder, surge, draws, np.random.default_rng(SEED))
+    return [_simulated_row(source, turns, i, side, rudder) for side, turns in both.items() for i in range(entry.size)]
+
+
+def _simulated_row(source: Source, turns: SettledTurns, index: int, side: str, rudder: float) -> TurnRow:
+    speed, rate = float(turns.entry[index]), float(turns.rate[index])
+    if not np.isfinite(turns.radius[0, index]):
+        raise ModelError(
+            f"the model has no steady turn to {side} at {speed:.3g} m/s: it is unstable, and nothing in it holds the rate",
+            found=f"a22 = {source.base_at(speed).get('a22', 0.0):.4g} 1/s, effects: {', '.join(turns.effects) or 'none'}",
+            hint="add the damping that holds it: `sysid extend MODEL --add quadratic_damping RUN...`",
+        )
+    time = turns.transient.time_180[index]
+    reach = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
+    doubt = doubt_of(turns.effects, reach, formula=False)
+    spread = np.exp(doubt_draws(doubt, turns.radius.shape[0], np.random.default_rng(SEED + 1)))
+    radius = turns.radius[:, index]
+    row = _row(
+        speed, side, "simulated", reach, rudder, radius=radius, spread=spread, time=time * radius / radius[0],
+        steady=float(radius[0]), u_turn_radius=float(turns.transient.path_180[index] / np.pi), rate=rate,
+        turn_speed=float(turns.path_speed[index]),
+    )  # fmt: skip
+    after = turns.transient
+    return replace(
+        row,
+        advance=float(after.advance[index]),
+        transfer=float(after.transfer[index]),
+        tactical_diameter=float(after.tactical_diameter[index]),
+    )
+
+
+def _row(
+    speed: float,
+    side: str,
+    method: str,
+    reach: Reach,
+    rudder: float,
+    *,
+    radius: FloatArray,
+    spread: FloatArray,
+    time: FloatArray,
+    steady: float,
+    u_turn_radius: float,
+    rate: float,
+    turn_speed: float,
+) -> TurnRow:
+    value = float(radius[0])
+    interval = _interval(radius * spread, value)
+    because = reach.missing
+    return TurnRow(
+        speed=float(speed),
+        side=side,
+        radius=value,
+        interval95=interval,
+        steady_radius=steady,
+        u_turn_radius=u_turn_radius,
+        u_turn_time=float(time[0]),
+        yaw_rate_max=rate,
+        method=method,
+        trust="extrapolated" if because else "identified",
+        because=because,
+        settle_with=_settles(because, side, speed, rudder),
+        turn_speed=float(turn_speed),
+        u_turn_time95=_interval(time * spread, float(time[0])),
+        predicted=value,
+        predicted95=interval,
+    )
+
+
+def _interval(draws: FloatArray, value: float) -> tuple[float, float]:
+    """Return the 95 % interval of draws, stretched to hold the value itself."""
+    if not np.isfinite(value):
+        return float("nan"), float("nan")
+    low, high = np.nanpercentile(draws, [2.5, 97.5])
+    return min(float(low), value), max(float(high), value)
+
+
+def _usable(rudder: float, offset: FloatArray, sign: float, fin_zero: float, rng: np.random.Generator) -> FloatArray:
+    """Return draws of the usable fin; an offset that is not counted still widens the band to both sides."""
+    nominal = float(offset[0])
+    if counted_offset(nominal, fin_zero) != 0.0:
+        fin = rudder + sign * offset
+        fin[0] = usable_fin(rudder, nominal, sign, 1.0)
+    else:
+        fin = rudder + rng.uniform(-1.0, 1.0, offset.size) * abs(nominal)
+        fin[0] = rudder
+    return np.maximum(fin, 0.05 * rudder)
+
+
+def _reach(source: Source, speed: float, rudder: float, rate: float, quarter_s: float) -> Reach:
+    flown = source.supports(speed)
+    if not source.models:
+        return reach_of({}, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown)
+    model = source.models[source.near(speed)[0][0]]
+    slowest = model.values.get("cross_damping", np.inf) * model.law.scale(speed)
+    seen = slowest * model.trained.get("held_s", 0.0) >= 1.0
+    return reach_of(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
+
+
+def _settles(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:
+    if not because:
+        return "nothing more: the data reached this turn"
+    return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: one and a half circles, x_m and y_m logged"
+
+
+def _compared(turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]]) -> MeasuredRow:
+    speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
+    if not (np.isfinite(turn.fin) and abs(turn.fin) > 0.01):
+        nan = float("nan")
+        return MeasuredRow(turn, nan, (nan, nan))
+    row = next(r for r in rows_at([speed], abs(turn.fin)) if r.side == turn.side)
+    return MeasuredRow(turn, row.radius, row.interval95)
+
+
+def _with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: float) -> TurnRow:
+    """Return the row with the measured radius where a circle was flown at this speed, side and rudder."""
+    for m in measured:
+        turn = m.turn
+        near_speed = abs(turn.entry_speed - row.speed) <= SAME_TURN * row.speed
+        near_fin = abs(abs(turn.fin) - rudder) <= SAME_TURN * rudder
+        if turn.side == row.side and near_speed and near_fin:
+            return replace(
+                row,
+                radius=turn.circle.radius,
+                interval95=turn.circle.interval95,
+                method="measured",
+                trust="measured",
+                because=(),
+                settle_with=f"settled by `{turn.run}`",
+            )
+    return row
+
+
+def _by_side(rows: Sequence[TurnRow]) -> list[TurnRow]:
+    return [r for side in SIDES for r in rows if r.side == side]
+
+
+def _chosen(source: Source, method: str) -> str:
+    if method != "auto":
+        return method
+    return "simulated" if any(m.effects for m in source.models) else "u_turn"
+
+
+def _check(source: Source, speeds: Sequence[float], rudder_max: float, method: str) -> None:
+    if source.axis is not Axis.YAW:
+        raise UsageError("a turning radius needs the yaw axis", found="pitch parameters", hint="identify with `--axis yaw`")
+    if method not in METHODS:
+        raise UsageError(f"there is no method {method!r}", found=", ".join(METHODS), hint="leave `--method` out")
+    if method == "simulated" and not source.models:
+        raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
+    if not 0.0 < rudder_max <= 1.5708:
+        raise UsageError(
+            "the rudder limit must be an angle in rad", found=f"{rudder_max:g}", hint="for 15 deg: `--rudder-max 0.26`"
+        )
+    if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):
+        raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")
+
+
+def _notes(source: Source, rows: Sequence[TurnRow], method: str, surge: SurgeModel | None, fin_zero: float) -> list[Note]:
+    notes = []
+    outside = sorted({r.speed for r in rows if not source.supports(r.speed)})
+    if outside:
+        low, high = float(source.speeds[0]), float(source.speeds[-1])
+        notes.append(
+            Note(
+                "outside_support",
+                f"{len(outside)} speeds from {outside[0]:.3g} to {outside[-1]:.3g} m/s lie outside {low:.3g} .. {high:.3g} m/s, "
+                "where data were taken",
+                {"speeds": outside},
+            )
+        )
+    if method == "simulated" and (surge is None or not surge.surge_measured):
+        notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 45 %)"))
+    if method == "u_turn":
+        notes += _offset_notes(source, fin_zero)
+    return notes
+
+
+def _offset_notes(source: Source, fin_zero: float) -> list[Note]:
+    names = NAMES[Axis.YAW]
+    offsets = [
+        (p, p.values[names.trim] / p.values[names.authority])
+        for p in source.points
+        if {names.trim, names.authority} <= set(p.values)
+    ]
+    small = [o for _, o in offsets if 0 < abs(o) <= fin_zero]
+    if not small:
+        return []
+    return [
+        Note(
+            "offset_not_counted",
+            f"fin offsets up to {max(map(abs, small)):.3g} rad are within {fin_zero:.3g} rad, the tolerance of a fin's zero: "
+            "port and starboard are taken alike (`--fin-zero 0` counts them)",
+        )
+    ]

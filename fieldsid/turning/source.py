@@ -1,0 +1,213 @@
+"""Where parameters at a speed come from: identified models, a table of points, or fitted laws; with draws of their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid.artifacts import read_yaml
+from fieldsid.errors import UsageError
+from fieldsid.logs.run import FloatArray, Run
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import effect_named
+from fieldsid.models.model import Model, load_model
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.turning.laws import KIND as FIT_KIND
+from fieldsid.turning.laws import Laws, fit_laws, load_laws, with_own_law
+from fieldsid.turning.line import t_factor
+from fieldsid.turning.points import SAME_SPEED, Point, check_authority, distinct_speeds, points_of
+from fieldsid.turning.table import read_table
+
+TABLES = (".csv", ".txt", ".tsv")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Points of one axis at rising speeds; the models they came from (none for a table); laws where two speeds allow them."""
+
+    axis: Axis
+    points: tuple[Point, ...]
+    models: tuple[Model, ...]
+    names: tuple[str, ...]
+    laws: Laws | None
+    paths: tuple[Path, ...]
+    own_laws: tuple[str, ...] = ()
+    flown: tuple[float, float] | None = None
+
+    @property
+    def speeds(self) -> FloatArray:
+        """Speeds of the points, (n,) m/s, rising."""
+        return np.sort(np.array([p.speed for p in self.points]))
+
+    def supports(self, speed: float) -> bool:
+        """Whether a speed lies within those the data were taken at."""
+        low, high = float(self.speeds[0]), float(self.speeds[-1])
+        for model in self.models:
+            low = min(low, model.trained.get("speed_low", low))
+            high = max(high, model.trained.get("speed_high", high))
+        if self.flown is not None:
+            low, high = min(low, self.flown[0]), max(high, self.flown[1])
+        return low * (1 - SAME_SPEED) <= speed <= high * (1 + SAME_SPEED)
+
+    def flown_by(self, runs: Sequence[Run]) -> Source:
+        """Return the source knowing the speeds its runs really had: the entry speed of a turn is above a run's median."""
+        surges = [r["surge_m_s"] for r in runs if r.has("surge_m_s")]
+        if not surges:
+            return self
+        spans = np.array([np.nanpercentile(s, [2.0, 98.0]) for s in surges])
+        return replace(self, flown=(float(spans[:, 0].min()), float(spans[:, 1].max())))
+
+    def near(self, speed: float) -> list[tuple[int, float]]:
+        """Return the one or two models next to a speed with weights that sum to one, linear in log speed."""
+        known = np.array([m.law.reference for m in self.models])
+        if known.size == 1 or not np.isfinite(known).all():
+            return [(0, 1.0)]
+        order = np.argsort(known)
+        logs = np.log(known[order])
+        place = float(np.interp(np.log(speed), logs, np.arange(known.size)))
+        below = int(np.floor(place))
+        share = place - below
+        if share < 1e-9 or below + 1 >= known.size:
+            return [(int(order[below]), 1.0)]
+        return [(int(order[below]), 1.0 - share), (int(order[below + 1]), share)]
+
+    def base_at(self, speed: float) -> dict[str, float]:
+        """Return the base parameters at a speed: the point's own where one is there and no law of the user's overrides it.
+
+        Else the laws', or the single point's scaled as lift: damping with u, authority with u^2.
+        """
+        at = [p for p in self.points if abs(p.speed - speed) <= 1e-6 * speed]
+        out = dict(at[0].values) if at else {}
+        if self.laws is not None:
+            laws = self.laws.at(speed)
+            out = {**laws, **out}
+            out |= {n: laws[n] for n in self.own_laws}
+        elif not at:
+            only = self.points[0]
+            law = SpeedLaw(only.speed)
+            names = NAMES[self.axis]
+            out = dict(only.values)
+            out[names.authority] = law.authority(speed, out[names.authority])
+            if names.damping in out:
+                out[names.damping] *= law.damping_factor(speed)
+        return out
+
+    def base_std_at(self, speed: float) -> dict[str, float]:
+        """Return standard errors of the base parameters at a speed: the point's own, else the scatter about the law."""
+        at = [p for p in self.points if abs(p.speed - speed) <= 1e-6 * speed]
+        own = dict(at[0].std_errors) if at else {}
+        if self.laws is None:
+            return own
+        spread = {}
+        for name, law in self.laws.by_name.items():
+            line = law.line
+            scatter = line.rms * np.sqrt(law.values.size / line.dof) if line.dof > 0 else 0.0
+            width = float(np.nan_to_num(line.std(speed)[0])) if not at else 0.0
+            spread[name] = float(np.hypot(scatter, width)) * t_factor(line.dof) / t_factor(0)
+        return {**spread, **own}
+
+    def base_draws(self, speed: float, count: int, rng: np.random.Generator) -> dict[str, FloatArray]:
+        """Return draws (count,) of the base parameters at a speed, the first the estimate."""
+        values, spread = self.base_at(speed), self.base_std_at(speed)
+        out = {}
+        for name in NAMES[self.axis].base:
+            z = rng.standard_normal(count)
+            z[0] = 0.0
+            out[name] = values.get(name, 0.0) + z * spread.get(name, 0.0)
+        return out
+
+
+def load_source(paths: Sequence[Path], *, laws: Sequence[str] = ()) -> Source:
+    """Return the source that files give: one table, one fit file, or models; `laws` are the user's own, `NAME=c0[,c1]`.
+
+    Raises UsageError for a mix of kinds, DataError and ArtifactError as the files deserve.
+    """
+    if not paths:
+        raise UsageError("nothing to work on", found="no file", hint="give model files, a fit file, or a table with speed_m_s")
+    tables = [p for p in paths if str(p) == "-" or p.suffix.lower() in TABLES]
+    if tables and len(paths) > 1:
+        raise UsageError(
+            "a table stands alone", found=", ".join(map(str, paths)), hint=f"give `{tables[0]}` only, or models only"
+        )
+    if tables:
+        axis, points = read_table(paths[0])
+        return _with_laws(axis, points, (), (), paths, laws)
+    bodies = [read_yaml(p) for p in paths]
+    if any(_is_fit(b) for b in bodies):
+        if len(paths) > 1:
+            raise UsageError(
+                "a fit file stands alone", found=", ".join(map(str, paths)), hint="give the fit file only, or models only"
+            )
+        found = load_laws(paths[0])
+        return _source_of_laws(found, paths, laws)
+    models = tuple(load_model(p) for p in paths)
+    names = tuple(p.stem for p in paths)
+    axis, points = points_of(models, names)
+    return _with_laws(axis, points, models, names, paths, laws)
+
+
+def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[list[dict[str, float]], FloatArray]:
+    """Return draws of a model's values from its covariance, the first the estimate, and of its damping exponent (count,).
+
+    Values stay within the bounds their effects declare, and damping that was found positive stays positive.
+    """
+    covariance = np.nan_to_num(np.asarray(model.covariance))
+    size = len(model.free)
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T)) if size else (np.zeros(0), np.zeros((0, 0)))
+    z = rng.standard_normal((count, size)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    bounds = _bounds(model)
+    draws = []
+    for i in range(count):
+        own = dict(model.values)
+        if i:
+            for j, name in enumerate(model.free):
+                low, high = bounds.get(name, (-np.inf, np.inf))
+                own[name] = float(np.clip(own[name] + z[i, j], low, high))
+        draws.append(own)
+    exponent = np.full(count, model.law.damping_exponent)
+    stated = model.info.get("law_parameters", {}).get("damping_exponent", {})
+    spread = stated.get("std_error") or 0.0
+    exponent[1:] += float(spread) * rng.standard_normal(count - 1)
+    return draws, exponent
+
+
+def _bounds(model: Model) -> dict[str, tuple[float, float]]:
+    names = NAMES[model.axis]
+    bounds = {c.name: (c.low, c.high) for e in model.effects for c in effect_named(e).shared}
+    for name in (names.damping, names.authority):
+        value = model.values[name]
+        bounds[name] = (0.05 * value, np.inf) if value > 0 else (-np.inf, 0.05 * value)
+    return bounds
+
+
+def _is_fit(body: Mapping[str, Any]) -> bool:
+    return str(body.get("schema", "")).startswith(f"{FIT_KIND}/")
+
+
+def _source_of_laws(found: Laws, paths: Sequence[Path], own: Sequence[str]) -> Source:
+    for text in own:
+        found = with_own_law(found, text)
+    return Source(found.axis, found.points, (), (), found, tuple(paths), tuple(t.partition("=")[0] for t in own))
+
+
+def _with_laws(
+    axis: Axis,
+    points: Sequence[Point],
+    models: tuple[Model, ...],
+    names: tuple[str, ...],
+    paths: Sequence[Path],
+    own: Sequence[str],
+) -> Source:
+    check_authority(axis, points)
+    ordered = tuple(sorted(points, key=lambda p: p.speed))
+    laws = fit_laws(axis, ordered) if distinct_speeds(np.array([p.speed for p in ordered])) > 1 else None
+    if own:
+        if laws is None:
+            raise UsageError("`--law` needs points at two speeds or more", found=f"{len(points)} point", hint="leave `--law` out")
+        for text in own:
+            laws = with_own_law(laws, text)
+    return Source(axis, ordered, models, names, laws, tuple(paths), tuple(t.partition("=")[0] for t in own))

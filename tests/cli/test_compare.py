@@ -1,0 +1,45 @@
+"""`sysid compare`: the contract's numbers, the figure, the gate, and bad input."""
+
+from __future__ import annotations
+
+import pytest
+from cli import trial
+
+from fieldsid.models.axis import Axis
+
+
+def test_the_model_that_made_a_run_is_down_to_its_noise(run_cli, tmp_path):
+    body = run_cli("compare", trial.model_file(tmp_path), trial.flown(tmp_path, spec="zigzag"), "--json").json
+    (run,) = body["runs"]
+    assert body["schema"] == "fieldsid/compare/1"
+    assert run["rate_rms_rad_s"] == pytest.approx(0.004, rel=0.1)
+    assert run["angle_rms_rad"] == pytest.approx(0.005, rel=0.1)
+    assert 0.0 <= run["theil"] <= 1.0
+    assert run["r2"] <= 1.0
+    assert {"condition", "share_of_error", "rms_ratio", "t_start_s", "t_end_s"} <= set(run["where"][0])
+
+
+def test_one_figure_per_run_is_drawn_beside_each_other(run_cli, tmp_path):
+    runs = [trial.flown(tmp_path, spec="zigzag", name=n) for n in ("one", "two")]
+    body = run_cli("compare", trial.model_file(tmp_path), *runs, "-o", tmp_path / "out", "--json").json
+    assert [r["figure"] for r in body["runs"]] == [str(tmp_path / "out" / f"truth_on_{n}.png") for n in ("one", "two")]
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["truth_on_one.png", "truth_on_two.png"]
+
+
+@pytest.mark.parametrize(("least", "code"), [(50, 0), (99.9, 1)])
+def test_a_gate_that_fails_is_exit_one_with_the_numbers_printed_all_the_same(run_cli, tmp_path, least, code):
+    answer = run_cli("compare", trial.model_file(tmp_path), trial.flown(tmp_path), "--min-fit", least)
+    assert answer.code == code
+    assert "run7" in answer.out
+    assert ("gate failed: run7" in answer.err) is bool(code)
+
+
+def test_text_fits_eighty_columns(run_cli, tmp_path):
+    out = run_cli("compare", trial.model_file(tmp_path), trial.flown(tmp_path)).out
+    assert max(len(line.rstrip()) for line in out.splitlines()) <= 80
+
+
+def test_a_run_of_the_other_axis_is_refused(run_cli, tmp_path):
+    answer = run_cli("compare", trial.model_file(tmp_path, Axis.PITCH), trial.flown(tmp_path, Axis.YAW))
+    assert answer.code == 2
+    assert "no fin signal for pitch" in answer.err

@@ -1,0 +1,62 @@
+"""`sysid fit` as a user meets it."""
+
+from __future__ import annotations
+
+import pytest
+from truth.paper import PITCH, YAW
+
+NAMES = {"yaw": ("a22", "b2", "C0"), "pitch": ("c22", "c23", "d2", "Cb")}
+
+
+def table(folder, axis="yaw", rows=None):
+    rows = rows or (YAW if axis == "yaw" else PITCH)
+    path = folder / f"{axis}.csv"
+    lines = [",".join(("thrust_percent", "speed_m_s", *NAMES[axis]))]
+    lines += [",".join(["70", str(r.speed), *(str(getattr(r, n)) for n in NAMES[axis])]) for r in rows]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("axis", "name", "slope", "intercept"), [("yaw", "b2", 0.327, 0.228), ("pitch", "d2", 0.367, 0.564)])
+def test_json_holds_slope_intercept_exponent_and_schema(run_cli, tmp_path, axis, name, slope, intercept):
+    body = run_cli("fit", table(tmp_path, axis), "--json").json
+    law = body["laws"][name]
+    assert body["schema"] == "fieldsid/fit/1"
+    assert law["slope"] == pytest.approx(slope, abs=5e-4)
+    assert law["intercept"] == pytest.approx(intercept, abs=5e-4)
+    assert law["exponent"]["p_against_2"] < 0.05
+    assert len(law["leave_one_out"]) == 5
+
+
+def test_text_shows_the_candidates_and_says_what_the_exponent_says(run_cli, tmp_path):
+    answer = run_cli("fit", table(tmp_path))
+    assert answer.code == 0
+    for word in ("affine *", "through zero", "power law", "slope 0.3270, intercept 0.2278", "not u^2", "leave one out"):
+        assert word in answer.out
+    assert "proves little" in answer.err
+
+
+def test_the_file_is_written_with_its_figure_and_not_twice(run_cli, tmp_path):
+    law = tmp_path / "law.yaml"
+    assert run_cli("fit", table(tmp_path), "-o", law).code == 0
+    assert law.with_suffix(".png").read_bytes()[:4] == b"\x89PNG"
+    again = run_cli("fit", table(tmp_path), "-o", law)
+    assert again.code == 2
+    assert "exists" in again.err
+    assert run_cli("turn-radius", law, "--rudder-max", "0.26", "--json").code == 0
+
+
+def test_one_speed_only_is_said_and_its_point_offered(run_cli, tmp_path):
+    answer = run_cli("fit", table(tmp_path, rows=YAW[:1]))
+    assert answer.code == 2
+    assert "one speed only" in answer.err
+    assert "b2 = -0.62" in answer.err
+    assert "hint: " in answer.err
+
+
+def test_a_fit_file_is_not_fitted_again(run_cli, tmp_path):
+    law = tmp_path / "law.yaml"
+    run_cli("fit", table(tmp_path), "-o", law, "--no-figures")
+    answer = run_cli("fit", law)
+    assert answer.code == 2
+    assert "fit file already" in answer.err

@@ -1,0 +1,118 @@
+"""`sysid identify`: the numbers of a known vehicle come back, files and figures are written whole, bad input is refused."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+
+import pytest
+from cli import trial
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import load_model
+
+
+@pytest.mark.parametrize("axis", list(Axis))
+def test_the_numbers_of_a_known_vehicle_come_back_within_their_intervals(run_cli, tmp_path, axis):
+    run = trial.flown(tmp_path, axis)
+    body = run_cli("identify", run, "--axis", axis, "--json").json
+    (fit,) = body["fits"]
+    assert body["schema"] == "fieldsid/identify/1"
+    assert fit["model"] is None
+    for name, truth in trial.TRUTH[axis].items():
+        found = fit["parameters"][name]
+        assert abs(found["value"] - truth) < 3.5 * found["std_error"]
+        low, high = found["interval95"]
+        assert low < found["value"] < high
+
+
+def test_the_fin_offset_follows_from_trim_and_authority(run_cli, tmp_path):
+    (fit,) = run_cli("identify", trial.flown(tmp_path), "--axis", "yaw", "--json").json["fits"]
+    p = fit["parameters"]
+    assert p["delta_r0"]["value"] == pytest.approx(p["C0"]["value"] / p["b2"]["value"])
+    assert p["delta_r0"]["unit"] == "rad"
+
+
+def test_model_and_figure_are_written_beside_each_other_and_the_log_is_untouched(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    before = run.read_bytes()
+    body = run_cli("identify", run, "--axis", "yaw", "-o", tmp_path / "models", "--json").json
+    assert sorted(p.name for p in (tmp_path / "models").iterdir()) == ["run7_yaw.png", "run7_yaw.yaml"]
+    assert body["fits"][0]["model"] == str(tmp_path / "models" / "run7_yaw.yaml")
+    assert run.read_bytes() == before
+    text = (tmp_path / "models" / "run7_yaw.yaml").read_text()
+    assert hashlib.sha256(before).hexdigest() in text
+
+
+def test_the_model_file_holds_what_was_printed(run_cli, tmp_path):
+    body = run_cli("identify", trial.flown(tmp_path), "--axis", "yaw", "-o", tmp_path, "--no-figures", "--json").json
+    model = load_model(tmp_path / "run7_yaw.yaml")
+    for name, value in model.values.items():
+        assert body["fits"][0]["parameters"][name]["value"] == pytest.approx(value)
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_an_existing_model_is_kept_unless_forced(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    (tmp_path / "run7_yaw.yaml").write_text("mine")
+    answer = run_cli("identify", run, "--axis", "yaw", "-o", tmp_path, "--no-figures")
+    assert answer.code == 2
+    assert "add `--force`" in answer.err
+    assert (tmp_path / "run7_yaw.yaml").read_text() == "mine"
+    assert run_cli("identify", run, "--axis", "yaw", "-o", tmp_path, "--no-figures", "--force").code == 0
+
+
+def test_several_speeds_make_one_joint_model(run_cli, tmp_path):
+    runs = [trial.flown(tmp_path, speed=u, seed=i, name=f"v{u}") for i, u in enumerate((1.0, 1.4, 1.8))]
+    body = run_cli("identify", *runs, "--axis", "yaw", "--joint", "-o", tmp_path, "--no-figures", "--json").json
+    (fit,) = body["fits"]
+    assert [r["run"] for r in fit["runs"]] == ["v1.0", "v1.4", "v1.8"]
+    assert (tmp_path / "joint_yaw.yaml").is_file()
+
+
+def test_two_files_of_one_name_are_told_apart_by_their_folders(run_cli, tmp_path):
+    runs = []
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        runs.append(trial.flown(tmp_path / folder))
+    body = run_cli("identify", *runs, "--axis", "yaw", "--json").json
+    assert [f["run"] for f in body["fits"]] == ["a_run7", "b_run7"]
+
+
+def test_text_fits_eighty_columns_and_says_that_nothing_was_kept(run_cli, tmp_path):
+    answer = run_cli("identify", trial.flown(tmp_path), "--axis", "yaw")
+    assert [line for line in answer.out.splitlines() if len(line.rstrip()) > 80 and not line.startswith("warning")] == []
+    assert "+/-" in answer.out
+    assert "add `-o DIR`" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--axis", "roll"], "invalid value"),
+        (["--axis", "pitch"], "no fin signal for pitch"),
+        (["--axis", "yaw", "--method", "output_eror"], "did you mean `output_error`"),
+        (["--axis", "yaw", "--effects", "servolag"], "did you mean `servo_lag`"),
+        (["--axis", "yaw", "--effects", "roll_coupling"], "roll_coupling needs roll"),
+        (["--axis", "yaw", "--from", "500"], "no samples between"),
+        ([], "missing option"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_with_a_hint(run_cli, tmp_path, arguments, says):
+    answer = run_cli("identify", trial.flown(tmp_path), *arguments)
+    assert (answer.code, answer.out) == (2, "")
+    assert says.lower() in answer.err.lower()
+    assert "\nhint: " in answer.err
+
+
+def test_a_missing_file_is_named(run_cli, tmp_path):
+    answer = run_cli("identify", tmp_path / "nothing.csv", "--axis", "yaw")
+    assert answer.code == 2
+    assert "nothing.csv" in answer.err
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser writes everywhere")
+def test_a_folder_that_cannot_be_written_is_refused(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    tmp_path.chmod(0o500)
+    assert run_cli("identify", run, "--axis", "yaw", "-o", tmp_path / "models").code == 2

@@ -1,0 +1,100 @@
+"""`sysid schedule` as a user meets it: design, verify with gates, export to files and into one that exists."""
+
+from __future__ import annotations
+
+import pytest
+from cli.test_fit import table
+
+
+@pytest.fixture
+def gains(run_cli, tmp_path):
+    path = tmp_path / "gains.yaml"
+    answer = run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26", "--fin-lag", "0.2", "-o", path)
+    assert answer.code == 0, answer.err
+    return path
+
+
+def test_design_prints_the_papers_gains(run_cli, tmp_path):
+    body = run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26", "--damping", "0.7", "--json").json
+    row = body["rows"][2]
+    assert body["schema"] == "fieldsid/schedule/1"
+    assert row["kp"] == pytest.approx(1.01**2 / (4 * 0.49 * -1.04), rel=1e-6)
+    assert row["feed_forward_rad"] == pytest.approx(-0.0081 / 1.04)
+    assert body["provenance"]["models"][0]["sha256"]
+
+
+def test_verify_passes_and_fails_by_its_gates(run_cli, gains, tmp_path):
+    good = run_cli("schedule", "verify", gains, "--require-phase-margin", "40", "--max-overshoot", "30", "-o", tmp_path / "g.png")
+    assert good.code == 0, good.err
+    assert "passed: phase_margin_deg" in good.out
+    assert (tmp_path / "g.png").is_file()
+    bad = run_cli("schedule", "verify", gains, "--require-phase-margin", "75")
+    assert bad.code == 1
+    assert "FAILED: phase_margin_deg" in bad.out
+
+
+def test_verify_says_when_the_models_are_gone(run_cli, gains, tmp_path):
+    (tmp_path / "yaw.csv").rename(tmp_path / "moved.csv")
+    answer = run_cli("schedule", "verify", gains)
+    assert answer.code == 2
+    assert "--model" in answer.err
+    assert run_cli("schedule", "verify", gains, "--model", tmp_path / "moved.csv").code == 0
+
+
+def test_export_prints_or_writes_and_refuses_an_unknown_target(run_cli, gains, tmp_path):
+    assert "ros__parameters:" in run_cli("schedule", "export", gains, "--to", "ros2").out
+    assert run_cli("schedule", "export", gains, "--to", "dune", "-o", tmp_path / "g.ini").code == 0
+    assert "[Control." in (tmp_path / "g.ini").read_text()
+    answer = run_cli("schedule", "export", gains, "--to", "ross")
+    assert answer.code == 2
+    assert "ros2" in answer.err
+
+
+def test_export_into_shows_first_and_writes_only_when_told(run_cli, gains, tmp_path):
+    config = tmp_path / "vehicle_config.yaml"
+    config.write_text("# mine\ncontrol:\n  heading: {}\n  other: 1  # stays\n")
+    shown = run_cli("schedule", "export", gains, "--into", config, "--key", "control.heading")
+    assert shown.code == 0
+    assert "+    kp: [" in shown.out
+    assert "nothing was changed" in shown.err
+    assert config.read_text().endswith("heading: {}\n  other: 1  # stays\n")
+    assert run_cli("schedule", "export", gains, "--into", config, "--key", "control.heading", "--write").code == 0
+    assert "# stays" in config.read_text()
+    assert "kp: [" in config.read_text()
+    assert (tmp_path / "vehicle_config.yaml.bak").read_text().startswith("# mine")
+
+
+def test_export_into_needs_a_key_that_is_there(run_cli, gains, tmp_path):
+    config = tmp_path / "vehicle_config.yaml"
+    config.write_text("control: {heading: 1}\n")
+    assert run_cli("schedule", "export", gains, "--into", config).code == 2
+    answer = run_cli("schedule", "export", gains, "--into", config, "--key", "control.headin")
+    assert answer.code == 2
+    assert "heading" in answer.err
+
+
+def test_a_fin_limit_below_the_offset_and_none_at_all_are_refused(run_cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "below the offset" in run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.01").err
+    assert "--fin-limit 0.26" in run_cli("schedule", "design", table(tmp_path)).err
+
+
+def test_depth_goes_through_pitch(run_cli, tmp_path):
+    path = tmp_path / "pitch_gains.yaml"
+    answer = run_cli(
+        "schedule",
+        "design",
+        table(tmp_path, "pitch"),
+        "--fin-limit",
+        "0.26",
+        "--controller",
+        "pd",
+        "--depth",
+        "--fin-lag",
+        "0.2",
+        "-o",
+        path,
+    )
+    assert answer.code == 0, answer.err
+    shown = run_cli("schedule", "verify", path)
+    assert "depth step of 2 m" in shown.out

@@ -1,0 +1,36 @@
+"""Runs for the command tests: a vehicle of known numbers flown through pulses, with sensor noise from a seed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fieldsid.logs import save_run
+from fieldsid.maneuvers import Limits, parse_spec
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise, save_model
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.planning.rehearse import rehearse, with_noise
+
+TRUTH = {
+    Axis.YAW: {"a22": 1.1, "b2": -1.2, "C0": 0.02},
+    Axis.PITCH: {"c22": 1.4, "c23": 0.4, "d2": 1.3, "Cb": 0.02},
+}
+
+
+def vehicle(axis: Axis, *effects: str, **values: float) -> Model:
+    return Model(axis, effects, TRUTH[axis] | values, {}, (), np.zeros((0, 0)), SpeedLaw(1.4), Noise(0.005, 0.004))
+
+
+def flown(
+    folder: Path, axis: Axis = Axis.YAW, *, spec: str = "square_pulses", speed: float = 1.4, seed: int = 3, name: str = "run7"
+) -> Path:
+    model = vehicle(axis)
+    run = with_noise(rehearse(model, *parse_spec(spec), speed=speed, limits=Limits(0.35)), model, seed)
+    return save_run(replace(run, name=name), folder / f"{name}.parquet")
+
+
+def model_file(folder: Path, axis: Axis = Axis.YAW) -> Path:
+    return save_model(vehicle(axis), folder / "truth.yaml")

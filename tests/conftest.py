@@ -1,0 +1,57 @@
+"""What all tests share: the data beside the repository, a quiet drawing backend, and the program run in this process."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+import pytest
+
+from fieldsid.cli.app import main
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a command line gave: exit code, stdout and stderr."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Mapping[str, Any]:
+        """Stdout as one JSON object; the command must have ended well."""
+        assert self.code == 0, self.err
+        body = json.loads(self.out)
+        assert isinstance(body, dict)
+        return body
+
+
+@pytest.fixture
+def run_cli(capfd: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
+    """Return a function that runs `sysid` with its arguments in this process."""
+
+    def call(*arguments: object) -> Answer:
+        capfd.readouterr()
+        code = main([str(a) for a in arguments])
+        out, err = capfd.readouterr()
+        return Answer(code, out, err)
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Return the folder of third-party data; skips, saying why, where it is absent."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"third-party data are not part of the project and absent here: {folder}")
+    return folder

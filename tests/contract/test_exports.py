@@ -1,0 +1,170 @@
+"""Every export target: names, numbers, head of notes, and what its own reader gets back."""
+
+from __future__ import annotations
+
+import configparser
+import re
+
+import pytest
+from ruamel.yaml import YAML
+
+from fieldsid.errors import ArtifactError
+from fieldsid.exports import all_targets
+from fieldsid.exports._target import columns_of
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.record import Row, Schedule
+
+TARGETS = sorted(all_targets())
+
+
+def schedule_of(axis=Axis.YAW, *, depth=False):
+    rows = tuple(
+        Row(
+            1.0 + i,
+            Gains(-1.0 / (1 + i), 0.0, -1e-7 * i),
+            -0.013 * i,
+            0.0,
+            0.26,
+            0.05 if depth else 0.0,
+            i < 2,
+            1.0,
+            65.0,
+            float("inf"),
+            2.0,
+        )
+        for i in range(3)
+    )
+    provenance = {
+        "models": [{"path": "models/a.yaml", "sha256": "0123456789abcdef" * 4}],
+        "runs": ["r1", "r2"],
+        "supported_m_s": [1.0, 2.0],
+        "law": "rudder = kp e",
+        "sign_convention": "positive rudder turns to port (b2 < 0)",
+        "schedule_variable": "speed_m_s",
+        "between_rows": "linear in speed",
+        "outside_rows": "clamp",
+    }
+    return Schedule(axis, "p", 0.7, 45.0, depth, rows, {"lag_s": 0.2}, provenance)
+
+
+@pytest.fixture(params=[(Axis.YAW, False), (Axis.PITCH, True)], ids=["heading", "depth"])
+def schedule(request):
+    return schedule_of(request.param[0], depth=request.param[1])
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_target_says_what_it_is(name):
+    target = all_targets()[name]
+    assert target.name == name
+    assert target.says
+    assert target.suffix.startswith(".")
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_the_text_carries_provenance_signs_margins_and_support(name, schedule):
+    target = all_targets()[name]
+    text = target.render(schedule, target.node, None)
+    for word in ("0123456789ab", "r1, r2", "b2 < 0", "65 deg", "clamp", "1.00 to 2.00 m/s"):
+        assert word in text, word
+
+
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"yaml"}))
+def test_every_number_has_a_decimal_point_and_no_exponent(name, schedule):
+    target = all_targets()[name]
+    body = "\n".join(
+        line for line in target.render(schedule, target.node, None).splitlines() if not line.lstrip().startswith(("#", "//"))
+    )
+    numbers = re.findall(r"(?<![\w.])-?\d[\w.+-]*", body)
+    assert len(numbers) >= 3 * 7
+    loose = [n for n in numbers if not re.fullmatch(r"-?\d+\.\d+", n)]
+    assert set(loose) <= {"3", "10"}, loose  # the count of rows, a process' tick
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_the_columns_come_back_from_the_text(name, schedule):
+    target = all_targets()[name]
+    found = READERS[name](target.render(schedule, target.node, None), target.node)
+    for column, values in columns_of(schedule).items():
+        assert found[column] == pytest.approx(values, abs=1e-6), column
+
+
+def read_yaml(text, node):
+    rows = YAML(typ="safe").load(text)[node]["rows"]
+    return {k: [float(r[k]) for r in rows] for k in rows[0] if isinstance(rows[0][k], (int, float))}
+
+
+def read_ros2(text, node):
+    """A parser as strict as rcl's: a node, ros__parameters, strings and arrays of one type; no lists of maps, no nulls."""
+    tree = YAML(typ="safe").load(text)
+    assert list(tree) == [node]
+    assert list(tree[node]) == ["ros__parameters"]
+    ((name, block),) = tree[node]["ros__parameters"].items()
+    assert re.fullmatch(r"[a-z][a-z0-9_]*", name)
+    arrays = {k: v for k, v in block.items() if isinstance(v, list)}
+    assert all(isinstance(v, (str, list)) for v in block.values())
+    assert all(type(x) is float for v in arrays.values() for x in v)
+    assert len({len(v) for v in arrays.values()}) == 1
+    return arrays
+
+
+def read_dune(text, node):
+    parser = configparser.ConfigParser()
+    parser.optionxform = str
+    parser.read_string(text)
+    names = {
+        "Speeds": "speed_m_s",
+        "Proportional Gains": "kp",
+        "Integral Gains": "ki",
+        "Derivative Gains": "kd",
+        "Feed Forward": "feed_forward_rad",
+        "Reference Gains": "reference_gain",
+        "Maximum Fin Angle": "fin_limit_rad",
+        "Depth Gains": "depth_gain",
+        "Supported": "supported",
+    }
+    return {names[k]: [float(v) for v in text.split(",")] for k, text in parser[node].items() if k in names}
+
+
+def read_ardupilot(text, node):
+    names = {
+        "SPEED": "speed_m_s",
+        "P": "kp",
+        "I": "ki",
+        "D": "kd",
+        "FF": "feed_forward_rad",
+        "REF": "reference_gain",
+        "MAX": "fin_limit_rad",
+        "DEPTH": "depth_gain",
+        "OK": "supported",
+    }
+    lines = dict(line.split(",") for line in text.splitlines() if line and not line.startswith("#"))
+    assert all(len(name) <= 16 for name in lines)
+    count = int(lines[f"{node}_COUNT"])
+    return {c: [float(lines[f"{node}{i + 1}_{n}"]) for i in range(count)] for n, c in names.items() if f"{node}1_{n}" in lines}
+
+
+def read_moos(text, node):
+    assert f"ProcessConfig = {node}\n{{" in text
+    rows = [
+        dict(p.strip().split("=") for p in line.split("ROW = ")[1].split(",")) for line in text.splitlines() if "ROW = " in line
+    ]
+    return {k: [float(r[k]) for r in rows] for k in rows[0]}
+
+
+READERS = {"yaml": read_yaml, "ros2": read_ros2, "dune": read_dune, "ardupilot": read_ardupilot, "moos": read_moos}
+
+
+def test_every_target_has_a_reader_here():
+    assert set(TARGETS) == set(READERS)
+
+
+@pytest.mark.parametrize("name", ["dune", "ardupilot", "moos"])
+def test_a_template_of_ones_own_is_used_and_a_broken_one_refused(name, tmp_path):
+    own = tmp_path / "own.txt"
+    own.write_text("{{ node }} {{ rows[0].kp }}")
+    assert all_targets()[name].render(schedule_of(), "N", own) == "N -1.0"
+    for broken in ("{{ nothing }}", "{% for %}"):
+        own.write_text(broken)
+        with pytest.raises(ArtifactError, match="not valid"):
+            all_targets()[name].render(schedule_of(), "N", own)

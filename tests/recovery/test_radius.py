@@ -1,0 +1,100 @@
+"""Turning radius of the six-degree-of-freedom vehicle (equations apart from ours), identified from what a user records."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.pilots import Autopilot, excited, steady_turn, zigzagging
+from truth.vehicle import Fins, Flight, Sea, fly_vehicle
+
+from fieldsid.fitting.identify import identify
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import save_model
+from fieldsid.turning.measured import measure_turn
+from fieldsid.turning.radius import turn_radius
+from fieldsid.turning.source import load_source
+
+FINS = Fins(lag=0.15)
+SPEED = 1.54
+SWAY = ("servo_lag", "sway_coupling", "quadratic_damping")
+DRAG = ("servo_lag", "quadratic_damping", "speed_varying")
+"""What this hull turns by: its cross-flow drag holds the rate long before the Munk moment shows."""
+TIMES, PULSES = (0.0, 5.0, 7.0, 9.0, 20.0, 22.0, 24.0), (np.nan, 0.26, -0.26, np.nan, 0.15, -0.15, np.nan)
+
+
+def run_of(name: str, flight: Flight) -> Run:
+    log = dict(flight.log)
+    return Run(name, log.pop("time_s"), log)
+
+
+@pytest.fixture(scope="module")
+def pulses() -> Run:
+    return run_of("pulses", fly_vehicle(excited(Autopilot(), "yaw", TIMES, PULSES), 36.0, speed=SPEED, fins=FINS, seed=3))
+
+
+@pytest.fixture(scope="module")
+def zigzag() -> Run:
+    return run_of(
+        "zigzag", fly_vehicle(zigzagging(Autopilot(), "yaw", fin=0.2, angle=0.35, end=40.0), 45.0, speed=SPEED, fins=FINS, seed=4)
+    )
+
+
+def source_of(folder, runs, effects):
+    (fit,) = identify(runs, Axis.YAW, effects=effects, joint=len(runs) > 1)
+    return load_source([save_model(fit.model, folder / "model.yaml", force=True)])
+
+
+@pytest.mark.parametrize("rudder", [0.2, 0.3])
+def test_pulses_and_zigzag_with_drag_predict_the_circle_within_five_percent_and_the_band_holds_it(
+    tmp_path, pulses, zigzag, rudder
+):
+    truth = steady_turn(rudder, speed=SPEED, fins=FINS)["radius_m"]
+    runs = [pulses, zigzag]
+    prediction = turn_radius(source_of(tmp_path, runs, DRAG), [SPEED], rudder, runs=runs)
+    for row in prediction.rows:
+        assert row.method == "simulated"
+        assert row.radius == pytest.approx(truth, rel=0.05)
+        assert row.interval95[0] <= truth <= row.interval95[1]
+    assert prediction.surge.surge_measured
+
+
+def test_pulses_alone_are_called_extrapolated_and_their_band_holds_the_truth(tmp_path, pulses):
+    truth = steady_turn(0.3, speed=SPEED, fins=FINS)["radius_m"]
+    for effects in ((), DRAG, SWAY):
+        for row in turn_radius(source_of(tmp_path, [pulses], effects), [SPEED], 0.3, runs=[pulses]).rows:
+            assert row.trust == "extrapolated"
+            assert row.interval95[0] <= truth <= row.interval95[1], effects
+
+
+def test_the_loss_of_speed_and_the_drift_are_those_of_the_turn(tmp_path, pulses, zigzag):
+    truth = steady_turn(0.3, speed=SPEED, fins=FINS)
+    runs = [pulses, zigzag]
+    row = turn_radius(source_of(tmp_path, runs, DRAG), [SPEED], 0.3, runs=runs).rows[0]
+    assert row.turn_speed == pytest.approx(truth["speed_m_s"], rel=0.08)
+
+
+@pytest.mark.parametrize("current", [(0.0, 0.0), (0.25, -0.15)], ids=["calm", "current"])
+def test_a_measured_circle_is_the_true_one_within_half_a_percent(current):
+    level = Autopilot(heading=None)
+
+    def pilot(t, seen):
+        return (0.25 if t > 8.0 else Autopilot()(t, seen)[0], level(t, seen)[1])
+
+    flight = fly_vehicle(pilot, 150.0, speed=SPEED, fins=FINS, sea=Sea(current=current), seed=9)
+    late = flight.truth["time_s"] > 90.0
+    time, x, y, yaw = (flight.truth[n][late] for n in ("time_s", "x_m", "y_m", "yaw_rad"))
+    through_water = np.hypot(np.gradient(x, time) - current[0], np.gradient(y, time) - current[1])
+    truth = float(np.mean(through_water) / abs(np.mean(np.gradient(np.unwrap(yaw), time))))
+    turn = measure_turn(run_of("circle", flight))
+    assert turn.side == "port"
+    assert turn.circle.radius == pytest.approx(truth, rel=0.005)
+    assert turn.circle.current == pytest.approx(current, abs=0.01)
+
+
+def test_a_sway_mode_the_data_could_not_show_is_named_and_the_band_still_holds_the_truth(tmp_path, pulses, zigzag):
+    truth = steady_turn(0.3, speed=SPEED, fins=FINS)["radius_m"]
+    runs = [pulses, zigzag]
+    for row in turn_radius(source_of(tmp_path, runs, SWAY), [SPEED], 0.3, runs=runs).rows:
+        assert row.interval95[0] <= truth <= row.interval95[1]
+        assert abs(row.radius / truth - 1.0) < 0.05 or any("sway settles" in words for words in row.because)

@@ -1,0 +1,72 @@
+"""A model that lacks an effect is seen to fail where that effect acts; the right one fails nowhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldsid.comparison.compare import compare
+from fieldsid.comparison.residuals import companions
+from fieldsid.errors import DataError
+from fieldsid.logs.run import Run
+from fieldsid.maneuvers import Limits, parse_spec
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.planning.rehearse import rehearse, with_noise
+
+BASE = {"a22": 1.1, "b2": -1.2, "C0": 0.02}
+
+
+def model(*effects, **values):
+    return Model(Axis.YAW, effects, BASE | values, {}, (), np.zeros((0, 0)), SpeedLaw(1.4), Noise(0.005, 0.0035))
+
+
+def run_of(truth, spec="zigzag", helpers=None):
+    return with_noise(rehearse(truth, *parse_spec(spec), speed=1.4, limits=Limits(0.35), helpers=helpers), truth, 8)
+
+
+def test_the_right_model_is_down_to_the_noise():
+    truth = model("servo_lag", lag=0.3)
+    (c,) = compare(truth, [run_of(truth)])
+    assert c.merit.rate_rms == pytest.approx(0.0035, rel=0.1)
+    assert c.merit.rate_rms / c.floor.rate == pytest.approx(1.0, rel=0.1)
+    assert c.metrics.whiteness_p > 1e-3
+    assert c.metrics.r2 > 0.99
+
+
+def test_a_missing_lag_shows_at_the_onset():
+    (c,) = compare(model(), [run_of(model("servo_lag", lag=0.3))])
+    (onset,) = [p for p in c.where if p.condition == "phase: onset"]
+    assert onset.rms_ratio > 1.5
+    assert c.metrics.whiteness_p < 1e-6
+    assert c.channel == "rate"
+
+
+def test_a_compass_error_is_judged_by_the_angle():
+    truth = model("compass_deviation", deviation_sin=0.2, deviation_cos=0.0)
+    (c,) = compare(model(), [run_of(truth, "turning_circle")])
+    assert c.channel == "angle"
+
+
+def test_the_missing_moment_moves_with_the_signal_that_makes_it():
+    truth = model("roll_coupling", roll_moment=0.4)
+    run = run_of(truth, helpers=lambda t: {"roll": 0.15 * np.sin(t)})
+    (c,) = compare(model(), [run])
+    assert c.moves_with[0].signal == "roll"
+    assert c.moves_with[0].explained > 0.5
+
+
+def test_a_run_without_a_rate_has_no_missing_moment():
+    run = run_of(model())
+    bare = Run("bare", run.time, {k: v for k, v in run.signals.items() if k != "yaw_rate_rad_s"})
+    (c,) = compare(model(), [bare])
+    assert c.channel == "angle"
+    assert companions(c.shown, 1.0) == ()
+    assert np.isnan(c.merit.rate_rms)
+
+
+def test_a_run_without_a_fin_is_refused():
+    run = run_of(model())
+    with pytest.raises(DataError, match="no fin signal"):
+        compare(model(), [Run("bare", run.time, {"yaw_rad": run["yaw_rad"]})])

@@ -1,0 +1,73 @@
+"""Figures of law, turn and schedule show the numbers they are given: points, bands, circles, hollow rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.paper import YAW
+
+from fieldsid.figures import canvas, law, schedule, turn
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.verify import verify_schedule
+from fieldsid.turning.circle import fit_circle
+from fieldsid.turning.laws import fit_laws
+from fieldsid.turning.measured import MeasuredTurn
+from fieldsid.turning.points import Point
+from fieldsid.turning.radius import turn_radius
+from fieldsid.turning.source import Source
+
+
+@pytest.fixture(scope="module")
+def source():
+    points = tuple(Point(f"row {i}", r.speed, {"a22": r.a22, "b2": r.b2, "C0": r.C0}, {}) for i, r in enumerate(YAW))
+    return Source(Axis.YAW, points, (), (), fit_laws(Axis.YAW, points), ())
+
+
+def axes_of(figure):
+    return [ax for ax in figure.get_axes() if ax.axison]
+
+
+def test_law_figure_has_the_authority_against_u_squared_with_its_verdict(source, tmp_path):
+    figure = law.figure(source.laws)
+    main, *others = axes_of(figure)
+    assert main.get_xlabel() == "u², m²/s²"
+    assert "not u^2" in main.get_title(loc="left").replace("\n", " ")
+    labels = [t.get_text() for t in main.get_legend().get_texts()]
+    assert any("taken" in text for text in labels)
+    assert len(others) == 2
+    assert canvas.save(figure, tmp_path / "law.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("count", [5, 40])
+def test_turn_figure_draws_both_sides_with_their_bands(source, count):
+    prediction = turn_radius(source, list(np.linspace(1.1, 2.1, count)), 0.26, draws=40)
+    radius, time = axes_of(turn.figure(prediction))
+    assert {"port, predicted", "starboard, predicted"} <= {t.get_text() for t in radius.get_legend().get_texts()}
+    assert time.get_xlabel() == "speed before the turn, m/s"
+    assert radius.get_ylim()[0] == 0.0
+    bands = radius.collections if count > 12 else radius.containers
+    assert len(bands) >= 2
+
+
+def test_track_figure_draws_the_circle_with_its_radius():
+    time = np.linspace(0.0, 40.0, 400)
+    x, y = 3.0 * np.cos(0.4 * time), 3.0 * np.sin(0.4 * time)
+    circle = fit_circle(time, x, y)
+    measured = MeasuredTurn("run", "starboard", circle, -0.3, 1.5, 1.2, 0.0, 40.0, (x, y), (x, y))
+    top, bottom = axes_of(turn.track_figure(measured))
+    assert any("R = 3.000" in t.get_text() for t in top.get_legend().get_texts())
+    assert top.get_aspect() == 1.0
+    assert bottom.get_ylabel() == "off the circle, m"
+
+
+def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
+    made = design_schedule(source, 0.26, speeds=[0.7, 1.4, 2.0])
+    figure = schedule.figure(made, verify_schedule(made, source, draws=5))
+    gains, forward, margins, scheduled, constant = axes_of(figure)
+    faces = [line.get_markerfacecolor() for line in gains.lines if line.get_marker() == "o"]
+    assert faces[0] == "white"
+    assert "white" not in faces[1:]
+    assert forward.get_ylabel() == "feed-forward, deg"
+    assert margins.get_ylim()[0] == 0.0
+    assert len(scheduled.lines) == len(constant.lines) == 5

@@ -1,0 +1,235 @@
+"""Gains by the paper's formula, slowed by lag and delay; margins against python-control; steps against scipy; the file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from truth.paper import PITCH, YAW
+
+from fieldsid.errors import ArtifactError, ModelError, UsageError
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.controller import KINDS, Gains, least_damping
+from fieldsid.schedule.design import Wish, design_gains
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.margins import control_margins, margins
+from fieldsid.schedule.plant import FinLimits, LinearPlant, plants_at
+from fieldsid.schedule.record import load_schedule, save_schedule
+from fieldsid.schedule.response import depth_response, overshoot, settling, steady_error, step_response
+from fieldsid.schedule.verify import checked_speeds, constant_row, verify_schedule
+from fieldsid.turning.source import load_source
+
+
+def source_of(folder, rows, names):
+    path = folder / "table.csv"
+    text = [",".join(("speed_m_s", *names))] + [",".join(str(getattr(r, n)) for n in ("speed", *names)) for r in rows]
+    path.write_text("\n".join(text) + "\n")
+    return load_source([path])
+
+
+@pytest.fixture
+def yaw(tmp_path):
+    return source_of(tmp_path, YAW, ("a22", "b2", "C0"))
+
+
+@pytest.fixture
+def pitch(tmp_path):
+    return source_of(tmp_path, PITCH, ("c22", "c23", "d2", "Cb"))
+
+
+def plant(speed=1.5, count=1, **own):
+    base = {
+        "damping": 1.2,
+        "stiffness": 0.0,
+        "authority": -1.6,
+        "offset": 0.0,
+        "quadratic": 0.0,
+        "cross_damping": 1.0,
+        "cross_rate": 0.0,
+        "cross_fin": 0.0,
+        "lag": 0.0,
+        "delay": 0.0,
+        "fin_rate": np.inf,
+    }
+    arrays = {k: np.full(count, v, dtype=float) for k, v in (base | own).items()}
+    return LinearPlant(Axis.YAW, speed, **arrays)
+
+
+@pytest.mark.parametrize("zeta", [0.6, 0.7071, 0.9])
+def test_yaw_gain_and_feed_forward_are_the_papers(yaw, zeta):
+    schedule = design_schedule(yaw, 0.26, wish=Wish(damping=zeta))
+    for row, truth in zip(schedule.rows, YAW, strict=True):
+        assert row.gains.kp == pytest.approx(truth.a22**2 / (4 * zeta**2 * truth.b2), rel=1e-9)
+        assert row.feed_forward == pytest.approx(-truth.C0 / truth.b2)
+        assert row.slowed == 1.0
+        assert row.supported
+
+
+def test_poles_of_the_papers_gain_have_the_chosen_damping():
+    found = design_gains(plant(), Wish(damping=0.7), 0.26)
+    assert least_damping(plant(), found.gains) == pytest.approx(0.7, abs=1e-6)
+
+
+def test_lag_and_delay_slow_the_gain_until_damping_and_margin_hold():
+    wish = Wish(damping=0.7, phase_margin_deg=50.0)
+    late = plant(lag=0.3, delay=0.4)
+    found = design_gains(late, wish, 0.26)
+    assert found.slowed < 0.95
+    assert least_damping(late, found.gains) >= 0.7 - 1e-3
+    assert margins(late, found.gains).phase_deg[0] >= 50.0 - 0.1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_controller_is_stable_and_keeps_its_margin(kind, yaw, pitch):
+    for source in (yaw, pitch):
+        schedule = design_schedule(source, 0.26, wish=Wish(kind=kind), limits=FinLimits(0.2, 0.1, 0.6))
+        assert all(r.phase_margin_deg >= 44.0 for r in schedule.rows)
+        assert all(r.gain_margin_db > 6.0 for r in schedule.rows)
+
+
+def test_integral_control_needs_no_feed_forward(yaw):
+    row = design_schedule(yaw, 0.26, wish=Wish(kind="pi")).rows[2]
+    late = step_response(plants_at(yaw, 1.63, FinLimits(), 1, 0)[0][0], row, reference=0.0, seconds=120.0, offset=0.03)
+    assert steady_error(late.angle, 0.0)[0] == pytest.approx(0.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {},
+        {"lag": 0.2},
+        {"lag": 0.2, "delay": 0.3},
+        {"cross_rate": -0.5, "cross_damping": 0.8, "cross_fin": -0.3},
+        {"stiffness": 0.4},
+    ],
+)
+@pytest.mark.parametrize("gains", [Gains(-0.5), Gains(-0.6, -0.05, -0.2)], ids=["p", "pid"])
+def test_margins_agree_with_python_control(own, gains):
+    ours = margins(plant(**own), gains)
+    phase, gain, delay = control_margins(plant(**own), gains)
+    assert ours.phase_deg[0] == pytest.approx(phase, abs=0.3)
+    assert ours.delay_s[0] == pytest.approx(delay, rel=0.01)
+    assert ours.gain_db[0] == pytest.approx(gain, abs=0.1) or (ours.gain_db[0] == gain == np.inf)
+
+
+def test_margins_of_a_known_loop_are_those_of_the_textbook():
+    own = plant(damping=1.0, authority=1.0, lag=0.5)
+    gains = Gains(2.0)
+    gain, phase, *_ = control.margin(control.tf([2.0], [0.5, 1.5, 1.0, 0.0]))
+    assert margins(own, gains).phase_deg[0] == pytest.approx(phase, abs=0.05)
+    assert margins(own, gains).gain_db[0] == pytest.approx(20 * np.log10(gain), abs=0.02)
+
+
+def test_step_agrees_with_an_ode_solver():
+    own = plant(lag=0.25, quadratic=0.8, cross_rate=-0.4, cross_damping=0.7, offset=0.01)
+    row = replace(design_schedule_row(), gains=Gains(-0.6, 0.0, -0.2), feed_forward=-0.01, fin_limit=10.0)
+    ours = step_response(own, row, reference=0.3, seconds=15.0)
+
+    def slope(_t, s):
+        y, p, x, fin = s
+        command = -0.6 * (0.3 - y) + 0.2 * p - 0.01
+        return [p, -1.2 * p - 1.6 * (fin + 0.01) - 0.8 * p * abs(p) + x, -0.7 * x + 0.4 * p, (command - fin) / 0.25]
+
+    theirs = solve_ivp(slope, (0.0, 15.0), [0.0, 0.0, 0.0, -0.01], t_eval=ours.time, rtol=1e-9, atol=1e-11)
+    assert np.max(np.abs(ours.angle[:, 0] - theirs.y[0])) < 2e-3
+
+
+def design_schedule_row():
+    from fieldsid.schedule.record import Row
+
+    return Row(1.5, Gains(-0.5), 0.0, 0.0, 0.26, 0.0, True, 1.0, 60.0, np.inf, 1.0)
+
+
+def test_fin_limit_rate_and_delay_are_kept():
+    row = replace(design_schedule_row(), gains=Gains(-3.0), fin_limit=0.2)
+    own = plant(fin_rate=0.4, delay=0.5)
+    steps = step_response(own, row, reference=0.5, seconds=10.0)
+    assert np.max(np.abs(steps.fin)) <= 0.2 + 1e-12
+    assert np.all(steps.angle[steps.time < 0.5, 0] == 0.0)
+    assert steps.angle[steps.time > 2.0, 0][0] != 0.0
+
+
+def test_overshoot_and_settling_of_a_known_second_order_step():
+    row = replace(design_schedule_row(), gains=Gains(-1.0 / 1.6), fin_limit=10.0)
+    zeta = 1.2 / 2.0
+    steps = step_response(plant(), row, reference=1.0, seconds=20.0)
+    assert overshoot(steps.angle, 1.0)[0] == pytest.approx(np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), abs=8e-3)
+    assert settling(steps.time, steps.angle, 1.0)[0] == pytest.approx(5.2, abs=0.4)
+
+
+def test_feed_forward_removes_the_error_of_a_bent_fin_and_its_absence_leaves_it():
+    row = design_schedule_row()
+    known = replace(row, feed_forward=-0.05)
+    gone = step_response(plant(), known, reference=0.0, seconds=40.0, offset=0.05)
+    left = step_response(plant(), row, reference=0.0, seconds=40.0, offset=0.05)
+    assert steady_error(gone.angle, 0.0)[0] == pytest.approx(0.0, abs=1e-4)
+    assert steady_error(left.angle, 0.0)[0] == pytest.approx(0.05 / 0.5, rel=0.01)
+
+
+def test_depth_through_pitch_settles_without_overshoot_to_speak_of(pitch):
+    schedule = design_schedule(pitch, 0.26, wish=Wish(kind="pd"), depth=True)
+    own = plants_at(pitch, 1.67, FinLimits(0.2), 1, 0)[0][0]
+    steps = depth_response(own, schedule.rows[2], step=2.0, seconds=120.0, pitch_limit=0.35)
+    assert steps.depth[-1, 0] == pytest.approx(2.0, abs=0.1)
+    assert overshoot(steps.depth, 2.0)[0] < 0.15
+
+
+def test_verification_covers_knots_and_between_and_beats_the_constant_gain(yaw):
+    schedule = design_schedule(yaw, 0.26, limits=FinLimits(lag=0.2))
+    checked = verify_schedule(schedule, yaw, draws=20)
+    assert [c.knot for c in checked.scheduled] == [True, False] * 4 + [True]
+    assert max(c.overshoot for c in checked.scheduled) < 0.1
+    assert max(c.settling for c in checked.scheduled) < 0.6 * max(c.settling for c in checked.constant)
+    assert all(c.phase_least_deg <= c.phase_deg + 0.5 for c in checked.scheduled)
+    assert all(abs(c.bent_error) < 0.1 * abs(c.bent_error_unknown) for c in checked.scheduled)
+
+
+def test_the_constant_gain_is_the_one_that_is_damped_everywhere(yaw):
+    schedule = design_schedule(yaw, 0.26)
+    assert constant_row(schedule).speed == 2.19
+    assert len(checked_speeds(schedule)) == 9
+
+
+def test_schedule_comes_back_from_its_file_and_is_clamped_outside(yaw, tmp_path):
+    schedule = design_schedule(yaw, 0.26, speeds=[0.8, 1.5, 2.0])
+    again = load_schedule(save_schedule(schedule, tmp_path / "gains.yaml", inputs=yaw.paths))
+    assert [r.gains.kp for r in again.rows] == pytest.approx([r.gains.kp for r in schedule.rows], rel=1e-5)
+    assert [r.gain_margin_db for r in again.rows] == [r.gain_margin_db for r in schedule.rows]
+    assert [r.supported for r in again.rows] == [False, True, True]
+    assert again.at(5.0).gains == again.rows[-1].gains
+    assert not again.at(5.0).supported
+    middle = again.at(1.75).gains.kp
+    assert middle == pytest.approx(0.5 * (again.rows[1].gains.kp + again.rows[2].gains.kp))
+    assert again.provenance["outside_rows"].startswith("clamp")
+
+
+def test_a_schedule_without_rows_is_refused(yaw, tmp_path):
+    path = save_schedule(design_schedule(yaw, 0.26), tmp_path / "gains.yaml")
+    path.write_text(path.read_text().split("rows:")[0] + "rows: []\nprovenance: {}\n")
+    with pytest.raises(ArtifactError, match="not a complete schedule"):
+        load_schedule(path)
+
+
+@pytest.mark.parametrize(
+    ("wish", "limit"),
+    [(Wish(kind="bang"), 0.26), (Wish(damping=0.0), 0.26), (Wish(phase_margin_deg=89.0), 0.26), (Wish(), 0.0), (Wish(), 0.005)],
+)
+def test_a_wish_that_cannot_be_meant_is_refused(yaw, wish, limit):
+    with pytest.raises(UsageError) as caught:
+        design_schedule(yaw, limit, wish=wish)
+    assert caught.value.hint
+
+
+def test_depth_of_a_heading_schedule_is_refused(yaw):
+    with pytest.raises(UsageError, match="depth"):
+        design_schedule(yaw, 0.26, depth=True)
+
+
+def test_an_unstable_plant_is_refused_for_p_and_held_by_pd():
+    with pytest.raises(ModelError, match="unstable"):
+        design_gains(plant(damping=-0.2), Wish(), 0.26)
+    held = design_gains(plant(damping=-0.2), Wish(kind="pd"), 0.26)
+    assert least_damping(plant(damping=-0.2), held.gains) > 0.5

@@ -1,0 +1,42 @@
+"""Values and errors are rounded together, by the examples of the Particle Data Group's own text."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldsid.rounding import number, with_error
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [
+        (0.827, 0.119, "0.83 +/- 0.12"),
+        (0.827, 0.367, "0.8 +/- 0.4"),
+        (2.2811, 0.01342, "2.281 +/- 0.013"),
+        (-3.0917, 0.0967, "-3.09 +/- 0.10"),
+        (14.674, 0.964, "14.7 +/- 1.0"),
+        (12345.0, 678.0, "12300 +/- 700"),
+        (0.5, 0.0, "0.5000"),
+        (0.5, float("nan"), "0.5000"),
+        (float("nan"), 0.1, "-"),
+    ],
+)
+def test_value_and_error_show_the_digits_the_error_allows(value, error, expected):
+    assert with_error(value, error) == expected
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e5))
+def test_rounding_moves_neither_by_more_than_the_rule_allows(value, error):
+    shown_value, shown_error = (float(part) for part in with_error(value, error).split(" +/- "))
+    assert abs(shown_error - error) <= 0.13 * error
+    assert abs(shown_value - value) <= 0.5 * error + 1e-9 * abs(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(0.0, "0"), (12.345678, "12.35"), (1.5e-9, "1.500e-09"), (None, "-"), (float("inf"), "-"), (-0.0456789, "-0.04568")],
+)
+def test_a_number_alone_has_four_digits(value, expected):
+    assert number(value) == expected

@@ -1,0 +1,134 @@
+"""The whole prediction: methods, trust, bands, measured turns, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.paper import YAW
+
+from fieldsid.errors import ModelError, UsageError
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise, save_model
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.turning.doubt import Reach, doubt_of, reach_of
+from fieldsid.turning.radius import turn_radius
+from fieldsid.turning.source import load_source
+
+FULL = {"fin_max": 0.3, "rate_max": 0.5, "held_s": 30.0, "speed_low": 1.0, "speed_high": 2.0}
+PULSES = {"fin_max": 0.3, "rate_max": 0.2, "held_s": 2.0, "speed_low": 1.5, "speed_high": 1.5}
+
+
+def table(folder, rows=YAW, offset=True):
+    lines = ["speed_m_s,a22,b2" + (",C0" if offset else "")]
+    lines += [f"{r.speed},{r.a22},{r.b2}" + (f",{r.C0}" if offset else "") for r in rows]
+    path = folder / "table.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return load_source([path])
+
+
+def source_of(folder, trained, effects=("quadratic_damping",), **values):
+    own = {"a22": 1.2, "b2": -1.6, "C0": 0.01, "quadratic": 1.0} | values
+    if not effects:
+        own.pop("quadratic")
+    covariance = np.diag([(0.02 * abs(v)) ** 2 for v in own.values()])
+    model = Model(Axis.YAW, effects, own, {}, tuple(own), covariance, SpeedLaw(1.5), Noise(0.005, 0.005), trained)
+    return load_source([save_model(model, folder / "model.yaml", force=True)])
+
+
+def test_a_table_goes_by_the_formula_and_is_extrapolated(tmp_path):
+    prediction = turn_radius(table(tmp_path), [1.36, 1.63], 0.26)
+    assert {r.side for r in prediction.rows} == {"port", "starboard"}
+    assert all(r.method == "u_turn" and r.trust == "extrapolated" and r.because for r in prediction.rows)
+    assert all(r.interval95[0] < r.radius < r.interval95[1] for r in prediction.rows)
+    assert all("turning_circle" in r.settle_with for r in prediction.rows)
+    assert any(n.code == "offset_not_counted" for n in prediction.notes)
+
+
+def test_an_offset_of_a_degree_or_more_sets_the_sides_apart(tmp_path):
+    path = tmp_path / "case.csv"
+    path.write_text("speed_m_s,a22,b2,delta_r0_rad\n1.37,2.15,-1.62,-0.064\n")
+    port, starboard = turn_radius(load_source([path]), [1.37], 0.26).rows
+    assert port.radius == pytest.approx(9.74, abs=0.06)
+    assert starboard.radius < 0.7 * port.radius
+
+
+def test_effects_are_simulated_and_the_steady_circle_is_the_radius(tmp_path):
+    row = turn_radius(source_of(tmp_path, FULL), [1.5], 0.3).rows[0]
+    assert row.method == "simulated"
+    assert row.radius == row.steady_radius
+    assert row.turn_speed < 1.5
+    assert np.isfinite([row.advance, row.transfer, row.tactical_diameter]).all()
+
+
+def test_data_that_reached_the_turn_are_trusted_and_pulses_are_not(tmp_path):
+    reached = turn_radius(source_of(tmp_path, FULL), [1.5], 0.3).rows[0]
+    pulses = turn_radius(source_of(tmp_path, PULSES), [1.5], 0.3).rows[0]
+    assert reached.trust == "identified"
+    assert not reached.extrapolated
+    assert pulses.trust == "extrapolated"
+    assert {"a yaw rate this high was not reached", "no turn was held long enough to settle"} <= set(pulses.because)
+    width = [r.interval95[1] - r.interval95[0] for r in (reached, pulses)]
+    assert width[1] > 1.4 * width[0]
+
+
+def test_a_speed_outside_the_data_is_said(tmp_path):
+    prediction = turn_radius(source_of(tmp_path, FULL), [2.6], 0.3)
+    assert prediction.rows[0].because == ("this speed was not flown",)
+    assert any(n.code == "outside_support" for n in prediction.notes)
+
+
+def test_surge_that_was_not_measured_is_said_and_widens_nothing_silently(tmp_path):
+    assert any(n.code == "surge_not_measured" for n in turn_radius(source_of(tmp_path, FULL), [1.5], 0.3).notes)
+
+
+def test_an_unstable_model_is_simulated_with_drag_and_refused_without(tmp_path):
+    assert turn_radius(source_of(tmp_path, FULL, a22=-0.2), [1.5], 0.3).rows[0].radius > 0
+    with pytest.raises(ModelError, match="a22 <= 0"):
+        turn_radius(source_of(tmp_path, FULL, effects=(), a22=-0.2), [1.5], 0.3)
+    with pytest.raises(ModelError, match="unstable"):
+        turn_radius(source_of(tmp_path, FULL, effects=("servo_lag",), a22=-0.2, lag=0.1), [1.5], 0.3)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "rudder", "method"), [([1.5], 0.0, "auto"), ([1.5], 15.0, "auto"), ([], 0.26, "auto"), ([1.5], 0.26, "magic"),
+                                     ([1.5], 0.26, "simulated"), ([-1.0], 0.26, "auto")]
+)  # fmt: skip
+def test_what_cannot_be_meant_is_refused(tmp_path, speeds, rudder, method):
+    with pytest.raises(UsageError) as caught:
+        turn_radius(table(tmp_path), speeds, rudder, method=method)
+    assert caught.value.hint
+
+
+def test_a_rudder_below_the_offset_is_refused(tmp_path):
+    path = tmp_path / "case.csv"
+    path.write_text("speed_m_s,a22,b2,C0\n1.37,2.15,-1.62,0.5\n")
+    with pytest.raises(UsageError, match="below the offset"):
+        turn_radius(load_source([path]), [1.37], 0.26)
+
+
+def test_the_minimum_of_the_upper_branch_is_found(tmp_path):
+    source = load_source(table(tmp_path).paths, laws=["a22=1", "b2=-0.2319,-0.3263", "C0=0"])
+    prediction = turn_radius(source, [round(0.25 + 0.05 * i, 2) for i in range(96)], 0.26, draws=50)
+    best = prediction.best("port")
+    assert best.speed == pytest.approx(3.7, abs=0.051)
+    assert best.radius == pytest.approx(5.75, abs=0.01)
+    assert prediction.rows[0].radius == pytest.approx(4.0, abs=0.02)
+
+
+def test_doubt_shrinks_as_the_data_reach_further():
+    near = reach_of(FULL, fin=0.3, rate=0.5, quarter_s=5.0, speed_flown=True)
+    far = reach_of(PULSES, fin=0.5, rate=0.5, quarter_s=5.0, speed_flown=True)
+    assert near.missing == ()
+    assert len(far.missing) == 3
+    for effects, formula in (((), True), ((), False), (("sway_coupling",), False)):
+        a, b = doubt_of(effects, near, formula=formula), doubt_of(effects, far, formula=formula)
+        assert a.sd < b.sd
+        assert a.mean < b.mean
+
+
+def test_doubt_of_a_short_pulse_covers_published_turning_trials():
+    """Formula against turning trials of other vehicles: -43 .. +13 %."""
+    doubt = doubt_of((), Reach(float("nan"), float("nan"), float("nan"), speed_flown=True), formula=True)
+    low, high = doubt.mean - 1.96 * doubt.sd, doubt.mean + 1.96 * doubt.sd
+    assert low <= np.log(1.0 / 1.13)
+    assert high >= np.log(1.0 / 0.57)

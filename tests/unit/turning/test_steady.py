@@ -1,0 +1,144 @@
+"""The settled circle by algebra is where the model's own simulation ends; speed lost, drift and both sides counted in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.simulate import command_record, simulate
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.turning.plant import plant_of
+from fieldsid.turning.steady import crossflow, steady_turn
+from fieldsid.turning.surge import Slowing, draw_slowing, fit_surge, no_slowing
+from fieldsid.turning.transient import turn_transient
+
+EFFECTS = {
+    "plain": ((), {}),
+    "quadratic": (("quadratic_damping",), {"quadratic": 3.0}),
+    "sway": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4}),
+    "fins": (("servo_lag", "rate_limit", "asymmetric_fin"), {"lag": 0.2, "max_rate": 0.5, "asymmetry": 0.1}),
+    "stall": (("stall",), None),
+    "all": (
+        ("servo_lag", "sway_coupling", "quadratic_damping"),
+        {"lag": 0.15, "cross_damping": 0.9, "cross_rate": -0.4, "quadratic": 2.0},
+    ),
+}
+
+
+def model_of(name, sign=-1.0, **base):
+    from fieldsid.effects import pick_effect
+
+    effects, own = EFFECTS[name]
+    starts = {c.name: c.start for e in effects for c in pick_effect(e).shared}
+    values = {"a22": 1.5, "b2": sign * 2.0, "C0": 0.02} | starts | (own or {}) | base
+    return Model(Axis.YAW, effects, values, {}, tuple(values), np.zeros((len(values),) * 2), SpeedLaw(1.5), Noise(0.01, 0.01))
+
+
+def turn_of(model, side, speed=1.5, fin=0.3, slowing=None, entry=None):
+    plant = plant_of(model, [dict(model.values)], fin, np.array([model.law.damping_exponent]))
+    return plant, steady_turn(plant, slowing or no_slowing(1), np.array(entry or [speed]), side)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_settled_rate_is_that_of_the_models_own_simulation(name, sign, side):
+    model = model_of(name, sign)
+    time = np.arange(0.0, 80.0, 0.05)
+    record = command_record(Axis.YAW, time, np.full(time.size, side * sign * 0.3), speed=1.5)
+    wanted = float(simulate(model, record, state=(0.0, 0.0, 0.0)).rate[-1])
+    _, turn = turn_of(model, side)
+    assert np.sign(wanted) == side
+    assert turn.rate[0, 0] == pytest.approx(wanted, rel=1e-5)
+    assert turn.radius[0, 0] == pytest.approx(1.5 / abs(wanted), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_at_another_speed_the_rate_is_that_of_the_simulation_there(name):
+    model = model_of(name)
+    time = np.arange(0.0, 120.0, 0.05)
+    record = command_record(Axis.YAW, time, np.full(time.size, -0.3), speed=0.9)
+    wanted = float(simulate(model, record, state=(0.0, 0.0, 0.0)).rate[-1])
+    assert turn_of(model, 1.0, speed=0.9)[1].rate[0, 0] == pytest.approx(wanted, rel=1e-4)
+
+
+def test_the_loss_of_speed_satisfies_its_own_balance():
+    slowing = Slowing(*(np.array([[v]]) for v in (4.0, 0.5, 0.4, 0.2)))
+    _, turn = turn_of(model_of("all"), 1.0, slowing=slowing)
+    u, r = turn.surge[0, 0], turn.rate[0, 0]
+    assert u**2 * (1.0 + 0.5 * 0.09) + 4.0 * r**2 == pytest.approx(1.5**2, rel=1e-6)
+    assert turn.speed[0, 0] == pytest.approx(np.hypot(u, 0.4 * r))
+    assert u < 1.4
+
+
+def test_an_unstable_model_turns_steadily_only_where_its_drag_holds_it():
+    assert np.isnan(turn_of(model_of("plain", a22=-0.3), 1.0)[1].radius[0, 0])
+    held = turn_of(model_of("quadratic", a22=-0.3), 1.0)[1].rate[0, 0]
+    assert -0.3 * held + 3.0 * held**2 == pytest.approx(2.0 * 0.3 + 0.02, rel=1e-6)
+
+
+def test_crossflow_without_drift_is_quadratic_damping():
+    rate = np.array([-0.5, 0.2, 1.0])
+    assert crossflow(np.zeros(3), rate) == pytest.approx(rate * np.abs(rate), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["plain", "all"])
+def test_the_transient_ends_on_the_settled_circle(name):
+    slowing = Slowing(*(np.array([[v]]) for v in (3.0, 0.2, 0.3, 0.2)))
+    plant, turn = turn_of(model_of(name, C0=0.0), 1.0, slowing=slowing)
+    after = turn_transient(plant, slowing, np.array([1.5]), 1.0, 0.3)
+    assert after.time_90[0] < after.time_180[0]
+    assert after.tactical_diameter[0] > 1.8 * turn.radius[0, 0]
+    assert after.path_180[0] > np.pi * turn.radius[0, 0]
+    late = turn_transient(plant, slowing, np.array([1.5]), -1.0, 0.3)
+    assert late.tactical_diameter[0] == pytest.approx(after.tactical_diameter[0], rel=1e-6)
+
+
+def test_the_transient_of_a_first_order_model_agrees_with_its_closed_form():
+    plant, _ = turn_of(model_of("plain", C0=0.0), 1.0)
+    after = turn_transient(plant, no_slowing(1), np.array([1.5]), 1.0, 0.3)
+    rate, a, t = 2.0 * 0.3 / 1.5, 1.5, after.time_180[0]
+    assert rate * (t - (1.0 - np.exp(-a * t)) / a) == pytest.approx(np.pi, rel=1e-3)
+    assert after.path_180[0] == pytest.approx(1.5 * t, rel=1e-3)
+
+
+def surge_run(seed, speed=1.5, drag=0.2, loss=0.8, fin_loss=0.1, drift=0.4, noise=0.02):
+    rng, time = np.random.default_rng(seed), np.arange(0.0, 60.0, 0.05)
+    fin = np.where((time > 5) & (time < 60), 0.2 * np.sign(np.sin(0.5 * time)), 0.0)
+    rate = np.zeros(time.size)
+    surge = np.full(time.size, speed)
+    for i in range(time.size - 1):
+        rate[i + 1] = rate[i] + 0.05 * (-1.5 * rate[i] - 2.0 * fin[i])
+        slope = drag * (speed**2 - surge[i] ** 2) - loss * rate[i] ** 2 - fin_loss * surge[i] ** 2 * fin[i] ** 2
+        surge[i + 1] = surge[i] + 0.05 * slope
+    noisy = {
+        "surge_m_s": surge + noise * rng.standard_normal(time.size),
+        "sway_m_s": -drift * rate + noise * rng.standard_normal(time.size),
+        "yaw_rate_rad_s": rate + 0.003 * rng.standard_normal(time.size),
+        "rudder_rad": fin,
+    }
+    return Run(f"surge{seed}", time, noisy)
+
+
+def test_the_loss_of_speed_comes_back_from_measured_surge():
+    model = fit_surge([surge_run(1), surge_run(2, speed=1.1)])
+    slowing = draw_slowing(model, 0.3, 200, np.random.default_rng(0))
+    truth = np.sqrt(1.0 + 0.1 / 0.2 * 0.09 + 0.8 / 0.2 * 0.09)
+    factors = slowing.factor(np.full((200, 1), 0.3), np.full((200, 1), 0.3))
+    assert factors[0, 0] == pytest.approx(truth, rel=0.02)
+    low, high = np.percentile(factors, [1.0, 99.0])
+    assert low <= truth <= high
+    assert model.drift_per_rate == pytest.approx(0.4, rel=0.05)
+
+
+def test_without_surge_a_typical_loss_is_taken_and_spread_widely():
+    assert fit_surge([]) is None
+    slowing = draw_slowing(None, 0.3, 2000, np.random.default_rng(0))
+    factors = slowing.factor(np.full((2000, 1), 0.3), np.full((2000, 1), 0.3))
+    assert factors[0, 0] == pytest.approx(1.0 / 0.85, rel=1e-6)
+    low, high = np.percentile(1.0 - 1.0 / factors, [2.5, 97.5])
+    assert low < 0.06
+    assert high > 0.4
