@@ -13,8 +13,8 @@ PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
     "_version", "errors", "registry", "artifacts", "rounding", "strict", "templates", "logs", "vehicle", "maneuvers", "models",
-    "effects", "fitting", "estimators", "comparison", "planning", "diagnosis", "turning", "schedule", "exports", "figures",
-    "report", "demo", "cli", "__main__",
+    "effects", "fitting", "estimators", "comparison", "planning", "diagnosis", "extension", "turning", "schedule", "exports",
+    "figures", "report", "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""
 

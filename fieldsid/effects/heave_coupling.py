@@ -1,8 +1,9 @@
 """Heave takes part in pitch through the Munk moment: an extra state x, the pitch moment of the heave speed (rad/s^2).
 
     q' += x,   x' = -cross_damping s x - cross_rate s^2 q,   s = speed / reference speed
-From w' = -c11 w - c12 q + d1 delta and q' = -c21 w + ..., all of it lift, so c11, c12, c21 ~ u and d1 ~ u^2. The fin's own
-lift d1 cannot be seen in pitch: it is taken up by the other numbers (effects/sway_coupling.py). Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the paper's full form.
+From w' = -c11 w - c12 q + d1 delta and q' = -c21 w + ..., all of it lift, so c11, c12, c21 ~ u and d1 ~ u^2.
+The fin's own lift d1 cannot be seen in pitch: it is taken up by the other numbers (effects/sway_coupling.py).
+Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the paper's full form.
 """
 
 from __future__ import annotations

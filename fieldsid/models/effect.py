@@ -5,7 +5,7 @@ Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENS
     p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| - crossflow F(w, p)
          + heading_sin sin(angle) + heading_cos cos(angle) + righting_sin (angle - sin angle)
          + righting_cos (cos angle - 1) + x
-    x' = -cross_damping x - cross_rate p + cross_fin delta
+    x' = -cross_damping g x - cross_rate g^2 p + cross_fin delta
 with p the rate and x the cross state (sway or heave, scaled so that its moment is +x).
 """
 
@@ -74,13 +74,15 @@ class Terms:
     """Time-varying parts that depend on measured signals only, each a factor or an addition per sample (n,).
 
     `damping_factor` and `authority_factor` multiply a(t) and b(t); `moment` (rad/s^2) is added to m(t);
-    `damping` (1/s) is added to a(t) after the factor. None leaves the part as it is.
+    `damping` (1/s) is added to a(t) after the factor. `cross_factor` is g, the speed over the run's own in the cross
+    state's equation. None leaves the part as it is.
     """
 
     damping_factor: FloatArray | None = None
     authority_factor: FloatArray | None = None
     moment: FloatArray | None = None
     damping: FloatArray | None = None
+    cross_factor: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)

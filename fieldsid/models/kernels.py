@@ -2,9 +2,10 @@
 
     y' = p
     p' = -a p - k y + m(t) - Q p|p| - X F(w/L, p) + hs sin y + hc cos y + rs (y - sin y) + rc (cos y - 1) + x
-    x' = -e x - f p + q(t)
+    x' = -e g x - f g^2 p + q
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
-a and k are held over an interval; m, q and w run straight from its start to its end. The tangents are the
+a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
+start to its end. The tangents are the
 derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
 """
 
@@ -15,7 +16,7 @@ import numpy as np
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import jit
 
-DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_start", "cross_end", "flow_start", "flow_end")
+DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
 CONSTANTS = (
     "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
     "cross_damping", "cross_rate",
@@ -49,6 +50,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
+        e, f_cross, q = c[7] * drive[i, 4], c[8] * drive[i, 4] ** 2, drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -64,8 +66,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
                 if turning:
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
-                q = drive[i, 4] + (drive[i, 5] - drive[i, 4]) * part
-                ky, kp, kx = ps, f, -c[7] * xs - c[8] * ps + q
+                ky, kp, kx = ps, f, -e * xs - f_cross * ps + q
                 ty += weight[stage] * ky
                 tp += weight[stage] * kp
                 tx += weight[stage] * kx
@@ -116,6 +117,8 @@ def tangents(
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
+        fast = drive[i, 4]
+        damp, turn, q = c[7] * fast, c[8] * fast * fast, drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -142,28 +145,26 @@ def tangents(
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
                     by_y += c[3] * cos - c[4] * sin + c[5] * (1.0 - cos) - c[6] * sin
-                q = drive[i, 4] + (drive[i, 5] - drive[i, 4]) * part
                 for j in range(count):
                     dy = s[j, 0] + g * kt[j, 0]
                     dp = s[j, 1] + g * kt[j, 1]
                     dx = s[j, 2] + g * kt[j, 2]
                     e = by_y * dy + by_p * dp + dx
-                    z = -c[7] * dx - c[8] * dp
+                    z = -damp * dx - turn * dp
                     r = int(which[j])
                     if r >= 0:
                         d0, d1 = d_drive[r, i, 2], d_drive[r, i, 3]
                         e += d0 + (d1 - d0) * part - d_drive[r, i, 0] * ps - d_drive[r, i, 1] * ys
-                        d0, d1 = d_drive[r, i, 4], d_drive[r, i, 5]
-                        z += d0 + (d1 - d0) * part
+                        z += d_drive[r, i, 5] - d_drive[r, i, 4] * (c[7] * xs + 2.0 * fast * c[8] * ps)
                     if has_c[j]:
                         e -= d_c[j, 0] * drag + d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
                         e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * (ys - sin) + d_c[j, 6] * (cos - 1.0)
-                        z -= d_c[j, 7] * xs + d_c[j, 8] * ps
+                        z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps
                     kt[j, 0], kt[j, 1], kt[j, 2] = dp, e, z
                     acc[j, 0] += wt * dp
                     acc[j, 1] += wt * e
                     acc[j, 2] += wt * z
-                ky, kp, kx = ps, f, -c[7] * xs - c[8] * ps + q
+                ky, kp, kx = ps, f, -damp * xs - turn * ps + q
                 ty += wt * ky
                 tp += wt * kp
                 tx += wt * kx

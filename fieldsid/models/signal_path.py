@@ -58,6 +58,7 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
     authority_factor: FloatArray | None = None
     moment: FloatArray | None = None
     damping: FloatArray | None = None
+    cross_factor: FloatArray | None = None
     for effect in effects:
         if effect.terms is None:
             continue
@@ -66,7 +67,8 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
         authority_factor = _times(authority_factor, t.authority_factor)
         moment = _plus(moment, t.moment)
         damping = _plus(damping, t.damping)
-    return Terms(damping_factor, authority_factor, moment, damping)
+        cross_factor = _times(cross_factor, t.cross_factor)
+    return Terms(damping_factor, authority_factor, moment, damping, cross_factor)
 
 
 def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
@@ -88,9 +90,9 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     if terms.moment is not None:
         drive[:, 2] += terms.moment[:-1]
         drive[:, 3] += terms.moment[1:]
+    drive[:, 4] = 1.0 if terms.cross_factor is None else _held(terms.cross_factor)
     if core.cross_fin != 0.0:
-        drive[:, 4] = core.cross_fin * fin.start
-        drive[:, 5] = core.cross_fin * fin.end
+        drive[:, 5] = core.cross_fin * fin.mean
     if core.crossflow != 0.0:
         # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
         cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]

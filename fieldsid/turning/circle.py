@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 
 from fieldsid.errors import DataError
 from fieldsid.logs.run import FloatArray
+from fieldsid.turning.line import t_factor
 
 HUBER = 1.345
 MAD_TO_SD = 1.4826
@@ -40,7 +41,8 @@ class Circle:
     @property
     def interval95(self) -> tuple[float, float]:
         """The 95 % interval of the radius, m."""
-        return self.radius - 1.96 * self.radius_std_error, self.radius + 1.96 * self.radius_std_error
+        half = t_factor(round(self.effective_samples)) * self.radius_std_error
+        return self.radius - half, self.radius + half
 
     @property
     def residual_sd(self) -> float:
@@ -166,7 +168,11 @@ def _robust_sd(residual: FloatArray) -> float:
 
 
 def _effective(residual: FloatArray) -> float:
-    """Return the number of independent samples in correlated residuals (n,): n / (1 + 2 sum of the autocorrelation)."""
+    """Return the number of independent samples in correlated residuals (n,), the lesser of two estimates.
+
+    n / (1 + 2 sum of the autocorrelation), and that of an AR(1) whose coefficient is corrected for its bias (Kendall 1954):
+    the sum is cut where it is lost in noise, the AR(1) misses colour under white noise.
+    """
     centred = residual - residual.mean()
     power = float(centred @ centred)
     if power <= 0.0:
@@ -177,4 +183,7 @@ def _effective(residual: FloatArray) -> float:
         if rho < 2.0 / np.sqrt(residual.size):
             break
         total += 2.0 * rho
-    return max(residual.size / total, 2.0)
+    size = residual.size
+    rho = float(centred[1:] @ centred[:-1]) / power
+    rho = min(max(rho + (1.0 + 4.0 * rho) / size, 0.0), 0.995)
+    return max(min(size / total, size * (1.0 - rho) / (1.0 + rho)), 2.0)

@@ -15,7 +15,7 @@ FOLDER = Path(__file__).with_suffix("")
 ROWS = (
     Row(1.0, Gains(-0.8722, -0.01, 0.0), -0.013871, 0.0, 0.26, 0.0, supported=True, slowed=0.82, phase_margin_deg=64.5,
         gain_margin_db=18.1, delay_margin_s=1.41),
-    Row(1.5, Gains(-0.4904, -0.005, -0.0000012), 0.0, 0.0, 0.26, 0.0, supported=False, slowed=1.0, phase_margin_deg=65.5,
+    Row(1.5, Gains(-0.4904, -0.005, -0.0012), 0.0, 0.0, 0.26, 0.0, supported=False, slowed=1.0, phase_margin_deg=65.5,
         gain_margin_db=float("inf"), delay_margin_s=2.26),
 )  # fmt: skip
 PROVENANCE = {

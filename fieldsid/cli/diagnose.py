@@ -1,0 +1,206 @@
+"""sysid diagnose: which physical effect is missing, how sure, what else it could be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.options import AxisOption, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.diagnosis import Diagnosis
+    from fieldsid.models.axis import Axis
+    from fieldsid.models.model import Model
+
+MOST_PLACES = 5
+
+KnownModel = Annotated[
+    Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
+]
+FigureFile = Annotated[Path | None, typer.Option("--figure", metavar="PNG", help="Draw the candidates.", show_default=False)]
+
+
+def command(
+    runs: RunFiles,
+    axis: AxisOption,
+    validate: ValidateRuns = None,
+    model: KnownModel = None,
+    mapping: MappingFile = None,
+    output: OutputFile = None,
+    figure: FigureFile = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Say which physical effect the model is missing, how sure that is, and what else it could be.
+
+    Every effect of the catalogue, and every one in `effects/*.yaml`, is added to a model fitted to all runs together and judged by
+    its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis is kept for
+    `sysid plan --from FILE`.
+
+    Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
+    """
+    from fieldsid.cli.inputs import files_of, read_runs
+    from fieldsid.cli.patience import refuse_existing, trying
+    from fieldsid.diagnosis import diagnose
+
+    refuse_existing(output, figure, force=force)
+    known = _known(model, axis)
+    logs = read_runs([*runs, *(validate or [])], mapping=mapping)
+    training, unseen = logs[: len(runs)], logs[len(runs) :]
+    with trying("diagnosing") as report:
+        found = diagnose(training, axis, unseen, known=known.effects if known else (), report=report)
+    inputs = [*files_of(logs), *([model] if model else [])]
+    body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model)
+    body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, force=force)}
+    if not as_json:
+        warn(found.notes)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, found, body))
+
+
+def _known(path: Path | None, axis: Axis) -> Model | None:
+    if path is None:
+        return None
+    from fieldsid.models.model import load_model
+
+    model = load_model(path)
+    if model.axis is not axis:
+        raise UsageError(
+            f"`{path}` is a {model.axis.value} model", found=f"--axis {axis.value}", hint=f"write `--axis {model.axis.value}`"
+        )
+    return model
+
+
+def _body(
+    found: Diagnosis, runs: Sequence[str], unseen: Sequence[str], known: Model | None, path: Path | None
+) -> dict[str, Any]:
+    from fieldsid.diagnosis import body_of
+
+    return {
+        "schema": "fieldsid/diagnose/1",
+        **body_of(found),
+        "runs": list(runs),
+        "validation_runs": list(unseen),
+        "model": None if path is None else str(path),
+        "known": [] if known is None else list(known.effects),
+    }
+
+
+def _saved(body: Mapping[str, Any], path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
+    if path is None:
+        return None
+    from fieldsid.artifacts import save_record
+
+    kept = {k: v for k, v in body.items() if k != "schema"}
+    return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
+
+
+def _drawn(found: Diagnosis, path: Path | None, *, force: bool) -> str | None:
+    if path is None:
+        return None
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.diagnose import figure
+
+    return str(save(figure(found), path, force=force))
+
+
+def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    to.print(Text(f"{found.verdict}: {found.says}", style="bold"))
+    to.print()
+    to.print(_candidates(found))
+    floor = found.noise_floor
+    to.print(Text(f"x floor: the error over the noise, {_floor(floor.angle, 'rad')} and {_floor(floor.rate, 'rad/s')}"))
+    _render_words(to, found)
+    _render_where(to, found)
+    _render_skipped(to, found.skipped)
+    _render_next(to, found, body)
+    for key in ("file", "figure"):
+        if body[key]:
+            to.print(f"{key}: {body[key]}", soft_wrap=True)
+
+
+def _candidates(found: Diagnosis) -> Any:
+    floor = found.noise_floor
+    judged = found.base.validation.over(floor)
+    rows = [("as it is", "", _times(found.base.train.over(floor)), _times(judged), "", "")]
+    rows += [
+        (
+            f"+ {c.effect}",
+            _probability(c.probability),
+            _times(c.errors.train.over(floor)),
+            _times(c.errors.validation.over(floor)),
+            f"{100 * c.explained:.0f} %",
+            f"{c.score:+.0f}",
+        )
+        for c in found.candidates
+    ]
+    return table("", ("effect", "probability", "x floor, fitted", "unseen", "explained", "evidence"), rows)
+
+
+def _render_words(to: Console, found: Diagnosis) -> None:
+    """Say the evidence for the first candidate, and what it may be confused with."""
+    from rich.text import Text
+
+    for c in found.candidates[:1]:
+        alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
+        to.print()
+        to.print(Text(f"{c.effect}: {c.evidence}{alike}"))
+
+
+def _render_where(to: Console, found: Diagnosis) -> None:
+    rows = [
+        (p.condition, f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
+        for p in found.where[:MOST_PLACES]
+    ]
+    to.print()
+    to.print(table("where the model as it is fails", ("", "of error", "rms ratio", "worst, s"), rows))
+
+
+def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
+    from rich.text import Text
+
+    if not skipped:
+        return
+    why: dict[str, list[str]] = {}
+    for name, reason in skipped.items():
+        why.setdefault(reason, []).append(name)
+    to.print()
+    for reason, names in why.items():
+        to.print(Text(f"not tried: {', '.join(names)}: {reason}"))
+
+
+def _render_next(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    fly = found.next_maneuver
+    if fly:
+        to.print()
+        command = f": `{fly['command']}`" if "command" in fly else ""
+        to.print(Text(f"next: {fly['maneuver']}, {fly['why']}{command}"))
+    if found.effects:
+        unseen = " --validate RUN" if body["validation_runs"] else ""
+        model = body["model"] or "MODEL"
+        adds = " ".join(f"--add {n}" for n in found.effects)
+        messages().print(Text(f"add it: `sysid extend {model} RUN... {adds}{unseen}`"), soft_wrap=True)
+
+
+def _probability(p: float) -> str:
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2f}" if ratio == ratio else "-"  # noqa: PLR0124 - NaN is not itself
+
+
+def _floor(value: float, unit: str) -> str:
+    from fieldsid.rounding import number
+
+    return f"{number(value, 2)} {unit}"

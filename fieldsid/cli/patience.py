@@ -1,0 +1,30 @@
+"""What a command that takes seconds does for who waits: refuse an output that exists at once, show what is being tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fieldsid.cli.console import messages
+from fieldsid.errors import ArtifactError
+
+
+def refuse_existing(*paths: Path | None, force: bool) -> None:
+    """Refuse outputs that exist before the work is done and not after it; raises ArtifactError."""
+    for path in paths:
+        if path is not None and path.exists() and not force:
+            raise ArtifactError(
+                f"`{path}` exists", found=f"{path.stat().st_size} bytes", hint="add `--force`, or name another output"
+            )
+
+
+@contextmanager
+def trying(says: str) -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows what is being tried, on stderr and only on a terminal."""
+    console = messages()
+    if not console.is_terminal:
+        yield lambda _text: None
+        return
+    with console.status(says) as status:
+        yield lambda text: status.update(f"{says}: {text}")

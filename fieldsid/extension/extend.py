@@ -1,0 +1,140 @@
+"""A model with some effects more: everything refitted together, and judged on runs that were not fitted.
+
+Before and after are found by the one search that `diagnose` uses, with the same start values, noise models and runs,
+so that the difference between them is the addition and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from fieldsid.diagnosis.diagnose import shown_floor
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.search import MATTERS, WORTH, Search, search, usable
+from fieldsid.diagnosis.split import held_back
+from fieldsid.effects import pick_effect
+from fieldsid.errors import DataError, UsageError
+from fieldsid.extension.refitted import refitted_model
+from fieldsid.fitting.fit import check
+from fieldsid.logs.run import Note, Run
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record, record_of
+
+WIDTH = 2
+"""Orders in which several effects are added that are followed from one addition to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """What an addition changed: errors before and after over one noise floor, on named runs.
+
+    `unseen` tells whether there were data to judge by that were not fitted.
+    """
+
+    added: tuple[str, ...]
+    before: Pair
+    after: Pair
+    noise_floor: Noise
+    unseen: bool
+    learned_on: tuple[str, ...]
+    judged_on: tuple[str, ...]
+
+    @property
+    def over_floor(self) -> tuple[float, float]:
+        """The error before and after over the noise floor, on unseen data where there are any."""
+        before, after = (p.validation if self.unseen else p.train for p in (self.before, self.after))
+        return before.over(self.noise_floor), after.over(self.noise_floor)
+
+
+@dataclass(frozen=True, slots=True)
+class Extension:
+    """The extended model, what the addition changed, and its gain in log evidence."""
+
+    model: Model
+    gain: Gain
+    evidence: float
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def pays(self) -> bool:
+        """Whether the error falls by more than a trifle; where all data were fitted the evidence must pay as well."""
+        before, after = self.gain.over_floor
+        return after < MATTERS * before and (self.gain.unseen or self.evidence > WORTH)
+
+
+def extend(
+    parent: Model,
+    add: Sequence[str],
+    training: Sequence[Run],
+    validation: Sequence[Run] = (),
+    *,
+    report: Callable[[str], None] = lambda _text: None,
+) -> Extension:
+    """Return a model with effects added by name, base and all effects refitted to the training runs together.
+
+    Without validation runs a part of the training runs is held back to judge by. report is told what is being tried.
+    Raises UsageError for an effect that is unknown, of the other axis or in the model already, DataError for runs that
+    cannot be used or lack a signal the effects need, EffectError for a user's effect that fails.
+    """
+    new = _new_effects(parent, add)
+    parts = (*(pick_effect(n) for n in parent.effects), *new)
+    records = [record_of(r, parent.axis) for r in training]
+    unseen = tuple(record_of(r, parent.axis) for r in validation)
+    check([*records, *unseen], parent.axis)
+    learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
+    _refuse_missing_signals(parts, [*learned, *judged])
+    work = search(learned, judged, parent.axis, parts, known=parent.effects, report=report)
+    before, after = work.base(), _with_all(work)
+    gain = Gain(
+        added=tuple(e.name for e in new),
+        before=before.errors,
+        after=after.errors,
+        noise_floor=shown_floor(work.floor, after.judged.noise),
+        unseen=bool(judged),
+        learned_on=tuple(r.name for r in learned),
+        judged_on=tuple(r.name for r in (judged or learned)),
+    )
+    return Extension(refitted_model(after), gain, after.score - before.score, notes)
+
+
+def _with_all(work: Search) -> Hypothesis:
+    """Return the hypothesis of all effects of the search's catalogue, grown one effect at a time."""
+    front = [work.base()]
+    for _ in range(len(work.catalogue) - len(work.known)):
+        children = {frozenset(c.names): c for parent in front for c in work.grow(parent)}
+        front = sorted(children.values(), key=lambda h: -h.score)[:WIDTH]
+    return front[0]
+
+
+def _new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
+    names = tuple(dict.fromkeys(add))
+    if not names:
+        raise UsageError("there is no effect to add", hint="name one: `--add servo_lag`; `sysid diagnose` says which is missing")
+    effects = tuple(pick_effect(n) for n in names)
+    for effect in effects:
+        if effect.name in parent.effects:
+            raise UsageError(
+                f"effect `{effect.name}` is in the model already",
+                found=", ".join(parent.effects),
+                hint="refit the model as it is: `sysid identify RUN... --effects " + ",".join(parent.effects) + "`",
+            )
+        if parent.axis not in effect.axes:
+            raise UsageError(
+                f"effect `{effect.name}` does not act on the {parent.axis.value} axis",
+                found=", ".join(a.value for a in effect.axes),
+                hint=f"see `sysid effects list --axis {parent.axis.value}`",
+            )
+    return effects
+
+
+def _refuse_missing_signals(parts: Sequence[Effect], records: Sequence[Record]) -> None:
+    _, skipped = usable(parts, records)
+    for name, why in skipped.items():
+        raise DataError(
+            f"effect `{name}` {why}",
+            found=", ".join(f"{r.name} has {', '.join(sorted(r.signals)) or 'none'}" for r in records),
+            hint="map the signal on import: `sysid inspect LOG`, or leave the effect out",
+        )

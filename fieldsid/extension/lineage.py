@@ -1,0 +1,181 @@
+"""Where an extended model comes from: its parents with the error before and after each addition, their hashes checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fieldsid.artifacts import load_record, sha256_of
+from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.errors import ArtifactError
+from fieldsid.extension.extend import Extension, Gain
+from fieldsid.logs.run import Run
+from fieldsid.models.model import KIND, Noise, load_model, save_model
+
+INTACT, CHANGED, MISSING = "intact", "changed", "missing"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One addition: what it changed, why it was kept, and the logs that are no longer what it was made from."""
+
+    gain: Gain
+    kept_by: str
+    changed_data: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Parent:
+    """The file a model was made from: where it is now, and whether it is still as it was (`intact`, `changed`, `missing`)."""
+
+    path: Path
+    sha256: str
+    state: str
+
+
+@dataclass(frozen=True, slots=True)
+class Generation:
+    """One model of a line: its file, its effects, whether the file is as its child knew it, and how it came about."""
+
+    path: Path
+    effects: tuple[str, ...]
+    state: str
+    step: Step | None
+
+
+def errors_body(pair: Pair) -> dict[str, dict[str, float]]:
+    """Return errors as the JSON contract has them."""
+    return {
+        side: {"angle_rms_rad": e.angle_rms_rad, "rate_rms_rad_s": e.rate_rms_rad_s}
+        for side, e in (("train", pair.train), ("validation", pair.validation))
+    }
+
+
+def gain_body(gain: Gain) -> dict[str, Any]:
+    """Return a gain as it is written and printed; `_step` reads it back."""
+    before, after = gain.over_floor
+    return {
+        "added": list(gain.added),
+        "before": errors_body(gain.before),
+        "after": errors_body(gain.after),
+        "noise_floor": {"angle_rad": gain.noise_floor.angle, "rate_rad_s": gain.noise_floor.rate},
+        "over_floor": {"before": before, "after": after},
+        "unseen": gain.unseen,
+        "learned_on": list(gain.learned_on),
+        "judged_on": list(gain.judged_on),
+    }
+
+
+def kept_by(extension: Extension) -> str:
+    """Return why an extension is kept: by what it brings, or because the user says so."""
+    if not extension.pays:
+        return "--keep"
+    return "error on unseen data" if extension.gain.unseen else "evidence"
+
+
+def save_extension(
+    extension: Extension,
+    path: Path,
+    *,
+    parent: Path,
+    training: Sequence[Run] = (),
+    validation: Sequence[Run] = (),
+    force: bool = False,
+) -> Path:
+    """Write the extended model with its parent, errors before and after, and the hashes of the data; raises ArtifactError."""
+    roles = [("training", r) for r in training] + [("validation", r) for r in validation]
+    files = [(role, r.name, r.source) for role, r in roles if r.source is not None and r.source.exists()]
+    body = {
+        **gain_body(extension.gain),
+        "log_evidence": extension.evidence,
+        "kept_by": kept_by(extension),
+        "data": [{"run": n, "role": role, "path": str(p), "sha256": sha256_of(p)} for role, n, p in files],
+    }
+    model = replace(extension.model, info={**extension.model.info, "extension": body})
+    return save_model(model, path, inputs=[p for _, _, p in files], parent=parent, force=force)
+
+
+def parent_of(path: Path) -> Parent | None:
+    """Return the parent a model file names, None where it names none; raises ArtifactError.
+
+    The parent is looked for where the file says, and beside the file itself: a folder may have been moved.
+    """
+    named = load_record(path, KIND).get("parent")
+    if named is None:
+        return None
+    try:
+        said, digest = Path(str(named["path"])), str(named["sha256"])
+    except (KeyError, TypeError) as error:
+        raise ArtifactError(f"`{path}` names its parent badly", found=repr(named)[:80], hint="extend the parent again") from error
+    places = [p for p in (said, path.parent / said.name) if p.is_file()]
+    for place in places:
+        if sha256_of(place) == digest:
+            return Parent(place, digest, INTACT)
+    return Parent(places[0], digest, CHANGED) if places else Parent(said, digest, MISSING)
+
+
+def history_of(path: Path) -> tuple[Generation, ...]:
+    """Return the line of a model from its oldest known ancestor on; raises ArtifactError where a file cannot be read.
+
+    A parent that is missing ends the line: what its child knows of it is all that is said.
+    """
+    line: list[Generation] = []
+    place, state = path, INTACT
+    while True:
+        model = load_model(place)
+        step = _step(place, model.info.get("extension"))
+        line.append(Generation(place, model.effects, state, step))
+        parent = parent_of(place)
+        if parent is None:
+            break
+        if parent.state == MISSING:
+            before = tuple(e for e in model.effects if step is None or e not in step.gain.added)
+            line.append(Generation(parent.path, before, MISSING, None))
+            break
+        if parent.path.resolve() in {g.path.resolve() for g in line}:
+            raise ArtifactError(f"`{place}` descends from itself", found=str(parent.path), hint="extend the oldest model again")
+        place, state = parent.path, parent.state
+    return tuple(reversed(line))
+
+
+def _step(path: Path, body: Any) -> Step | None:
+    if body is None:
+        return None
+    try:
+        changed = (str(d["path"]) for d in body["data"] if _differs(Path(str(d["path"])), str(d["sha256"])))
+        return Step(_gain(body), str(body["kept_by"]), tuple(changed))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError(
+            f"`{path}` does not say completely how it was extended",
+            found=f"{type(error).__name__}: {error}",
+            hint="extend its parent again, with `--force`",
+        ) from error
+
+
+def _gain(body: Mapping[str, Any]) -> Gain:
+    floor = body["noise_floor"]
+    return Gain(
+        added=tuple(str(n) for n in body["added"]),
+        before=_pair(body["before"]),
+        after=_pair(body["after"]),
+        noise_floor=Noise(_number(floor["angle_rad"]), _number(floor["rate_rad_s"])),
+        unseen=bool(body["unseen"]),
+        learned_on=tuple(str(n) for n in body["learned_on"]),
+        judged_on=tuple(str(n) for n in body["judged_on"]),
+    )
+
+
+def _differs(path: Path, digest: str) -> bool:
+    return path.exists() and sha256_of(path) != digest
+
+
+def _pair(body: Mapping[str, Any]) -> Pair:
+    sides = (body["train"], body["validation"])
+    train, validation = (Errors(_number(s["angle_rms_rad"]), _number(s["rate_rms_rad_s"])) for s in sides)
+    return Pair(train, validation)
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)

@@ -1,0 +1,36 @@
+"""The model of a hypothesis as it is written to a file: the values its free run was judged by, with their covariance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.diagnosis.diagnose import named_model
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.trial import white_weights
+from fieldsid.estimators.output_error import coloured_covariance
+from fieldsid.fitting.descent import descend
+from fieldsid.fitting.fit import model_of
+from fieldsid.fitting.method import Solution, shared_covariance
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.predict import refit_own
+from fieldsid.models.model import Model
+
+
+def refitted_model(h: Hypothesis) -> Model:
+    """Return the model whose errors the hypothesis reports.
+
+    That is the generalised least-squares one, or, where plain output error predicted unseen runs better, that one, with the
+    covariance it has under the hypothesis's own noise.
+    """
+    trial, noise = h.judged.trial, h.judged.noise
+    problem, layout = trial.problem, trial.problem.layout
+    x = trial.x.copy()
+    x[: layout.shared] = [h.model.values[n] for n in layout.names]
+    if np.array_equal(x, trial.x):
+        return named_model(h)
+    for run, record in enumerate(problem.records):
+        x = refit_own(problem, x, run, floor_of([record]))
+    weights = white_weights(problem, x)
+    found = descend(problem, x, weights, rounds=0)
+    full = coloured_covariance(problem, found, weights, noise)
+    return model_of(problem, Solution(found.x, shared_covariance(problem, full, found.free), noise, "output_error"))

@@ -1,0 +1,82 @@
+"""The figure of a diagnosis: what each candidate takes away of the error and how probable it is, and where the model fails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from textwrap import fill
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fieldsid.diagnosis import Diagnosis
+from fieldsid.figures import canvas, where
+
+MOST_BARS = 10
+TITLE_WIDTH = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """One candidate: its words, its error over the noise floor on fitted and on unseen runs, its probability, if it is named."""
+
+    effect: str
+    fitted: float
+    unseen: float
+    probability: float | None
+    named: bool
+
+
+def figure(found: Diagnosis) -> Figure:
+    """Return a sheet with the candidates at the left and where the model fails at the right."""
+    sheet = canvas.sheet(13.0, 6.4)
+    left, right = sheet.subplots(1, 2, width_ratios=(1.25, 1.0))
+    sheet.suptitle(fill(f"{found.axis.value}, {found.verdict}: {found.says}", TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
+    draw(bars_of(found), left)
+    where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in found.where[:MOST_BARS]], right)
+    right.set_title("where the model as it is fails\n(label: rms there over the whole run's)", loc="left", fontsize=10)
+    return sheet
+
+
+def bars_of(found: Diagnosis) -> list[Bar]:
+    """Return the bars of a diagnosis: the model as it is, then the candidates in their order."""
+    floor = found.noise_floor
+    base = Bar("model as it is", found.base.train.over(floor), found.base.validation.over(floor), None, named=False)
+    named = "+".join(found.effects)
+    return [
+        base,
+        *(
+            Bar(
+                f"+ {c.effect}",
+                c.errors.train.over(floor),
+                c.errors.validation.over(floor),
+                c.probability,
+                named=bool(named) and c.effect == named,
+            )
+            for c in found.candidates
+        ),
+    ]
+
+
+def draw(bars: list[Bar], ax: Axes) -> None:
+    """Draw the error over the noise floor of each candidate: bars for unseen runs, rings for fitted ones, the floor at 1."""
+    canvas.dress(ax, x="free-run error over the noise floor")
+    rows = list(range(len(bars)))[::-1]
+    unseen = [b.unseen if b.unseen == b.unseen else b.fitted for b in bars]  # noqa: PLR0124 - NaN is not itself
+    colours = [canvas.SIMULATED if b.named else canvas.QUIET for b in bars]
+    ax.barh(rows, unseen, color=colours, height=0.62, label="unseen runs")
+    ax.plot([b.fitted for b in bars], rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
+    ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
+    for row, b, value in zip(rows, bars, unseen, strict=True):
+        chance = "" if b.probability is None else f", p = {_chance(b.probability)}"
+        place = max(value, b.fitted)
+        ax.annotate(
+            f"{value:.2f} x{chance}", (place, row), xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5
+        )
+    ax.set_yticks(rows, [fill(b.effect.replace("+", " + "), 34).replace(" + ", "+").removeprefix("+ ") for b in bars], fontsize=9)
+    ax.set_xlim(0.0, 1.32 * max(*unseen, *(b.fitted for b in bars), 1.0))
+    ax.grid(visible=False, axis="y")
+    canvas.legend_above(ax, 3)
+
+
+def _chance(p: float) -> str:
+    return f"{p:.2f}" if p >= 0.005 else "< 0.01"
