@@ -69,7 +69,12 @@ def orders(day: Day, candidate: Candidate, window: Window) -> TruthManeuver:
     limits = Limits(day.physics.fin_limit)
     schedule = Schedule(window.rate_hz, window.lead, window.recover)
     flight = fly_scenes(
-        [scene], candidate.record, candidate.parameters, limits=limits, autopilot=autopilot_of(scene.base, limits), schedule=schedule
+        [scene],
+        candidate.record,
+        candidate.parameters,
+        limits=limits,
+        autopilot=autopilot_of(scene.base, limits),
+        schedule=schedule,
     )
     time = window.time
     inside = (time >= flight.excitation[0] - 1e-9) & (time < flight.excitation[1] - 1e-9)

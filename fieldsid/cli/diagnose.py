@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 MOST_PLACES = 5
+NAME_WIDTH = 30
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
@@ -77,9 +79,7 @@ def _known(path: Path | None, axis: Axis) -> Model | None:
     return model
 
 
-def _body(
-    found: Diagnosis, runs: Sequence[str], unseen: Sequence[str], known: Model | None, path: Path | None
-) -> dict[str, Any]:
+def _body(found: Diagnosis, runs: Sequence[str], unseen: Sequence[str], known: Model | None, path: Path | None) -> dict[str, Any]:
     from fieldsid.diagnosis import body_of
 
     return {
@@ -113,11 +113,16 @@ def _drawn(found: Diagnosis, path: Path | None, *, force: bool) -> str | None:
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
+    from fieldsid.rounding import number
+
     to.print(Text(f"{found.verdict}: {found.says}", style="bold"))
     to.print()
     to.print(_candidates(found))
     floor = found.noise_floor
-    to.print(Text(f"x floor: the error over the noise, {_floor(floor.angle, 'rad')} and {_floor(floor.rate, 'rad/s')}"))
+    noise = f"{number(floor.angle, 2)} rad and {number(floor.rate, 2)} rad/s"
+    to.print(
+        Text(f"fitted, unseen: free-run error of those runs over the noise floor, {noise}; evidence: log, over the first row")
+    )
     _render_words(to, found)
     _render_where(to, found)
     _render_skipped(to, found.skipped)
@@ -133,7 +138,7 @@ def _candidates(found: Diagnosis) -> Any:
     rows = [("as it is", "", _times(found.base.train.over(floor)), _times(judged), "", "")]
     rows += [
         (
-            f"+ {c.effect}",
+            fill(c.effect.replace("+", " +"), NAME_WIDTH),
             _probability(c.probability),
             _times(c.errors.train.over(floor)),
             _times(c.errors.validation.over(floor)),
@@ -142,7 +147,7 @@ def _candidates(found: Diagnosis) -> Any:
         )
         for c in found.candidates
     ]
-    return table("", ("effect", "probability", "x floor, fitted", "unseen", "explained", "evidence"), rows)
+    return table("", ("effect", "prob.", "fitted", "unseen", "explained", "evidence"), rows)
 
 
 def _render_words(to: Console, found: Diagnosis) -> None:
@@ -198,9 +203,3 @@ def _probability(p: float) -> str:
 
 def _times(ratio: float) -> str:
     return f"{ratio:.2f}" if ratio == ratio else "-"  # noqa: PLR0124 - NaN is not itself
-
-
-def _floor(value: float, unit: str) -> str:
-    from fieldsid.rounding import number
-
-    return f"{number(value, 2)} {unit}"

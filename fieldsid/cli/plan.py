@@ -44,7 +44,10 @@ WindowS = Annotated[float, typer.Option("--window", metavar="S", help="Length of
 RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight run before it.")]
 RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.")]
 Radius = Annotated[bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.")]
-Separate = Annotated[Text, _option("--separate", "A,B", "The maneuver that tells these effects apart; `none` is the plain model.")]
+OpenLoop = Annotated[bool, typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.")]
+Separate = Annotated[
+    Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.")
+]
 FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.")]
 Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.")]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.")]
@@ -71,6 +74,7 @@ def command(
     run_up: RunUpS = 10.0,
     rate: RateHz = 20.0,
     radius: Radius = False,
+    open_loop: OpenLoop = False,
     separate: Separate = None,
     diagnosis: FromDiagnosis = None,
     write: Write = None,
@@ -93,7 +97,7 @@ def command(
     limiting = Limiting(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
     asked = Asked(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
-        names_of(separate), diagnosis, seed,
+        names_of(separate), diagnosis, seed, open_loop,
     )  # fmt: skip
     with progress("planning", asked.legs) as step:
         made = planned(asked, step)
@@ -146,7 +150,9 @@ def _render(to: Console, plan: Plan, body: Mapping[str, Any]) -> None:
         for leg in plan.legs for name, e in leg.expected.items()
     ]  # fmt: skip
     to.print(table("what it buys", ("speed", "parameter", "expected", "error", "at worst", "pulses need"), errors, left=2))
-    to.print(f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}")
+    to.print(
+        f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}"
+    )
     for line in body.get("says", ()):
         to.print(line)
 

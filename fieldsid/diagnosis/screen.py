@@ -74,23 +74,20 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
 
 def promise_of(ground: Ground, effect: Effect) -> Promise:
     """Return the best scan point of an effect over its shared grid, its per-run grids chosen run by run."""
-    best: Promise | None = None
+    promises = []
     for values in shared_points(ground, effect):
         problem, x = grown(ground.parent, effect, values)
         for c in effect.nuisance:
             x = _best_per_run(ground, problem, x, effect, c)
         cost, start = _first_order(ground, problem, x, effect)
-        if best is None or cost < best.cost:
-            best = Promise(effect, cost, problem, start)
-    if best is None:
-        raise AssertionError(effect.name)
-    return best
+        promises.append(Promise(effect, cost, problem, start))
+    return min(promises, key=lambda p: p.cost)
 
 
 def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
     """Return the starts of an effect's shared coefficients: what it suggests itself, else the points of its grids."""
-    if effect.suggest is not None:
-        return effect.suggest(ground.parent.problem.records, ground.residuals)
+    if effect.suggest is not None and (suggested := effect.suggest(ground.parent.problem.records, ground.residuals)):
+        return suggested
     grids = [c.scan or (c.start,) for c in effect.shared]
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MOST_POINTS)

@@ -1,8 +1,7 @@
-"""Speed changes within the run: authority goes as f^2, damping as f^p, the cross state as f; f = (u/u_run)^speed_share.
+"""Speed changes within the run: authority goes as f^2, damping and cross state as f, f = (u/u_run)^speed_share.
 
-u is the smoothed surge, u_run its median over the run, where the run's parameters hold; s = 1 is lift theory (fin
-force ~ u^2, linear damping ~ u), s = 0 no dependence. p is the exponent the damping has between runs of different
-speed, 1 where a single speed was flown. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
+u is the smoothed surge, u_run its median over the run, where the run's parameters hold; 1 is lift theory (fin
+force ~ u^2, linear damping ~ u), 0 no dependence. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
 """
 
 from __future__ import annotations
@@ -28,8 +27,7 @@ def terms(values: Values, record: Record) -> Terms:
             hint="leave `speed_varying` out, or check the sign of the surge speed on import",
         )
     factor = np.maximum(surge / record.speed, SLOWEST) ** values["speed_share"]
-    exponent = values.get("damping_exponent", 1.0)
-    return Terms(damping_factor=factor**exponent, authority_factor=factor * factor, cross_factor=factor)
+    return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
 
 
 EFFECT = Effect(
@@ -37,7 +35,7 @@ EFFECT = Effect(
     says="the speed changes within the run, and the fin's authority and the damping with it",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW, Axis.PITCH),
-    equation="b(t) = b * (u/u_run)^(2 * speed_share), a(t) = a * (u/u_run)^(p * speed_share)",
+    equation="b(t) = b * (u/u_run)^(2 * speed_share), a(t) = a * (u/u_run)^speed_share",
     coefficients=(
         Coefficient("speed_share", "1", 0.0, 1.5, 1.0, step=1e-3, says="1 is lift theory, b ~ u^2 and a ~ u; 0 is no change"),
     ),

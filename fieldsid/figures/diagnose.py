@@ -12,7 +12,8 @@ from fieldsid.diagnosis import Diagnosis
 from fieldsid.figures import canvas, where
 
 MOST_BARS = 10
-TITLE_WIDTH = 120
+TITLE_WIDTH = 150
+LABEL_WIDTH = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ def bars_of(found: Diagnosis) -> list[Bar]:
         base,
         *(
             Bar(
-                f"+ {c.effect}",
+                c.effect,
                 c.errors.train.over(floor),
                 c.errors.validation.over(floor),
                 c.probability,
@@ -64,19 +65,19 @@ def draw(bars: list[Bar], ax: Axes) -> None:
     unseen = [b.unseen if b.unseen == b.unseen else b.fitted for b in bars]  # noqa: PLR0124 - NaN is not itself
     colours = [canvas.SIMULATED if b.named else canvas.QUIET for b in bars]
     ax.barh(rows, unseen, color=colours, height=0.62, label="unseen runs")
-    ax.plot([b.fitted for b in bars], rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
+    ax.plot(
+        [b.fitted for b in bars], rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs"
+    )
     ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
     for row, b, value in zip(rows, bars, unseen, strict=True):
-        chance = "" if b.probability is None else f", p = {_chance(b.probability)}"
+        chance = "" if b.probability is None else f", p {_chance(b.probability)}"
         place = max(value, b.fitted)
-        ax.annotate(
-            f"{value:.2f} x{chance}", (place, row), xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5
-        )
-    ax.set_yticks(rows, [fill(b.effect.replace("+", " + "), 34).replace(" + ", "+").removeprefix("+ ") for b in bars], fontsize=9)
+        ax.annotate(f"{value:.2f} x{chance}", (place, row), xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
+    ax.set_yticks(rows, [fill(b.effect.replace("+", " +"), LABEL_WIDTH) for b in bars], fontsize=9)
     ax.set_xlim(0.0, 1.32 * max(*unseen, *(b.fitted for b in bars), 1.0))
     ax.grid(visible=False, axis="y")
     canvas.legend_above(ax, 3)
 
 
 def _chance(p: float) -> str:
-    return f"{p:.2f}" if p >= 0.005 else "< 0.01"
+    return f"= {p:.2f}" if p >= 0.005 else "< 0.01"

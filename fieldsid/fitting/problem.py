@@ -13,7 +13,7 @@ from fieldsid.models import kernels
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Coefficient, Motion
 from fieldsid.models.record import Record
-from fieldsid.models.signal_path import Assembled, Base, assemble, combined_terms, lift, measured, run_core, with_moments
+from fieldsid.models.signal_path import Assembled, Base, assemble, lift, measured, run_core, with_moments
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ class _Pushes:
         if name == names.damping:
             return self._damping(share**exponent), none
         if name == "damping_exponent":
-            return self._exponent(share), none
+            return self._damping(self.base.damping * float(np.log(share))), none
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return self._authority(ratio**2), none
         d = np.zeros_like(self.arrays.drive)
@@ -184,20 +184,6 @@ class _Pushes:
         d = np.zeros_like(self.arrays.drive)
         shape = self.arrays.terms.damping_factor
         d[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1] + shape[1:])
-        return d
-
-    def _exponent(self, share: float) -> FloatArray:
-        """Derivative by the damping exponent: between runs by its logarithm, within a run through the effects' factors."""
-        d = self._damping(self.base.damping * float(np.log(share)))
-        if self.arrays.terms.damping_factor is not None:
-            step = 1e-4
-            ends = [
-                combined_terms(self.record, self.problem.layout.effects, self.values | {"damping_exponent": e}).damping_factor
-                for e in (self.values.get("damping_exponent", 1.0) + step, self.values.get("damping_exponent", 1.0) - step)
-            ]
-            if ends[0] is not None and ends[1] is not None:
-                slope = (ends[0] - ends[1]) / (2 * step)
-                d[:, 0] += self.base.damping * 0.5 * (slope[:-1] + slope[1:])
         return d
 
     def _authority(self, factor: float) -> FloatArray:

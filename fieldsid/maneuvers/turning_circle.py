@@ -12,9 +12,7 @@ def _memory(_: Parameters) -> tuple[float, ...]:
     return (np.inf,)  # the time at which the pull-out began
 
 
-def _rule(
-    p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _rule(p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
     turned = (np.abs(angle) >= p["turn"]) | (time >= p["duration"] - p["pull_out"])
     began = np.minimum(memory, np.where(turned, time, np.inf)[:, None])
     fin = np.where(time < began[:, 0], p["amplitude"] * side(p), 0.0)

@@ -15,9 +15,7 @@ def _memory(p: Parameters) -> tuple[float, ...]:
     return (side(p), 0.0, p["reversals"])
 
 
-def _rule(
-    p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _rule(p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
     out = memory.copy()
     # The first crossing tells which way the fin turns the vehicle: the sign of the authority need not be known.
     crossed = np.abs(angle) >= p["turn"]

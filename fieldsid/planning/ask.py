@@ -67,6 +67,7 @@ class Asked:
     separate: tuple[str, ...] = ()
     diagnosis: Path | None = None
     seed: int = 1
+    open_loop: bool = False
 
     @property
     def legs(self) -> int:
@@ -100,6 +101,7 @@ def planned(asked: Asked, step: Callable[[], None] = lambda: None) -> Made:
         window=Window(asked.window, rate_hz=asked.rate),
         run_up_s=_run_up(asked.run_up),
         radius=asked.radius,
+        open_loop=asked.open_loop,
         seed=asked.seed,
         vehicle=vehicle.name if vehicle else "vehicle",
         slowest=vehicle.speed_min_m_s if vehicle else None,

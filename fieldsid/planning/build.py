@@ -30,7 +30,7 @@ EFFORT = Effort(20, 12, 2)
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What all legs of a plan share."""
+    """What all legs of a plan share; `open_loop` leaves out maneuvers that follow the motion."""
 
     model: Model
     envelope: Envelope
@@ -38,6 +38,7 @@ class Setting:
     want: Mapping[str, float]
     run_up_s: float = 10.0
     seed: int = 1
+    open_loop: bool = False
     effort: Effort = EFFORT
 
 
@@ -48,6 +49,7 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Candidate] = ()) ->
     """
     judge = judge_of(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
     scored = _known_again(judge, known) if known else catalogue(judge, setting.effort)
+    scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
     seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
     scored.append(switching(judge, seeds, setting.effort, setting.seed))
     scored.sort(key=lambda s: s.cost)
@@ -66,6 +68,7 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Candidate] = ()) ->
 
 
 def crowd_at(judge: Judge, setting: Setting) -> Crowd:
+    """Return the draws of the prior that the legs of a judge's speed are tried on."""
     return crowd_of(setting.model, judge.scene.speed, judge.window, DRAWS, setting.seed + 1)
 
 
@@ -75,9 +78,7 @@ def risk_of(judge: Judge, crowd: Crowd, candidate: Candidate) -> tuple[float, di
     return float(np.mean(flights.outside(judge.envelope))), flights.quantiles(0.95)
 
 
-def leg_of(
-    judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | None = None, purpose: str = "parameters"
-) -> Leg:
+def leg_of(judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | None = None, purpose: str = "parameters") -> Leg:
     """Return a candidate as a leg: expected errors beside those of the paper's pulses, excursions, risk."""
     scene = judge.scene
     response = flown(scene, candidate, judge.window, judge.envelope.limits, judge.autopilot)
@@ -170,9 +171,7 @@ def surely_inside(judge: Judge, setting: Setting, crowd: Crowd, candidate: Candi
 
 def lowered(candidate: Candidate, share: float) -> Candidate | None:
     """Return a candidate with every angle it may choose times `share`; None below its bounds."""
-    changes = {
-        p.name: candidate.parameters[p.name] * share for p in candidate.record.parameters if p.unit == "rad" and p.tuned
-    }
+    changes = {p.name: candidate.parameters[p.name] * share for p in candidate.record.parameters if p.unit == "rad" and p.tuned}
     bounds = {p.name: p.low for p in candidate.record.parameters}
     if share < SMALLEST or any(v < bounds[n] for n, v in changes.items()):
         return None

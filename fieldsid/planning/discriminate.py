@@ -190,9 +190,13 @@ def _scored(arena: _Arena, *, fast: bool) -> list[tuple[Candidate, Mapping[str, 
 
 
 def _worth(pairs: Mapping[str, float]) -> float:
-    """Return the log odds of the worst pair, with a little of the mean so that ties are broken."""
-    values = np.array(list(pairs.values()))
-    return float(values.min() + 0.01 * values.mean())
+    """Return how much a maneuver decides: each pair counts until it is beyond doubt, a little more after that.
+
+    A rival whose effect has been fitted to nothing is as good as the plain model, and no maneuver shows it to be the
+    right one: such a pair must not hide what the others tell.
+    """
+    values = np.maximum(np.array(list(pairs.values())), 0.0)
+    return float(np.mean(1.0 - np.exp(-values / SURE)) + 1e-3 * np.mean(np.log1p(values)))
 
 
 def entrants(window: Window, envelope: Envelope) -> list[Candidate]:

@@ -90,9 +90,7 @@ def _refitted(loser: Rival, record: Record, noise: Noise, rounds: int) -> float:
     return float(total) if np.isfinite(total) else 0.0
 
 
-def _cost(
-    problem: Problem, x: FloatArray, start: FloatArray, loser: Rival, noise: Noise
-) -> tuple[float, FloatArray, FloatArray]:
+def _cost(problem: Problem, x: FloatArray, start: FloatArray, loser: Rival, noise: Noise) -> tuple[float, FloatArray, FloatArray]:
     cost, normal, gradient, _ = normal_equations(problem, x, noise, range(x.size))
     moved = x - start
     pull = loser.precision @ moved

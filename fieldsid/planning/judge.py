@@ -64,9 +64,7 @@ class Judge:
         return information_of(self.scene, flown(self.scene, candidate, self.window, self.envelope.limits, self.autopilot))
 
 
-def judge_of(
-    model: Model, speed: float, envelope: Envelope, window: Window, want: Mapping[str, float], run_up_s: float
-) -> Judge:
+def judge_of(model: Model, speed: float, envelope: Envelope, window: Window, want: Mapping[str, float], run_up_s: float) -> Judge:
     """Return the judge of candidates at one speed (m/s); `want` holds relative errors, empty for all alike."""
     names = NAMES[model.axis]
     scene = scene_of(model, speed)

@@ -36,6 +36,7 @@ class Request:
     window: Window = WINDOW
     run_up_s: float = 10.0
     radius: bool = False
+    open_loop: bool = False
     seed: int = 1
     vehicle: str = "vehicle"
     slowest: float | None = None
@@ -114,7 +115,7 @@ def _setting(model: Model, request: Request, speed: float) -> Setting:
     if request.envelope.area_length is not None:
         room = request.envelope.area_length / speed - request.run_up_s
         window = replace(window, length=min(window.length, np.floor(room * window.rate_hz) / window.rate_hz))
-    return Setting(model, request.envelope, window, request.want, request.run_up_s, request.seed)
+    return Setting(model, request.envelope, window, request.want, request.run_up_s, request.seed, request.open_loop)
 
 
 def _repeated(leg: Leg, want: Mapping[str, float]) -> Leg:

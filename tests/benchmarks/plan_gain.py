@@ -15,14 +15,13 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parents[2])]
 
-from plan_flights import believed, exact, flown, paper_day, scatter
+from plan_flights import believed, exact, flown, paper_day, scatter  # noqa: E402
 
-from fieldsid.maneuvers import pick_maneuver
-from fieldsid.models.axis import Axis
-from fieldsid.planning.build import Setting, best_leg, pulses
-from fieldsid.planning.candidate import Candidate, Window
-from fieldsid.planning.envelope import Envelope
-from fieldsid.planning.judge import judge_of
+from fieldsid.maneuvers import pick_maneuver  # noqa: E402
+from fieldsid.planning.build import Setting, best_leg, pulses  # noqa: E402
+from fieldsid.planning.candidate import Candidate, Window  # noqa: E402
+from fieldsid.planning.envelope import Envelope  # noqa: E402
+from fieldsid.planning.judge import judge_of  # noqa: E402
 
 WINDOW = Window(33.0)
 FIN = 0.26
@@ -66,13 +65,13 @@ def main() -> None:
     began = time.perf_counter()
     rows = compare(day, range(1, options.seeds + 1), method)
     base = rows[0][2]
-    print(f"{day.axis.value} at {day.speed} m/s, 33 s at 20 Hz, {options.seeds} fits by {method}, disturbance {day.disturbance} rad/s^2")
+    head = f"{day.axis.value} at {day.speed} m/s, 33 s at 20 Hz, {options.seeds} fits by {method}"
+    print(f"{head}, disturbance {day.disturbance} rad/s^2")
     print(f"{'maneuver':26}{'parameter':>10}{'predicted':>11}{'seen':>11}{'seen/pred':>11}{'vs pulses':>11}{'heading':>9}")
     for name, predicted, seen, heading in rows:
-        for n in predicted:
-            line = f"{name:26}{n:>10}{predicted[n]:11.5f}{seen[n]:11.5f}{seen[n] / predicted[n]:11.2f}"
+        for i, n in enumerate(predicted):
+            line = f"{'' if i else name:26}{n:>10}{predicted[n]:11.5f}{seen[n]:11.5f}{seen[n] / predicted[n]:11.2f}"
             print(line + f"{seen[n] / base[n]:11.2f}{np.degrees(heading):8.0f}d")
-            name = ""
     print(f"{time.perf_counter() - began:.1f} s")
 
 

@@ -10,24 +10,25 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parents[2])]
 
-from plan_flights import SENSOR, Day, flown
-from truth.physics import Physics
+from plan_flights import SENSOR, Day, flown  # noqa: E402
+from truth.physics import Physics  # noqa: E402
 
-from fieldsid.diagnosis import diagnose
-from fieldsid.errors import FieldsidError
-from fieldsid.fitting.fit import fit
-from fieldsid.maneuvers import parse_spec
-from fieldsid.models.axis import Axis
-from fieldsid.models.record import record_of
-from fieldsid.planning.candidate import Candidate, Window
-from fieldsid.planning.discriminate import separate
-from fieldsid.planning.envelope import Envelope
+from fieldsid.diagnosis import diagnose  # noqa: E402
+from fieldsid.errors import FieldsidError  # noqa: E402
+from fieldsid.fitting.fit import fit  # noqa: E402
+from fieldsid.maneuvers import parse_spec  # noqa: E402
+from fieldsid.models.axis import Axis  # noqa: E402
+from fieldsid.models.record import record_of  # noqa: E402
+from fieldsid.planning.candidate import Candidate, Window  # noqa: E402
+from fieldsid.planning.discriminate import separate  # noqa: E402
+from fieldsid.planning.envelope import Envelope  # noqa: E402
 
 SPEED, FIN = 1.4, 0.35
 STRENGTHS = {
@@ -47,7 +48,7 @@ PAIRS = (
     "servo_lag/delay", "deadband/stall", "stall/quadratic_damping", "quadratic_damping/sway_coupling", "current/trim_drift",
     "current/compass_deviation", "asymmetric_fin/trim_drift", "rate_limit/servo_lag",
 )  # fmt: skip
-PULSES = Candidate(*(lambda m, p: (m.name, p))(*parse_spec("square_pulses:amplitude=0.26,second=0.15")))
+PULSES = Candidate("square_pulses", parse_spec("square_pulses:amplitude=0.26,second=0.15")[1])
 
 
 def day_with(effect: str) -> Day:
@@ -58,8 +59,6 @@ def day_with(effect: str) -> Day:
 
 def runs_of(day: Day, candidate: Candidate, window: Window, seeds: tuple[int, ...], name: str):
     """Flights of one candidate, named apart."""
-    from dataclasses import replace
-
     return [replace(flown(day, candidate, window, s), name=f"{name}{s}") for s in seeds]
 
 

@@ -34,7 +34,9 @@ def test_json_is_one_object_with_every_parameters_expected_error(run_cli):
     leg = body["legs"][0]
     assert set(leg["expected"]) == {"a22", "b2", "C0"}
     assert all(leg["expected"][n]["std_error"] > 0 for n in leg["expected"])
-    assert body["minutes"] > 0 and body["metres"] > 0 and 0 <= body["break_probability"] <= 0.05
+    assert body["minutes"] > 0
+    assert body["metres"] > 0
+    assert 0 <= body["break_probability"] <= 0.05
     assert {"signal", "kind", "limit", "unit", "says"} == set(leg["abort"][0])
 
 
@@ -52,7 +54,8 @@ def test_everything_is_written_and_the_plan_reads_back(written):
 def test_a_second_plan_does_not_replace_the_first_without_force(run_cli, written):
     before = (written / "plan.yaml").read_bytes()
     answer = run_cli(*QUICK, "-o", written)
-    assert answer.code == 2 and "--force" in answer.err
+    assert answer.code == 2
+    assert "--force" in answer.err
     assert (written / "plan.yaml").read_bytes() == before
 
 
@@ -92,7 +95,9 @@ def test_what_cannot_be_done_is_refused_with_what_would_be_possible(run_cli, arg
     answer = run_cli(*QUICK, *arguments)
     assert answer.code == 2
     assert answer.out == ""
-    assert answer.err.startswith("error: ") and "  found: " in answer.err and "hint: " in answer.err
+    assert answer.err.startswith("error: ")
+    assert "  found: " in answer.err
+    assert "hint: " in answer.err
     assert words in answer.err
 
 
@@ -101,10 +106,12 @@ def test_the_vehicles_own_limits_and_signs_are_kept(run_cli, tmp_path):
     vehicle.write_text("name: pandan\nrudder_max_rad: 0.2\nfin_rate_rad_s: 0.8\npositive_rudder: starboard\nspeed_max_m_s: 2.0\n")
     body = run_cli(*QUICK, "--vehicle", vehicle, "--json").json
     assert body["vehicle"] == "pandan"
-    assert body["envelope"]["fin"] == 0.2 and body["envelope"]["fin_rate"] == 0.8
+    assert body["envelope"]["fin"] == 0.2
+    assert body["envelope"]["fin_rate"] == 0.8
     assert body["legs"][0]["expected"]["b2"]["value"] > 0
     refused = run_cli(*QUICK, "--vehicle", vehicle, "--fin-max", "0.3")
-    assert refused.code == 2 and "0.2" in refused.err
+    assert refused.code == 2
+    assert "0.2" in refused.err
     assert run_cli("plan", "--speeds", "3", "--vehicle", vehicle).code == 2
 
 
@@ -114,7 +121,8 @@ def test_an_unstable_prior_is_refused(run_cli, tmp_path):
     prior = tmp_path / "prior.yaml"
     prior.write_text(template_path("plan/priors/torpedo_yaw.yaml").read_text().replace("value: 1.1", "value: -0.2"))
     answer = run_cli(*QUICK, "--model", prior)
-    assert answer.code == 2 and "unstable" in answer.err
+    assert answer.code == 2
+    assert "unstable" in answer.err
 
 
 def test_the_same_seed_gives_the_same_plan(run_cli):

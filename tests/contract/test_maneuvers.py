@@ -43,8 +43,10 @@ def time_over(maneuver, values):
 @pytest.mark.parametrize("maneuver", ALL, ids=attrgetter("name"))
 def test_it_declares_what_a_planner_asks(maneuver):
     names = [p.name for p in maneuver.parameters]
-    assert "amplitude" in names and len(set(names)) == len(names)
-    assert maneuver.says and maneuver.source
+    assert "amplitude" in names
+    assert len(set(names)) == len(names)
+    assert maneuver.says
+    assert maneuver.source
     assert (maneuver.command is None) != (maneuver.rule is None)
     for p in maneuver.parameters:
         assert p.low <= p.default <= p.high, p.name
@@ -108,7 +110,8 @@ def test_a_rule_ends_by_itself_on_vehicles_of_either_fin_sign(maneuver, sign):
         limits=Limits(0.3), autopilot=Autopilot(0.4 * sign, 0.2 * sign, 0.3), schedule=Schedule(RATE_HZ),
     )  # fmt: skip
     assert flight.excitation[1] < maneuver.duration(maneuver.defaults)
-    assert flight.recovering[-1].all() and not flight.recovering[round(2.5 * RATE_HZ)].any()
+    assert flight.recovering[-1].all()
+    assert not flight.recovering[round(2.5 * RATE_HZ)].any()
     assert np.all(np.abs(flight.fin) <= 0.3 + 1e-12)
 
 

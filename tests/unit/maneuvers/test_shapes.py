@@ -103,7 +103,9 @@ class Turner:
 @pytest.mark.parametrize("gain", [1.0, -1.0])
 def test_a_zigzag_puts_the_fin_over_each_time_the_heading_is_reached_whichever_way_the_fin_turns(gain):
     maneuver, values = parse_spec("zigzag:amplitude=0.2,turn=0.3,reversals=3")
-    flight = fly(maneuver, values, Turner(gain), limits=Limits(0.3), autopilot=Autopilot(gain, 0.0), schedule=Schedule(run_up=1.0))
+    flight = fly(
+        maneuver, values, Turner(gain), limits=Limits(0.3), autopilot=Autopilot(gain, 0.0), schedule=Schedule(run_up=1.0)
+    )
     fin, angle = flight.fin[:, 0], flight.angle[:, 0]
     excited = ~flight.recovering[:, 0]
     turns = np.flatnonzero(np.diff(np.sign(fin[excited])))
@@ -117,7 +119,8 @@ def test_a_turning_circle_turns_as_far_as_asked_then_pulls_out():
     maneuver, values = parse_spec("turning_circle:amplitude=0.2,turn=7,pull_out=3,mirrored=1")
     flight = fly(maneuver, values, Turner(1.0), limits=Limits(0.3), autopilot=Autopilot(1.0, 0.0), schedule=Schedule(run_up=1.0))
     fin = flight.fin[~flight.recovering[:, 0], 0]
-    assert fin[0] == -0.2 and fin[-1] == 0.0
+    assert fin[0] == -0.2
+    assert fin[-1] == 0.0
     assert np.sum(fin == 0.0) == pytest.approx(3.0 * 20, abs=1)
     assert np.sum(fin != 0.0) * 0.2 / 20 == pytest.approx(7.0, abs=0.02)
 

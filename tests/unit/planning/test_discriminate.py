@@ -54,7 +54,10 @@ def test_half_the_noise_gives_four_times_the_log_odds():
 
 
 def test_a_circle_shows_current_where_pulses_hardly_do():
-    assert duel("current,trim_drift", "turning_circle:amplitude=0.3,duration=38")[0] > 3 * duel("current,trim_drift", "square_pulses")[0]
+    assert (
+        duel("current,trim_drift", "turning_circle:amplitude=0.3,duration=38")[0]
+        > 3 * duel("current,trim_drift", "square_pulses")[0]
+    )
 
 
 @pytest.mark.parametrize("names", PAIRS)
@@ -64,7 +67,8 @@ def test_a_quick_search_finds_a_maneuver_inside_the_envelope_for_every_pair(name
     assert len(found.pairs) == 2
     assert found.expected_log_odds == min(found.pairs.values())
     assert found.expected_log_odds > np.log(20)
-    assert found.plain()["decides"] and len(found.says()) == 3
+    assert found.plain()["decides"]
+    assert len(found.says()) == 3
 
 
 def test_a_full_search_is_never_worse_than_its_own_catalogue():
@@ -82,7 +86,9 @@ def test_the_envelope_is_kept_by_what_is_proposed():
         assert np.max(np.abs(response.angle)) <= 0.5 * 1.05
 
 
-@pytest.mark.parametrize("names", [("servo_lag",), ("servo_lag", "servo_lag"), ("servo_lag", "dlay"), ("heave_coupling", "delay")])
+@pytest.mark.parametrize(
+    "names", [("servo_lag",), ("servo_lag", "servo_lag"), ("servo_lag", "dlay"), ("heave_coupling", "delay")]
+)
 def test_rivals_that_are_no_rivals_are_refused(names):
     with pytest.raises(UsageError) as caught:
         rivals_named(PRIOR, names)
@@ -112,11 +118,14 @@ def diagnosis(tmp_path, **changes):
 def test_a_diagnosis_names_its_rivals(tmp_path):
     rivals = rivals_from(diagnosis(tmp_path))
     assert [m.effects for m in rivals] == [("delay",), ("servo_lag",)]
-    assert rivals[0].values["delay"] == 0.2 and rivals[0].law.reference == 1.4
+    assert rivals[0].values["delay"] == 0.2
+    assert rivals[0].law.reference == 1.4
     assert [m.effects for m in rivals_from(tmp_path / "diagnosis.yaml", ("stall", "delay"))] == [("delay",), ("stall",)]
 
 
-@pytest.mark.parametrize("changes", [{"candidates": []}, {"candidates": [{"effect": "delay"}]}, {"axis": "x"}, {"noise_floor": {}}])
+@pytest.mark.parametrize(
+    "changes", [{"candidates": []}, {"candidates": [{"effect": "delay"}]}, {"axis": "x"}, {"noise_floor": {}}]
+)
 def test_an_incomplete_diagnosis_is_refused(tmp_path, changes):
     with pytest.raises(FieldsidError) as caught:
         rivals_from(diagnosis(tmp_path, **changes))

@@ -36,8 +36,13 @@ def test_white_noise_information_is_that_of_differences_of_the_free_run(axis, sp
     columns = []
     for name in names:
         step = 1e-5
-        ends = [simulate(replace(model, values={**model.values, name: model.values[name] + s}), record, state=(0, 0, 0)) for s in (step, -step)]
-        columns.append(np.concatenate([(ends[0].angle - ends[1].angle) / 0.005, (ends[0].rate - ends[1].rate) / 0.008]) / (2 * step))
+        ends = [
+            simulate(replace(model, values={**model.values, name: model.values[name] + s}), record, state=(0, 0, 0))
+            for s in (step, -step)
+        ]
+        columns.append(
+            np.concatenate([(ends[0].angle - ends[1].angle) / 0.005, (ends[0].rate - ends[1].rate) / 0.008]) / (2 * step)
+        )
     for state in ((1e-5, 0, 0), (0, 1e-5, 0)):
         ends = [simulate(model, record, state=tuple(s * v for v in state)) for s in (1, -1)]
         columns.append(np.concatenate([(ends[0].angle - ends[1].angle) / 0.005, (ends[0].rate - ends[1].rate) / 0.008]) / 2e-5)

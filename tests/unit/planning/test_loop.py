@@ -35,7 +35,9 @@ def scene_with(*effects):
     return scene_of(rivals_named(PRIOR, ("none", "+".join(effects)))[1], 1.4)
 
 
-@pytest.mark.parametrize("effects", [(), ("quadratic_damping",), ("sway_coupling",), ("servo_lag",), ("rate_limit", "stall"), ("delay",)])
+@pytest.mark.parametrize(
+    "effects", [(), ("quadratic_damping",), ("sway_coupling",), ("servo_lag",), ("rate_limit", "stall"), ("delay",)]
+)
 def test_the_loops_motion_is_the_free_run_of_the_command_it_gave(effects):
     scene = scene_with(*effects)
     pilot = autopilot_of(scene.base, LIMITS)
@@ -85,7 +87,9 @@ def test_draws_flown_at_once_are_those_flown_one_by_one(spec):
         n = min(response.time.size, together.time.size)
         # The crowd's trim error is a constant moment of its own: it is small against the maneuver.
         assert np.max(np.abs(together.angle[:n, i] - response.angle[:n])) < 0.3
-        far = excursion_of(Axis.YAW, replace(response, angle=together.angle[:, i], rate=together.rate[:, i], time=together.time), 1.4, run_up=5.0)
+        far = excursion_of(
+            Axis.YAW, replace(response, angle=together.angle[:, i], rate=together.rate[:, i], time=together.time), 1.4, run_up=5.0
+        )
         assert together.excursions["heading"][i] == pytest.approx(far.heading)
         assert together.excursions["along"][i] == pytest.approx(far.along, rel=0.01)
 
@@ -93,6 +97,8 @@ def test_draws_flown_at_once_are_those_flown_one_by_one(spec):
 def test_a_command_is_kept_inside_angle_and_rate_limits():
     scene = scene_with()
     limits = Limits(0.1, 0.4)
-    response = loop.respond(scene, asked_of(candidate("prbs:amplitude=0.5,duration=25"), WINDOW), 20.0, limits, Autopilot(-5.0, -5.0))
+    response = loop.respond(
+        scene, asked_of(candidate("prbs:amplitude=0.5,duration=25"), WINDOW), 20.0, limits, Autopilot(-5.0, -5.0)
+    )
     assert np.max(np.abs(response.command)) <= 0.1 + 1e-12
     assert np.max(np.abs(np.diff(response.command))) <= 0.4 / 20 + 1e-12

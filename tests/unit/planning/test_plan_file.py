@@ -37,15 +37,25 @@ def leg(spec="square_pulses", **changes):
 
 
 def plan(*legs):
-    return Plan(Axis.YAW, "pandan", "torpedo", ENVELOPE, legs or (leg(), leg("zigzag:duration=26"), leg("chirp:duration=26")), {"a22": 0.05})
+    return Plan(
+        Axis.YAW,
+        "pandan",
+        "torpedo",
+        ENVELOPE,
+        legs or (leg(), leg("zigzag:duration=26"), leg("chirp:duration=26")),
+        {"a22": 0.05},
+    )
 
 
 def test_a_plan_reads_back_as_it_was(tmp_path):
     made = plan()
     again = load_plan(save_plan(made, tmp_path / "plan.yaml"))
-    assert again.envelope == made.envelope and again.want == made.want
+    assert again.envelope == made.envelope
+    assert again.want == made.want
     for one, two in zip(made.legs, again.legs, strict=True):
-        assert two.candidate == one.candidate and two.window == one.window and two.expected == one.expected
+        assert two.candidate == one.candidate
+        assert two.window == one.window
+        assert two.expected == one.expected
         for a, b in zip(commands_of(one, made.envelope), commands_of(two, again.envelope), strict=True):
             np.testing.assert_allclose(a, b, atol=1e-5)
 
@@ -72,7 +82,8 @@ def test_a_plan_that_was_tampered_with_is_refused_in_three_parts(tmp_path, path,
         YAML().dump(body, stream)
     with pytest.raises(FieldsidError) as caught:
         load_plan(file)
-    assert caught.value.what and caught.value.hint
+    assert caught.value.what
+    assert caught.value.hint
 
 
 NUMBERS = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.integers(-(10**6), 10**6), st.text(max_size=4), st.none())
@@ -110,7 +121,8 @@ def test_commands_are_clamped_even_when_a_plan_in_memory_breaks_its_own_limit():
     wild = leg("square_pulses:amplitude=0.6,second=0.6")
     time, fin, steered = commands_of(wild, ENVELOPE)
     assert np.max(np.abs(fin)) == pytest.approx(0.26)
-    assert steered[0] == 1 and steered[round(3.0 * 20)] == 0
+    assert steered[0] == 1
+    assert steered[round(3.0 * 20)] == 0
     assert time[1] - time[0] == pytest.approx(0.05)
 
 
@@ -135,7 +147,8 @@ def test_every_mission_style_names_the_abort_conditions_and_stays_within_the_lim
     text = render(plan(), leg(spec), style)
     assert "abort" in text.lower()
     assert "38" in text  # the window and its grace
-    assert "{{" not in text and "None" not in text
+    assert "{{" not in text
+    assert "None" not in text
     assert all(abs(s.fin) <= 0.26 for s in steps_of(plan(), leg(spec)))
 
 

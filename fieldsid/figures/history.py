@@ -1,0 +1,85 @@
+"""The figure of a line of models: the error on unseen and on fitted runs, falling addition by addition to the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees, isfinite
+from textwrap import fill
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fieldsid.extension import Gain, Generation
+from fieldsid.figures import canvas
+
+LABEL_WIDTH = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Fall:
+    """One addition in one channel, in the figure's unit: errors before and after on unseen and fitted runs, and the floor."""
+
+    unseen: tuple[float, float]
+    fitted: tuple[float, float]
+    floor: float
+
+
+def figure(line: Sequence[Generation], name: str) -> Figure:
+    """Return a sheet with a panel for the rate and one for the angle; channels that were not measured are left out."""
+    gains = [g.step.gain for g in line if g.step]
+    labels = [fill(", ".join(line[0].effects) or "plain model", LABEL_WIDTH)]
+    labels += [fill(" ".join(f"+{n}" for n in gain.added), LABEL_WIDTH) for gain in gains]
+    channels = [(c, falls) for c in ("rate", "angle") if (falls := falls_of(gains, c))]
+    sheet = canvas.sheet(max(8.0, 1.6 + 2.6 * len(labels)), 5.2)
+    sheet.suptitle(f"{name}: {summary(gains)}", x=0.01, ha="left", fontsize=11)
+    axes = sheet.subplots(1, max(len(channels), 1), squeeze=False)[0]
+    for ax, (channel, falls) in zip(axes, channels, strict=False):
+        unit = "deg/s" if channel == "rate" else "deg"
+        draw(falls, labels, ax)
+        canvas.dress(ax, y=f"free-run {channel} error, rms [{unit}]")
+        ax.grid(visible=False, axis="x")
+    if channels:
+        canvas.legend_above(axes[-1], 3)
+    return sheet
+
+
+def summary(gains: Sequence[Gain]) -> str:
+    """Return the whole fall in words."""
+    if not gains:
+        return "nothing was added yet"
+    where = "unseen runs" if gains[-1].unseen else "the runs fitted to"
+    return f"error on {where} from {gains[0].over_floor[0]:.2f} to {gains[-1].over_floor[1]:.2f} x the noise floor"
+
+
+def falls_of(gains: Sequence[Gain], channel: str) -> list[Fall]:
+    """Return the falls of a channel in deg or deg/s; none where it was not measured."""
+    name, noise = ("rate_rms_rad_s", "rate") if channel == "rate" else ("angle_rms_rad", "angle")
+    falls = [
+        Fall(
+            (degrees(getattr(g.before.validation, name)), degrees(getattr(g.after.validation, name))),
+            (degrees(getattr(g.before.train, name)), degrees(getattr(g.after.train, name))),
+            degrees(getattr(g.noise_floor, noise)),
+        )
+        for g in gains
+    ]
+    return [f for f in falls if isfinite(f.fitted[0]) or isfinite(f.unseen[0])]
+
+
+def draw(falls: Sequence[Fall], labels: Sequence[str], ax: Axes) -> None:
+    """Draw each addition as a line from before to after; a gap between two lines means that they were judged on other data."""
+    top = 0.0
+    for i, fall in enumerate(falls):
+        first = i == 0
+        x = (i, i + 1)
+        ax.hlines(fall.floor, i - 0.3, i + 1.3, color=canvas.SECOND, linestyle="--", label="noise floor" if first else None)
+        ax.plot(x, fall.fitted, "o:", color="0.45", markerfacecolor="white", markersize=6, label="fitted runs" if first else None)
+        ax.plot(x, fall.unseen, "o-", color=canvas.SIMULATED, linewidth=2.0, markersize=7, label="unseen runs" if first else None)
+        top = max(top, *(v for v in (*fall.unseen, *fall.fitted, fall.floor) if isfinite(v)))
+        shown = fall.unseen if isfinite(fall.unseen[0]) else fall.fitted
+        for at, value in zip(x, shown, strict=True):
+            if at == i + 1 or first:
+                ax.annotate(f"{value / fall.floor:.2f} x", (at, value), xytext=(8, 6), textcoords="offset points", fontsize=9)
+    ax.set_xticks(range(len(falls) + 1), list(labels), fontsize=9)
+    ax.set_xlim(-0.3, len(falls) + 0.5)
+    ax.set_ylim(0.0, 1.12 * top)
