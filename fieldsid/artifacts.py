@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML, YAMLError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError
@@ -96,7 +97,9 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
     schema = body.get("schema")
     if not isinstance(schema, str) or not schema.startswith(f"{kind}/"):
         raise ArtifactError(
-            f"`{path}` is not a {kind} file", found=f"schema: {schema!r}", hint=f"give a file whose first line is `schema: {kind}/1`"
+            f"`{path}` is not a {kind} file",
+            found=f"schema: {schema!r}",
+            hint=f"give a file whose first line is `schema: {kind}/1`",
         )
     if schema != f"{kind}/1":
         raise ArtifactError(f"`{path}` has a newer schema than this version reads", found=schema, hint="update fieldsid")
@@ -131,7 +134,7 @@ def to_yaml(body: Mapping[str, Any]) -> str:
     return stream.getvalue()
 
 
-def plain(value: Any) -> Any:
+def plain(value: Any) -> Any:  # noqa: PLR0911 - one return per kind of value
     """Return a value as nested dict, list and plain numbers; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
@@ -145,9 +148,7 @@ def plain(value: Any) -> Any:
         return int(value)
     if isinstance(value, (float, np.floating)):
         return float(value) if math.isfinite(value) else None
-    if value is None:
-        return None
-    return str(value)
+    return None if value is None else str(value)
 
 
 def _umask() -> int:

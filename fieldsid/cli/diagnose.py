@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
@@ -42,9 +43,9 @@ def command(
 ) -> Mapping[str, Any]:
     """Say which physical effect the model is missing, how sure that is, and what else it could be.
 
-    Every effect of the catalogue, and every one in `effects/*.yaml`, is added to a model fitted to all runs together and judged by
-    its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis is kept for
-    `sysid plan --from FILE`.
+    Every effect of the catalogue, and every one in `effects/*.yaml`, is added to a model fitted to all runs together, and judged
+    by its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis is kept
+    for `sysid plan --from FILE`.
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
@@ -202,4 +203,4 @@ def _probability(p: float) -> str:
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.2f}" if ratio == ratio else "-"  # noqa: PLR0124 - NaN is not itself
+    return f"{ratio:.2f}" if isfinite(ratio) else "-"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 SCHEMA = "fieldsid/extend/1"
+MUCH, SMALL = 100.0, 1e-3
+"""A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
 LearnedRuns = Annotated[
     list[Path] | None, typer.Argument(metavar="RUN...", help="The runs that the model and the effects are fitted to.")
@@ -107,9 +110,10 @@ def _extended(
 
 def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> dict[str, Any]:
     from fieldsid.artifacts import sha256_of
+    from fieldsid.effects import pick_effect
     from fieldsid.extension import gain_body, kept_by
 
-    new = [n for n in found.model.values if n not in parent.values]
+    new = [c.name for n in found.gain.added for c in pick_effect(n).shared]
     return {
         "schema": SCHEMA,
         "axis": parent.axis.value,
@@ -169,10 +173,10 @@ def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
-    from fieldsid.rounding import number, with_error
+    from fieldsid.rounding import number
 
     before, after = body["over_floor"]["before"], body["over_floor"]["after"]
-    where = "unseen runs" if body["unseen"] else "the runs fitted to"
+    where = "unseen data" if body["unseen"] else "the runs fitted to"
     said = f"{'+'.join(body['added'])}: the error on {where} goes from {before:.2f} to {after:.2f} x the noise floor"
     to.print(Text(said, style="bold"))
     to.print()
@@ -184,11 +188,11 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
             ("unseen", body["before"]["validation"], body["after"]["validation"]),
             ("fitted", body["before"]["train"], body["after"]["train"]),
         )
-        if b[key] == b[key]  # noqa: PLR0124 - NaN is not itself
+        if isfinite(b[key])
     ]
     to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
     to.print()
-    found = [(n, with_error(c["value"], c["std_error"]), c["unit"]) for n, c in body["coefficients"].items()]
+    found = [(n, _value(c["value"], c["std_error"]), c["unit"]) for n, c in body["coefficients"].items()]
     to.print(table("", ("coefficient", "value", "unit"), found, left=2))
     to.print()
     to.print(Text(_verdict(body)))
@@ -198,7 +202,15 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
 def _verdict(body: Mapping[str, Any]) -> str:
     if body["pays"]:
         return "kept: it predicts better what it has not seen" if body["unseen"] else "kept: the evidence pays for it"
-    data = "unseen runs" if body["unseen"] else "the evidence"
+    data = "unseen data" if body["unseen"] else "the evidence"
     if body["kept"]:
         return f"kept because of --keep: on {data} it does not pay"
     return f"not kept: on {data} it does not pay; nothing was written, --keep overrules"
+
+
+def _value(value: float, error: float) -> str:
+    """Return a value with its error, or that these data do not tell it."""
+    from fieldsid.rounding import number, with_error
+
+    known = error < MUCH * max(abs(value), SMALL)
+    return with_error(value, error) if known else f"{number(value)} (these data do not tell)"

@@ -66,7 +66,12 @@ def _render(to: Console, laws: Laws, body: Mapping[str, Any]) -> None:
 
     for law in laws.by_name.values():
         rows = [
-            (WORDS.get(c.kind, c.kind) + (" *" if c.kind == law.chosen else ""), _formula(law, i), number(c.rms, 3), _share(c.r2))
+            (
+                WORDS.get(c.kind, c.kind) + (" *" if c.kind == law.chosen else ""),
+                _formula(law, i),
+                number(c.rms, 3),
+                "-" if c.kind == "constant" else _share(c.r2),
+            )
             for i, c in enumerate(law.candidates)
         ]
         of = f"|{law.name}|" if law.exponent else law.name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.extension import Generation
+
+KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
 
 FigureFile = Annotated[
     Path | None, typer.Option("--figure", metavar="PNG", help="Draw the error falling to the noise floor.", show_default=False)
@@ -86,7 +89,8 @@ def _render(to: Console, line: Sequence[Generation], body: Mapping[str, Any]) ->
     for g in line:
         if g.step:
             judged = ("judged on " if g.step.gain.unseen else "fitted to ") + ", ".join(g.step.gain.judged_on)
-            to.print(f"+ {', '.join(g.step.gain.added)}: kept by {g.step.kept_by}, {judged}", soft_wrap=True)
+            kept = KEPT.get(g.step.kept_by, g.step.kept_by)
+            to.print(f"+ {', '.join(g.step.gain.added)}: {kept}; {judged}", soft_wrap=True)
     to.print(f"model: {body['model']}", soft_wrap=True)
     if body["figure"]:
         to.print(f"figure: {body['figure']}", soft_wrap=True)
@@ -106,7 +110,7 @@ def _rows(g: Generation) -> list[tuple[str, ...]]:
             ("angle, rad", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
             ("rate, rad/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
         )
-        if b == b  # noqa: PLR0124 - NaN is not itself
+        if isfinite(b)
     ]
     words = [f"+ {n}" for n in gain.added]
     words += [""] * (len(channels) - len(words))

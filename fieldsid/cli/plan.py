@@ -45,9 +45,7 @@ RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight r
 RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.")]
 Radius = Annotated[bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.")]
 OpenLoop = Annotated[bool, typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.")]
-Separate = Annotated[
-    Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.")
-]
+Separate = Annotated[Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.")]
 FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.")]
 Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.")]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.")]

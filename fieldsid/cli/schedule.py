@@ -121,7 +121,7 @@ def verify(
     output: OutputFile = None,
     force: Force = False,
     as_json: JsonFlag = False,
-) -> int:
+) -> Mapping[str, Any]:
     """Check a schedule at its knots and between, over the errors of the models, against one constant gain.
 
     Margins by python-control; steps with the fin's limit, rate, lag and delay. A gate that fails makes the exit code 1. With
@@ -149,7 +149,9 @@ def verify(
         "figure": None if output is None else _draw(known, checked, output, force=force),
     }
     emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body))
-    return 0 if body["passed"] else 1
+    if not body["passed"]:
+        raise typer.Exit(1)
+    return body
 
 
 @command.command("export", short_help="Write the gains for the vehicle's software.")

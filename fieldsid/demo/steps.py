@@ -116,6 +116,34 @@ def _turned(result: Result) -> str:
     )
 
 
+def _scheduled(result: Result) -> str:
+    first, last = result["rows"][0], result["rows"][-1]
+    return (
+        f"kp = a22^2 / (4 zeta^2 b2) goes from {number(abs(first['kp']), 2)} at {number(first['speed_m_s'], 2)} m/s to "
+        f"{number(abs(last['kp']), 2)} at {number(last['speed_m_s'], 2)} m/s, as each speed's own model says; "
+        "the feed-forward holds the fin's own trim."
+    )
+
+
+def _verified(result: Result) -> str:
+    ours, constant = (max(_settled(c) for c in result[part]) for part in ("scheduled", "constant"))
+    return (
+        f"The least phase margin over speeds and errors is {result['worst']['phase_margin_deg']:.0f} deg. A heading step settles "
+        f"within {ours:.0f} s at every speed, with one constant gain within {constant:.0f} s."
+    )
+
+
+def _settled(check: Result) -> float:
+    return float(check["settling_s"])
+
+
+def _exported(result: Result) -> str:
+    return (
+        "Flat arrays of equal length, a decimal point in every number: a ROS 2 node loads them as they are. `--into` puts them "
+        "into a configuration file you already have, and shows the difference first."
+    )
+
+
 def _over_noise(fit: Result, floor: Result) -> float:
     pairs = ((fit["angle_rms_rad"], floor["angle_rad"]), (fit["rate_rms_rad_s"], floor["rate_rad_s"]))
     return max(float(rms) / float(noise) for rms, noise in pairs if rms and noise)
@@ -151,6 +179,24 @@ STEPS: tuple[Step, ...] = (
         "How tight does it turn?",
         "turn-radius {models}/pulses_*_yaw.yaml --speeds 1.0,1.4,1.8 -o {turning}",
         _turned,
+        (Axis.YAW,),
+    ),
+    Step(
+        "Gains for every speed",
+        "schedule design {models}/pulses_*_yaw.yaml --fin-limit 0.26 -o {turning}/gains.yaml",
+        _scheduled,
+        (Axis.YAW,),
+    ),
+    Step(
+        "Are they good, also between the speeds?",
+        "schedule verify {turning}/gains.yaml --require-phase-margin 30 -o {turning}/gains.png",
+        _verified,
+        (Axis.YAW,),
+    ),
+    Step(
+        "Into the vehicle",
+        "schedule export {turning}/gains.yaml --to ros2 -o {turning}/heading_ros2.yaml",
+        _exported,
         (Axis.YAW,),
     ),
 )

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.comparison.localize import Place, places
 from fieldsid.comparison.conditions import conditions
+from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.advise import next_maneuver
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.records import Candidate, Diagnosis

@@ -74,9 +74,7 @@ def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
     )
 
 
-def unseen_likelihood(
-    judged: Judged, validation: Sequence[Record], shown: Sequence[tuple[Problem, FloatArray]]
-) -> FloatArray:
+def unseen_likelihood(judged: Judged, validation: Sequence[Record], shown: Sequence[tuple[Problem, FloatArray]]) -> FloatArray:
     """Return each validation run's log likelihood under the noise that all of them together ask for.
 
     The parameters are the training runs'; the noise is not, or a hypothesis that is right where it was fitted

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 from fieldsid.logs.run import Note
@@ -23,7 +24,7 @@ class Errors:
         parts = [
             (rms / sigma) ** 2
             for rms, sigma in ((self.angle_rms_rad, floor.angle), (self.rate_rms_rad_s, floor.rate))
-            if rms == rms and sigma > 0.0
+            if isfinite(rms) and sigma > 0.0
         ]
         return float((sum(parts) / len(parts)) ** 0.5) if parts else float("nan")
 

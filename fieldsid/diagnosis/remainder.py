@@ -1,4 +1,4 @@
-"""What is left after the last hypothesis: a disturbance of the sea, or something that is not in the catalogue?
+"""What is left after the last hypothesis: a disturbance of the sea, or something that is not in the catalogue.
 
 A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted
 noise model are white, of even size throughout, and not related to the fin or the motion. Three tests look for what

@@ -170,9 +170,7 @@ def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effec
             e, columns = _run_columns(ground, problem, x, run, others)
             cost, step = _projected(ground.own_basis[run], e, columns)
             names = [problem.layout.slots[i].name for i in others]
-            wrong = any(
-                s + x[i] < problem.layout.low[i] for s, i, n in zip(step, others, names, strict=True) if n == "amplitude"
-            )
+            wrong = any(s + x[i] < problem.layout.low[i] for s, i, n in zip(step, others, names, strict=True) if n == "amplitude")
             scored.append((cost if not wrong else cost + ground.cost, value))
         x[slot] = min(scored)[1]
     return x

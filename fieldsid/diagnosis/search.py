@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.remainder import remainder_of
 from fieldsid.diagnosis.screen import Promise, ground_of, promise_of
 from fieldsid.diagnosis.trial import Judged, Trial, judge, refine
 from fieldsid.fitting.layout import layout_of, speed_groups
@@ -21,9 +22,11 @@ from fieldsid.models.record import Record
 
 NOISES = ("disturbance", "coloured")
 FREE_RUNS = 3
-PROMISING = 5
+PROMISING, PROMISING_LATER = 5, 4
 """Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise."""
 LARGEST = 4
+CLEAN = 1.02
+ORDINARY = 0.05
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
 MATTERS = 0.985
@@ -84,9 +87,10 @@ class Search:
         key = frozenset(parent.names)
         if key not in self.grown_from:
             self.grown_from.add(key)
-            for promise in self._promising(parent):
+            for promise, plain in self._promising(parent):
                 self.report("+".join((*parent.names, promise.effect.name)))
-                child = judge(promise.problem, promise.start, parent.judged.noise, self.family)
+                start = refine(promise.problem, promise.start, parent.judged.trial.weights).x if plain else promise.start
+                child = judge(promise.problem, start, parent.judged.noise, self.family)
                 self._keep(child)
                 self._try_twin(child, promise.effect)
             self._free_runs(key)
@@ -115,17 +119,18 @@ class Search:
         for child in children[:FREE_RUNS]:
             self.tried[child] = with_free_run(self.tried[child], self.validation, self.floor)
 
-    def _promising(self, parent: Hypothesis) -> list[Promise]:
+    def _promising(self, parent: Hypothesis) -> list[tuple[Promise, bool]]:
+        """Return the promises worth judging, each with whether plain output error leads the way there."""
         trial, noise = parent.judged.trial, parent.judged.noise
         have = set(trial.names)
         left = [e for e in self.catalogue if e.name not in have]
-        found: dict[str, Promise] = {}
-        plain = refine(trial.problem, trial.x, trial.weights)
-        for at, weights in ((plain, plain.weights), (trial, noise)):
+        free_run = refine(trial.problem, trial.x, trial.weights)
+        found: list[tuple[Promise, bool]] = []
+        for at, weights, plain in ((free_run, free_run.weights, True), (trial, noise, False)):
             ground = ground_of(at, weights)
-            for promise in sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)[:PROMISING]:
-                found[promise.effect.name] = promise
-        return list(found.values())
+            promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
+            found += [(p, plain) for p in promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]]
+        return found
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""
@@ -171,8 +176,9 @@ class Search:
         return (h.errors.validation if self.validation else h.errors.train).over(self.floor)
 
     def asks_for_more(self, h: Hypothesis) -> bool:
-        """Whether there is still something above the noise to explain."""
-        return max(self.error(h), h.errors.train.over(self.floor)) > 1.02
+        """Whether something is left above the noise, and it is not what a disturbance would leave."""
+        above = max(self.error(h), h.errors.train.over(self.floor)) > CLEAN
+        return above and remainder_of(h, self.validation).p < ORDINARY
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

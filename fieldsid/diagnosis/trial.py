@@ -88,6 +88,10 @@ def grown(parent: Trial, effect: Effect, values: Mapping[str, float]) -> tuple[P
     layout = layout_of(records, parent.problem.layout.axis, (*parent.effects, effect), parent.problem.layout.groups)
     known = {(s.name, s.run): v for s, v in zip(parent.problem.layout.slots, parent.x, strict=True)}
     x = np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in layout.slots])
+    if effect.extra_states and "damping_exponent" in layout.names:
+        # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
+        place = layout.names.index("damping_exponent")
+        x[place] = np.clip(x[place], 0.0, 1.2)
     return Problem(records, layout), x
 
 
@@ -120,9 +124,7 @@ def _noise_at(problem: Problem, x: FloatArray, start: Noise, family: str) -> tup
 def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArray:
     """Return each run's log likelihood, (R,)."""
     residuals, dynamics, vector = residuals_of(problem, x), dynamics_of(problem, x), noise_vector(noise)
-    return np.array(
-        [log_likelihood([r], [d], [e], vector) for r, d, e in zip(problem.records, dynamics, residuals, strict=True)]
-    )
+    return np.array([log_likelihood([r], [d], [e], vector) for r, d, e in zip(problem.records, dynamics, residuals, strict=True)])
 
 
 def samples(records: Sequence[Record]) -> int:

@@ -32,8 +32,9 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
         return f"nothing to add: the base model predicts unseen runs at {error:.2f} x the noise floor{tail}"
     if verdict.word == "unexplained":
         return (
-            f"something is there that is not in the catalogue: error {base:.2f} x the noise floor, most of it in {left.worst_run} at "
-            f"{left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), it moves with {left.moves_with}"
+            f"something is there that is not in the catalogue: error {base:.2f} x the noise floor, most of it in "
+            f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
+            f"it moves with {left.moves_with}"
         )
     names = " and ".join(verdict.effects)
     says = "; ".join(effect_named(n).says for n in verdict.effects)

@@ -1,6 +1,6 @@
 """Heave takes part in pitch through the Munk moment: an extra state x, the pitch moment of the heave speed (rad/s^2).
 
-    q' += x,   x' = -cross_damping s x - cross_rate s^2 q,   s = speed / reference speed
+    q' += x,   x' = -cross_damping f x - cross_rate f^2 q,   f = (speed / reference speed)^p
 From w' = -c11 w - c12 q + d1 delta and q' = -c21 w + ..., all of it lift, so c11, c12, c21 ~ u and d1 ~ u^2.
 The fin's own lift d1 cannot be seen in pitch: it is taken up by the other numbers (effects/sway_coupling.py).
 Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the paper's full form.
@@ -14,9 +14,10 @@ from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients at `scale` times the reference speed."""
+    lift = scale ** values.get("damping_exponent", 1.0)
     return Core(
-        cross_damping=values["cross_damping"] * scale,
-        cross_rate=values["cross_rate"] * scale**2,
+        cross_damping=values["cross_damping"] * lift,
+        cross_rate=values["cross_rate"] * lift**2,
     )
 
 
@@ -25,10 +26,10 @@ EFFECT = Effect(
     says="the vehicle heaves while it pitches and the heave pitches it further (Munk moment)",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.PITCH,),
-    equation="q' += x; x' = -cross_damping s x - cross_rate s^2 q, s = speed/reference",
+    equation="q' += x; x' = -cross_damping f x - cross_rate f^2 q, f = (speed/reference)^p, p the damping's exponent",
     coefficients=(
-        Coefficient("cross_damping", "1/s", 0.02, 10.0, 0.8, scan=(0.2, 0.8, 3.0), step=1e-3, says="damping of the heave speed"),
-        Coefficient("cross_rate", "1/s^2", -20.0, 20.0, 0.1, says="Munk moment the pitch rate builds up; minus pitches on"),
+        Coefficient("cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.3, 0.8, 2.5), step=1e-3, says="damping of the heave speed"),
+        Coefficient("cross_rate", "1/s^2", -20.0, 20.0, 0.1, scan=(-0.3, 0.3), says="Munk moment the pitch rate builds up; minus pitches on"),
     ),
     telltale="the pitch creeps on or overshoots after a command where a second-order pitch would have settled",
     excited_by=("multisine", "three_two_one_one", "square_pulses", "chirp"),

@@ -53,7 +53,11 @@ def twin(values: Values, axis: Axis) -> dict[str, float] | None:
     damping, lag = values[NAMES[axis].damping], values["lag"]
     if axis is not Axis.YAW or damping <= 0.0 or lag <= FASTEST_S:
         return None
-    return {NAMES[axis].damping: 1.0 / lag, "lag": 1.0 / damping, NAMES[axis].authority: values[NAMES[axis].authority] / (lag * damping)}
+    return {
+        NAMES[axis].damping: 1.0 / lag,
+        "lag": 1.0 / damping,
+        NAMES[axis].authority: values[NAMES[axis].authority] / (lag * damping),
+    }
 
 
 EFFECT = Effect(

@@ -1,6 +1,6 @@
 """Sway takes part in yaw through the Munk moment: an extra state x, the yaw moment of the sway speed (rad/s^2).
 
-    r' += x,   x' = -cross_damping s x - cross_rate s^2 r,   s = speed / reference speed
+    r' += x,   x' = -cross_damping f x - cross_rate f^2 r,   f = (speed / reference speed)^p
 From v' = -a11 v - a12 r + b1 delta and r' = -a21 v - a22 r + b2 delta, all of it lift, so a11, a12, a21 ~ u and b1 ~ u^2.
 The fin's own side force b1 cannot be seen in yaw: with z = -a21 v + (a21 b1 / b2) r it drops out and leaves the same
 transfer function, a zero at -cross_damping and two poles. So x is that combination; needs no sway sensor.
@@ -15,9 +15,10 @@ from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients at `scale` times the reference speed."""
+    lift = scale ** values.get("damping_exponent", 1.0)
     return Core(
-        cross_damping=values["cross_damping"] * scale,
-        cross_rate=values["cross_rate"] * scale**2,
+        cross_damping=values["cross_damping"] * lift,
+        cross_rate=values["cross_rate"] * lift**2,
     )
 
 
@@ -26,10 +27,10 @@ EFFECT = Effect(
     says="the vehicle drifts sideways in a turn and the drift turns it further (Munk moment)",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW,),
-    equation="r' += x; x' = -cross_damping s x - cross_rate s^2 r, s = speed/reference",
+    equation="r' += x; x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p, p the damping's exponent",
     coefficients=(
-        Coefficient("cross_damping", "1/s", 0.02, 10.0, 0.8, scan=(0.2, 0.8, 3.0), step=1e-3, says="damping of the sway speed"),
-        Coefficient("cross_rate", "1/s^2", -20.0, 20.0, 0.1, says="Munk moment the turn rate builds up; minus turns on"),
+        Coefficient("cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.3, 0.8, 2.5), step=1e-3, says="damping of the sway speed"),
+        Coefficient("cross_rate", "1/s^2", -20.0, 20.0, 0.1, scan=(-0.3, 0.3), says="Munk moment the turn rate builds up; minus turns on"),
     ),
     telltale="the rate overshoots or creeps on after a command where a first-order yaw would have settled",
     excited_by=("multisine", "zigzag", "three_two_one_one", "turning_circle", "square_pulses"),

@@ -9,34 +9,48 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.estimators.output_error import minimise
-from fieldsid.fitting.colour import best_noise, dynamics_of, residuals_of
-from fieldsid.fitting.descent import covariance, descend
+from fieldsid.fitting.descent import Descent, covariance, descend
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
-from fieldsid.fitting.noise import estimate_noise, floor_of
+from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.restricted import best_noise, lines_of, restricted_noise
 from fieldsid.fitting.start import start_vector
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import FloatArray, Note
+from fieldsid.models.model import Noise
 
 ROUNDS = 8
-SETTLED = 1e-3
+SETTLED = 1e-2
+"""Largest movement, in standard errors, at which noise and parameters count as agreed."""
 
 
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the prediction-error solution of a joint problem."""
     found, weights = minimise(problem, start_vector(problem.records, problem.layout), floor_of(problem.records))
+    return solve_from(problem, found.x, weights)
+
+
+def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
+    """Return the prediction-error solution that an output-error minimum x leads to.
+
+    The family of the noise is chosen again after the first step away from that minimum, whose residuals a
+    disturbance fed back through the fin has bent.
+    """
+    found = descend(problem, x, best_noise(problem, x, weights)[1])
     family, noise, _ = best_noise(problem, found.x, weights)
     for _ in range(ROUNDS):
         before = found.x
         found = descend(problem, before, noise)
-        spread = np.sqrt(np.maximum(np.diag(covariance(found.normal)), 0.0))
-        moved = np.abs(found.x - before)[list(found.free)] / np.maximum(spread, 1e-12)
-        noise, _ = estimate_noise(
-            problem.records, dynamics_of(problem, found.x), residuals_of(problem, found.x), family, noise
-        )
-        if float(moved.max()) < SETTLED:
+        settled = _moved(found, before) < SETTLED
+        if settled:
             break
+        noise, _ = restricted_noise(problem, lines_of(problem, found.x), family, noise)
     notes = (Note("noise_model", f"noise model: {family}", {"family": family}),)
     return Solution(found.x, shared_covariance(problem, covariance(found.normal), found.free), noise, ESTIMATOR.name, notes)
+
+
+def _moved(found: Descent, before: FloatArray) -> float:
+    spread = np.sqrt(np.maximum(np.diag(covariance(found.normal)), 0.0))
+    return float(np.max(np.abs(found.x - before)[list(found.free)] / np.maximum(spread, 1e-12)))
 
 
 ESTIMATOR = Estimator(

@@ -9,11 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from fieldsid.diagnosis.diagnose import shown_floor
-from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search import MATTERS, WORTH, Search, search, usable
 from fieldsid.diagnosis.split import held_back
+from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.effects import pick_effect
 from fieldsid.errors import DataError, UsageError
 from fieldsid.extension.refitted import refitted_model
@@ -23,6 +26,8 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, record_of
 
+SAME = 1e-3
+"""Log likelihoods that differ by less are one optimum."""
 WIDTH = 2
 """Orders in which several effects are added that are followed from one addition to the next."""
 
@@ -87,7 +92,8 @@ def extend(
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
     _refuse_missing_signals(parts, [*learned, *judged])
     work = search(learned, judged, parent.axis, parts, known=parent.effects, report=report)
-    before, after = work.base(), _with_all(work)
+    before = base_from(work, parent)
+    after = _with_all(work)
     gain = Gain(
         added=tuple(e.name for e in new),
         before=before.errors,
@@ -98,6 +104,27 @@ def extend(
         judged_on=tuple(r.name for r in (judged or learned)),
     )
     return Extension(refitted_model(after), gain, after.score - before.score, notes)
+
+
+def base_from(work: Search, parent: Model) -> Hypothesis:
+    """Return the search's base, refitted from the parent's own values as well where that ends better.
+
+    Effects whose cost is not smooth have their scanned start in the parent, not in their declaration.
+    """
+    base = work.base()
+    problem = base.judged.trial.problem
+    layout, reference = problem.layout, problem.layout.groups.speeds[problem.layout.groups.reference]
+    given = {**parent.values, **parent.at_speed(reference)}
+    if not parent.effects or not all(np.isfinite(v) for v in given.values()):
+        return base
+    x = base.judged.trial.x.copy()
+    for i, name in enumerate(layout.names):
+        x[i] = given.get(name, x[i])
+    start = refine(problem, x, base.judged.trial.weights)
+    again = judge(problem, start.x, base.judged.noise, work.family)
+    if again.likelihood > base.judged.likelihood + SAME:
+        work.tried[work.root] = with_free_run(hypothesis_of(again, work.validation), work.validation, work.floor)
+    return work.base()
 
 
 def _with_all(work: Search) -> Hypothesis:
@@ -135,6 +162,6 @@ def _refuse_missing_signals(parts: Sequence[Effect], records: Sequence[Record]) 
     for name, why in skipped.items():
         raise DataError(
             f"effect `{name}` {why}",
-            found=", ".join(f"{r.name} has {', '.join(sorted(r.signals)) or 'none'}" for r in records),
+            found=", ".join(dict.fromkeys(f"{r.name} has {', '.join(sorted(r.signals)) or 'none'}" for r in records)),
             hint="map the signal on import: `sysid inspect LOG`, or leave the effect out",
         )

@@ -69,10 +69,10 @@ def gain_body(gain: Gain) -> dict[str, Any]:
 
 
 def kept_by(extension: Extension) -> str:
-    """Return why an extension is kept: by what it brings, or because the user says so."""
+    """Return why an extension is kept: `unseen` data are predicted better, the `evidence` pays, or the user said `--keep`."""
     if not extension.pays:
         return "--keep"
-    return "error on unseen data" if extension.gain.unseen else "evidence"
+    return "unseen" if extension.gain.unseen else "evidence"
 
 
 def save_extension(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from textwrap import fill
 
 from matplotlib.axes import Axes
@@ -62,19 +63,18 @@ def draw(bars: list[Bar], ax: Axes) -> None:
     """Draw the error over the noise floor of each candidate: bars for unseen runs, rings for fitted ones, the floor at 1."""
     canvas.dress(ax, x="free-run error over the noise floor")
     rows = list(range(len(bars)))[::-1]
-    unseen = [b.unseen if b.unseen == b.unseen else b.fitted for b in bars]  # noqa: PLR0124 - NaN is not itself
+    unseen = [b.unseen if isfinite(b.unseen) else b.fitted for b in bars]
     colours = [canvas.SIMULATED if b.named else canvas.QUIET for b in bars]
     ax.barh(rows, unseen, color=colours, height=0.62, label="unseen runs")
-    ax.plot(
-        [b.fitted for b in bars], rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs"
-    )
+    fitted = [b.fitted for b in bars]
+    ax.plot(fitted, rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
     ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
     for row, b, value in zip(rows, bars, unseen, strict=True):
         chance = "" if b.probability is None else f", p {_chance(b.probability)}"
         place = max(value, b.fitted)
         ax.annotate(f"{value:.2f} x{chance}", (place, row), xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
     ax.set_yticks(rows, [fill(b.effect.replace("+", " +"), LABEL_WIDTH) for b in bars], fontsize=9)
-    ax.set_xlim(0.0, 1.32 * max(*unseen, *(b.fitted for b in bars), 1.0))
+    ax.set_xlim(0.0, 1.32 * max(*unseen, *fitted, 1.0))
     ax.grid(visible=False, axis="y")
     canvas.legend_above(ax, 3)
 

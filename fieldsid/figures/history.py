@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from fieldsid.extension import Gain, Generation
 from fieldsid.figures import canvas
 
-LABEL_WIDTH = 16
+LABEL_WIDTH = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +28,8 @@ class Fall:
 def figure(line: Sequence[Generation], name: str) -> Figure:
     """Return a sheet with a panel for the rate and one for the angle; channels that were not measured are left out."""
     gains = [g.step.gain for g in line if g.step]
-    labels = [fill(", ".join(line[0].effects) or "plain model", LABEL_WIDTH)]
-    labels += [fill(" ".join(f"+{n}" for n in gain.added), LABEL_WIDTH) for gain in gains]
+    labels = [folded(", ".join(line[0].effects) or "plain model")]
+    labels += [folded(" ".join(f"+{n}" for n in gain.added)) for gain in gains]
     channels = [(c, falls) for c in ("rate", "angle") if (falls := falls_of(gains, c))]
     sheet = canvas.sheet(max(8.0, 1.6 + 2.6 * len(labels)), 5.2)
     sheet.suptitle(f"{name}: {summary(gains)}", x=0.01, ha="left", fontsize=11)
@@ -42,6 +42,11 @@ def figure(line: Sequence[Generation], name: str) -> Figure:
     if channels:
         canvas.legend_above(axes[-1], 3)
     return sheet
+
+
+def folded(text: str) -> str:
+    """Return a label on as many lines as it needs, names unbroken."""
+    return fill(text, LABEL_WIDTH, break_long_words=False)
 
 
 def summary(gains: Sequence[Gain]) -> str:
@@ -72,14 +77,15 @@ def draw(falls: Sequence[Fall], labels: Sequence[str], ax: Axes) -> None:
     for i, fall in enumerate(falls):
         first = i == 0
         x = (i, i + 1)
-        ax.hlines(fall.floor, i - 0.3, i + 1.3, color=canvas.SECOND, linestyle="--", label="noise floor" if first else None)
-        ax.plot(x, fall.fitted, "o:", color="0.45", markerfacecolor="white", markersize=6, label="fitted runs" if first else None)
-        ax.plot(x, fall.unseen, "o-", color=canvas.SIMULATED, linewidth=2.0, markersize=7, label="unseen runs" if first else None)
+        ends = (-0.5 if first else i, len(falls) + 0.5 if i == len(falls) - 1 else i + 1)
+        ax.hlines(fall.floor, *ends, color=canvas.SECOND, linestyle="--", label="noise floor" if first else "_")
+        ax.plot(x, fall.fitted, "o:", color="0.45", markerfacecolor="white", markersize=6, label="fitted runs" if first else "_")
+        ax.plot(x, fall.unseen, "o-", color=canvas.SIMULATED, linewidth=2.0, markersize=7, label="unseen runs" if first else "_")
         top = max(top, *(v for v in (*fall.unseen, *fall.fitted, fall.floor) if isfinite(v)))
         shown = fall.unseen if isfinite(fall.unseen[0]) else fall.fitted
         for at, value in zip(x, shown, strict=True):
             if at == i + 1 or first:
                 ax.annotate(f"{value / fall.floor:.2f} x", (at, value), xytext=(8, 6), textcoords="offset points", fontsize=9)
     ax.set_xticks(range(len(falls) + 1), list(labels), fontsize=9)
-    ax.set_xlim(-0.3, len(falls) + 0.5)
+    ax.set_xlim(-0.3, len(falls) + 0.45)
     ax.set_ylim(0.0, 1.12 * top)

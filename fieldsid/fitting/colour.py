@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.fitting.noise import FAMILIES, estimate_noise
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.restricted import best_noise
 from fieldsid.fitting.whitening import is_white, whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
 
-GAIN_NEEDED = 4.0
-"""Log likelihood a family must gain over a simpler one for each parameter more (about twice Akaike's 1)."""
 LAGS = 20
 WHITE_ENOUGH = 0.01
 
@@ -25,20 +23,6 @@ def dynamics_of(problem: Problem, x: FloatArray) -> list[tuple[float, float]]:
     """Return (damping, stiffness) of every run's linear base model."""
     bases = [problem.base_of(x, run) for run in range(len(problem.records))]
     return [(b.damping, b.stiffness) for b in bases]
-
-
-def best_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, Noise, float]:
-    """Return the family, noise and log likelihood that the residuals at x support, by a penalised likelihood."""
-    residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
-    best: tuple[str, Noise, float] | None = None
-    for family, names in FAMILIES.items():
-        noise, score = estimate_noise(problem.records, dynamics, residuals, family, start)
-        penalised = score - GAIN_NEEDED * len(names)
-        if best is None or penalised > best[2] - GAIN_NEEDED * len(FAMILIES[best[0]]):
-            best = (family, noise, score)
-    if best is None:
-        return "white", start, float("nan")
-    return best
 
 
 def whiteness(problem: Problem, x: FloatArray, noise: Noise) -> float:
@@ -72,7 +56,7 @@ def ljung_box(e: FloatArray) -> float:
 
 def chi_square_tail(statistic: float, freedom: int) -> float:
     """Return P(chi-square > statistic)."""
-    from scipy.special import gammaincc  # noqa: PLC0415  (scipy.special alone is cheap to load, and late)
+    from scipy.special import gammaincc
 
     return float(gammaincc(0.5 * freedom, 0.5 * statistic))
 

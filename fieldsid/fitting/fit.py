@@ -24,6 +24,8 @@ from fieldsid.models.signal_path import fin_path
 from fieldsid.registry import members, pick
 
 SHORTEST = 40
+STILL = 1e-4
+"""Range in rad below which a fin does not move: a servo's own step is larger."""
 AUTO = "auto"
 
 
@@ -68,7 +70,9 @@ def fit(
     missing = [f"{e.name} needs {role} ({r.name})" for e in parts for r in records for role in e.needs if role not in r.signals]
     if missing:
         raise DataError(
-            "an effect needs a signal the log lacks", found="; ".join(missing), hint="map the signal on import, or leave the effect out"
+            "an effect needs a signal the log lacks",
+            found="; ".join(missing),
+            hint="map the signal on import, or leave the effect out",
         )
     problem = Problem(tuple(records), layout_of(records, axis, parts))
     solution = _solve(problem, method, options or Options())
@@ -84,7 +88,9 @@ def _solve(problem: Problem, method: str, options: Options) -> Solution:
             hint="use `--method output_error`",
         )
     if len(problem.records) > 1 and not chosen.joint:
-        raise UsageError(f"`{chosen.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out")
+        raise UsageError(
+            f"`{chosen.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out"
+        )
     solution = chosen.solve(problem, options)
     if method == AUTO and is_disturbed(problem, solution):
         refined: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
@@ -149,10 +155,10 @@ def check(records: Sequence[Record], axis: Axis) -> None:
                 found=f"{measured} measured samples, at least {SHORTEST} are needed",
                 hint="fly at least two pulses of 2 s each, and widen `--from` and `--to`",
             )
-        if float(np.ptp(r.fin)) == 0.0:
+        if float(np.ptp(r.fin)) < STILL:
             raise DataError(
                 f"run {r.name!r} does not excite {axis.value}: the fin never moves",
-                found=f"`{NAMES[axis].fin}` = {r.fin[0]:.4g} rad throughout",
+                found=f"`{NAMES[axis].fin}` = {r.fin[0]:.4g} rad throughout, within {float(np.ptp(r.fin)):.2g} rad",
                 hint="fly an excitation: `sysid plan --axis " + axis.value + "`",
             )
         measurement = r.rate[r.rate_ok] if r.rate_ok.any() else r.angle[r.angle_ok]
@@ -193,7 +199,7 @@ def model_of(problem: Problem, solution: Solution) -> Model:
     values = dict(zip(layout.names, solution.x[: layout.shared].tolist(), strict=True))
     units = {s.name: s.unit for s in layout.slots[: layout.shared]}
     law = layout.law(values)
-    aside = {n for n in values if n == "damping_exponent" or n.startswith(f"{names.authority}@")}
+    aside = {n for n in values if n.startswith(f"{names.authority}@")}
     free = tuple(n for n in values if n not in aside)
     order = [layout.names.index(n) for n in free]
     p = whiteness(problem, solution.x, solution.noise)
@@ -228,7 +234,9 @@ def trained(problem: Problem) -> dict[str, float]:
         "held_s": max(longest_hold(r) for r in records),
     }
     roles = {role for r in records for role in r.signals}
-    return known | {f"{role}_mean": float(np.mean([r.signals[role].mean() for r in records if role in r.signals])) for role in sorted(roles)}
+    return known | {
+        f"{role}_mean": float(np.mean([r.signals[role].mean() for r in records if role in r.signals])) for role in sorted(roles)
+    }
 
 
 def longest_hold(record: Record) -> float:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
+from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
@@ -55,7 +56,7 @@ def speed_groups(records: Sequence[Record], *, snapped: bool = False) -> Groups:
         return Groups((float(known.mean()) if known.size else float("nan"),), (0,) * len(records), 0, own, snapped)
     order = np.argsort(speeds)
     labels = np.zeros(len(records), dtype=int)
-    for previous, index in zip(order[:-1], order[1:], strict=True):
+    for previous, index in pairwise(order):
         labels[index] = labels[previous] + int(np.log(speeds[index] / speeds[previous]) > GROUP_WIDTH)
     means = tuple(float(speeds[labels == g].mean()) for g in range(labels.max() + 1))
     reference = int(np.argmin(np.abs(np.log(np.array(means) / np.median(speeds)))))
@@ -72,6 +73,8 @@ class Layout:
     groups: Groups
     slots: tuple[Slot, ...]
     shared: int
+    exponent: float = 1.0
+    """Exponent of the damping's speed law where it is not one of the slots."""
 
     @property
     def names(self) -> list[str]:
@@ -136,7 +139,7 @@ def _own_slots(run: int, record: Record, effects: Sequence[Effect]) -> list[Slot
     return slots + [Slot(c.name, c.unit, c.low, c.high, c.start, run) for e in effects for c in e.nuisance]
 
 
-def _first(values: FloatArray, ok: FloatArray) -> float:
+def _first(values: FloatArray, ok: BoolArray) -> float:
     """Return the mean of the first few measured samples."""
     index = np.flatnonzero(ok)[:5]
     return float(values[index].mean()) if index.size else 0.0

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import comb
 
 import numpy as np
 from scipy.optimize import minimize
 
 from fieldsid.fitting.whitening import NOISE_FIELDS, innovations
-from fieldsid.logs.run import FloatArray
+from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
@@ -18,7 +18,7 @@ SMALLEST_ANGLE = 1e-7
 SMALLEST_RATE = 1e-7
 
 
-def white_floor(values: FloatArray, ok: FloatArray) -> float:
+def white_floor(values: FloatArray, ok: BoolArray) -> float:
     """Return the white-noise standard deviation of a smooth signal from its third differences.
 
     A polynomial of degree 2 leaves nothing in them, white noise leaves binom(6, 3) times its variance; a
@@ -82,23 +82,29 @@ def estimate_noise(
     residuals: Sequence[FloatArray],
     family: str,
     start: Noise,
+    likelihood: Callable[[FloatArray], float] | None = None,
 ) -> tuple[Noise, float]:
     """Return the noise of a family with the highest likelihood, and that log likelihood.
 
-    dynamics are (damping, stiffness) of each run's base model; start gives where the search begins.
+    dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
+    noise vector (7,), is by default that of the residuals as they are.
     """
     names = FAMILIES[family]
     floor = floor_of(records)
     rough = _rough_start(records, dynamics, residuals, floor, start)
     off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
     low, high = _bounds(names, floor)
+    place = [NOISE_FIELDS.index(n) for n in names]
+    plain = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
 
     def vector(x: FloatArray) -> FloatArray:
-        known = off | dict(zip(names, np.exp(x), strict=True))
-        return np.array([known[n] for n in NOISE_FIELDS])
+        known = plain.copy()
+        known[place] = np.exp(x)
+        return known
 
     def cost(x: FloatArray) -> float:
-        value = -log_likelihood(records, dynamics, residuals, vector(x))
+        known = vector(x)
+        value = -(likelihood(known) if likelihood is not None else log_likelihood(records, dynamics, residuals, known))
         return value if np.isfinite(value) else 1e15
 
     x0 = np.clip(np.log([rough[n] for n in names]), low, high)
@@ -106,8 +112,7 @@ def estimate_noise(
         cost, x0, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
         options={"maxiter": 30, "eps": 1e-4, "ftol": 1e-8},
     )  # fmt: skip
-    known = off | dict(zip(names, np.exp(best.x), strict=True))
-    return Noise(**{n: float(known[n]) for n in NOISE_FIELDS}), float(-best.fun)
+    return Noise(*vector(best.x).tolist()), float(-best.fun)
 
 
 def _bounds(names: tuple[str, ...], floor: Noise) -> tuple[FloatArray, FloatArray]:

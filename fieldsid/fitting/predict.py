@@ -63,15 +63,11 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     """Return a problem of one record whose shared slots hold the model's values at the record's speed."""
     names = NAMES[model.axis]
     layout = layout_of([record], model.axis, effects)
-    reference = model.law.reference
-    groups = Groups((reference,), (0,), 0, (model.law.effective(record.speed),))
-    layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared)
-    at_speed = model.at_speed(record.speed)
+    groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),))
+    layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared, model.law.damping_exponent)
+    # the frozen layout scales authority by s^2: divide that out of the law's own value
     scale = model.law.scale(record.speed)
-    # the frozen layout scales damping by s and authority by s^2: divide that out of the law's own values
-    values = dict(model.values) | at_speed
-    values[names.damping] /= scale
-    values[names.authority] /= scale**2
+    values = dict(model.values) | {names.authority: model.at_speed(record.speed)[names.authority] / scale**2}
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
     return Problem((record,), layout), x
 

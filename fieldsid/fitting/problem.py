@@ -40,15 +40,15 @@ class Problem:
         names, layout = NAMES[self.layout.axis], self.layout
         v = dict(zip(layout.names, x[: layout.shared], strict=True))
         group = layout.groups.of_run[run]
-        share, ratio = self._scales(run)
+        share, ratio = self.scales(run)
         return Base(
-            v[names.damping] * share ** v.get("damping_exponent", 1.0),
+            v[names.damping] * share ** v.get("damping_exponent", layout.exponent),
             0.0 if names.stiffness is None else v[names.stiffness],
             v[group_name(names.authority, layout.groups, group)] * ratio**2,
             v[names.trim],
         )
 
-    def _scales(self, run: int) -> tuple[float, float]:
+    def scales(self, run: int) -> tuple[float, float]:
         """Return speed over reference speed, and speed over the speed of the run's own group."""
         g = self.layout.groups
         speed = g.run_speeds[run]
@@ -60,7 +60,8 @@ class Problem:
         """Return the effects' coefficients as a run sees them."""
         layout = self.layout
         own = {layout.slots[i].name: float(x[i]) for i in layout.of_run(run)}
-        return dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
+        law = {"damping_exponent": layout.exponent}
+        return law | dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
 
     def start_of(self, values: dict[str, float]) -> FloatArray:
         """Return the initial state among a run's values."""
@@ -71,7 +72,7 @@ class Problem:
         record, effects = self.records[run], self.layout.effects
         base, values = self.base_of(x, run), self.values_of(x, run)
         start = self.start_of(values)
-        arrays = assemble(record, effects, base, values, self._scales(run)[0])
+        arrays = assemble(record, effects, base, values, self.scales(run)[0])
         arrays = with_moments(record, arrays, effects, values, start)
         out = run_core(record, arrays, start)
         return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
@@ -85,7 +86,7 @@ class Problem:
         """Return one run's free run with its sensitivities to the free slots that touch it."""
         record, layout = self.records[run], self.layout
         values, base = self.values_of(x, run), self.base_of(x, run)
-        start, scale = self.start_of(values), self._scales(run)[0]
+        start, scale = self.start_of(values), self.scales(run)[0]
         wanted = set(range(len(x)) if free is None else free)
         slots = tuple(i for i in (*range(layout.shared), *layout.of_run(run)) if i in wanted and self._touches(i, run))
         raw = assemble(record, layout.effects, base, values, scale)
@@ -163,12 +164,12 @@ class _Pushes:
     def _push(self, name: str) -> tuple[FloatArray | None, FloatArray]:
         names = NAMES[self.problem.layout.axis]
         none = np.zeros(len(kernels.CONSTANTS))
-        share, ratio = self.problem._scales(self.run)
-        exponent = self.values.get("damping_exponent", 1.0)
+        share, ratio = self.problem.scales(self.run)
+        exponent = self.values["damping_exponent"]
         if name == names.damping:
             return self._damping(share**exponent), none
         if name == "damping_exponent":
-            return self._damping(self.base.damping * float(np.log(share))), none
+            return self._damping(self.base.damping * float(np.log(share))), self._of_exponent()
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return self._authority(ratio**2), none
         d = np.zeros_like(self.arrays.drive)
@@ -185,6 +186,14 @@ class _Pushes:
         shape = self.arrays.terms.damping_factor
         d[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1] + shape[1:])
         return d
+
+    def _of_exponent(self) -> FloatArray:
+        """Derivative of the core's constants by the damping exponent: what sway and heave scale with, too."""
+        step, ends = 1e-4, []
+        for sign in (1.0, -1.0):
+            shifted = self.values | {"damping_exponent": self.values["damping_exponent"] + sign * step}
+            ends.append(assemble(self.record, self.problem.layout.effects, self.base, shifted, self.scale).constants)
+        return np.asarray((ends[0] - ends[1]) / (2 * step))
 
     def _authority(self, factor: float) -> FloatArray:
         d = np.zeros_like(self.arrays.drive)

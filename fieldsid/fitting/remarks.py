@@ -18,7 +18,12 @@ WEAKEST_AUTHORITY = 3.0
 
 def remarks(problem: Problem, solution: Solution, _floor: Noise) -> tuple[Note, ...]:
     """Return the remarks of a solution, the gravest first."""
-    return (*_stability(problem, solution), *_bounds(problem, solution), *_identifiability(problem, solution), *_correlations(problem, solution))
+    return (
+        *_stability(problem, solution),
+        *_bounds(problem, solution),
+        *_identifiability(problem, solution),
+        *_correlations(problem, solution),
+    )
 
 
 def _values(problem: Problem, solution: Solution) -> dict[str, float]:
@@ -55,7 +60,8 @@ def _bounds(problem: Problem, solution: Solution) -> Iterator[Note]:
         if min(solution.x[i] - slot.low, slot.high - solution.x[i]) <= 1e-6 * span:
             yield Note(
                 "on_bound",
-                f"{slot.name} = {solution.x[i]:.4g} {slot.unit} is on its bound [{slot.low:g}, {slot.high:g}]: no error bar is right there",
+                f"{slot.name} = {solution.x[i]:.4g} {slot.unit} is on its bound [{slot.low:g}, {slot.high:g}]: "
+                "no error bar is right there",
                 {"value": float(solution.x[i]), "low": slot.low, "high": slot.high},
             )
 
@@ -65,14 +71,16 @@ def _identifiability(problem: Problem, solution: Solution) -> Iterator[Note]:
     if names.stiffness is not None and abs(v[names.stiffness]) < 2.0 * s[names.stiffness]:
         yield Note(
             "stiffness_not_identifiable",
-            f"{names.stiffness} = {v[names.stiffness]:.2g} +/- {s[names.stiffness]:.2g} 1/s^2 cannot be told from zero in this maneuver",
+            f"{names.stiffness} = {v[names.stiffness]:.2g} +/- {s[names.stiffness]:.2g} 1/s^2 "
+            "cannot be told from zero in this maneuver",
             {"value": v[names.stiffness], "std_error": s[names.stiffness], "hint": "hold the fin longer, or fly slower"},
         )
     b = v[names.authority]
     if s[names.authority] > 0.0 and abs(b) < WEAKEST_AUTHORITY * s[names.authority]:
         yield Note(
             "not_excited",
-            f"{names.authority} = {b:.2g} +/- {s[names.authority]:.2g} 1/s^2 cannot be told from zero: the fin hardly moved the vehicle",
+            f"{names.authority} = {b:.2g} +/- {s[names.authority]:.2g} 1/s^2 cannot be told from zero: "
+            "the fin hardly moved the vehicle",
             {"value": b, "std_error": s[names.authority], "limit": WEAKEST_AUTHORITY, "hint": "fly larger or longer pulses"},
         )
 

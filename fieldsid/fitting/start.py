@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldsid.fitting.layout import Layout, group_name
-from fieldsid.logs.run import FloatArray
+from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
 
@@ -27,7 +27,7 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
     base += [group_name(names.authority, groups, i) for i in range(len(groups.speeds))] + [names.trim]
     rows, targets = [], []
     for run, record in enumerate(records):
-        block, target = _windows(record, names.stiffness is not None)
+        block, target = _windows(record, stiff=names.stiffness is not None)
         full = np.zeros((len(target), len(base)))
         share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
         full[:, 0] = block[:, 0] * share
@@ -53,11 +53,13 @@ def _share(speed: float, reference: float) -> float:
     return float(speed / reference) if ok else 1.0
 
 
-def _windows(record: Record, stiff: bool) -> tuple[FloatArray, FloatArray]:
+def _windows(record: Record, *, stiff: bool) -> tuple[FloatArray, FloatArray]:
     """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of one run."""
     h = record.steps
     rate, ok = _rate(record)
-    angle = np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
+    angle = (
+        np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
+    )
     count = max(2, round(WINDOW_S / float(np.median(h))))
     if len(record) <= count + 2:
         return np.zeros((0, 4)), np.zeros(0)
@@ -73,7 +75,7 @@ def _windows(record: Record, stiff: bool) -> tuple[FloatArray, FloatArray]:
     return block[good], target[good]
 
 
-def _rate(record: Record) -> tuple[FloatArray, FloatArray]:
+def _rate(record: Record) -> tuple[FloatArray, BoolArray]:
     """Return the measured rate, or the smoothed slope of the angle where there is none."""
     if record.rate_ok.any():
         known = record.rate_ok
@@ -90,8 +92,8 @@ def _smoothed(values: FloatArray, width: int = 5) -> FloatArray:
     return np.asarray(np.convolve(values, kernel, mode="same") / weight)
 
 
-def _whole(ok: FloatArray, count: int) -> FloatArray:
-    missing = _integral((~ok.astype(bool)).astype(float))[: ok.size]
+def _whole(ok: BoolArray, count: int) -> BoolArray:
+    missing = _integral((~ok).astype(float))[: ok.size]
     total = np.append(missing, missing[-1] + float(not ok[-1]))[: ok.size + 1]
     return np.asarray((total[count : ok.size] - total[: ok.size - count]) < 0.2 * count)
 

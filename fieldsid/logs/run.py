@@ -18,6 +18,7 @@ import numpy.typing as npt
 from fieldsid.errors import DataError
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 SIGNALS: Mapping[str, str] = MappingProxyType(
     {

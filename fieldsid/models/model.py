@@ -78,9 +78,7 @@ class Model:
         return out
 
 
-def save_model(
-    model: Model, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False
-) -> Path:
+def save_model(model: Model, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False) -> Path:
     """Write a model as YAML; raises ArtifactError."""
     body = {
         "axis": model.axis.value,
@@ -134,5 +132,7 @@ def load_model(path: Path) -> Model:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise ArtifactError(
-            f"`{path}` is not a complete model file", found=f"{type(error).__name__}: {error}", hint="identify again, with `--force`"
+            f"`{path}` is not a complete model file",
+            found=f"{type(error).__name__}: {error}",
+            hint="identify again, with `--force`",
         ) from error

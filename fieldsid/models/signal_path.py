@@ -115,9 +115,7 @@ def run_core(record: Record, assembled: Assembled, start: FloatArray) -> FloatAr
     return out
 
 
-def with_moments(
-    record: Record, assembled: Assembled, effects: Sequence[Effect], values: Values, start: FloatArray
-) -> Assembled:
+def with_moments(record: Record, assembled: Assembled, effects: Sequence[Effect], values: Values, start: FloatArray) -> Assembled:
     """Return the arrays with every state-dependent moment the core does not know, iterated to convergence.
 
     Quasilinearisation: m(y, p) is replaced by its value and slopes along the last trajectory, the slopes joining
@@ -134,7 +132,9 @@ def with_moments(
         drive = assembled.drive.copy()
         for effect in own:
             _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
-        current = Assembled(drive, assembled.constants, _pieces(record, drive, assembled.constants), assembled.fin, assembled.terms)
+        current = Assembled(
+            drive, assembled.constants, _pieces(record, drive, assembled.constants), assembled.fin, assembled.terms
+        )
         new = run_core(record, current, start)
         change = float(np.max(np.abs(new[:, :2] - path[:, :2])))
         path = new

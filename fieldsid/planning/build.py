@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldsid.errors import UsageError
-from fieldsid.maneuvers import pick_maneuver
+from fieldsid.logs.run import FloatArray
+from fieldsid.maneuvers import Schedule, pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.planning.candidate import Candidate, Window, fits, flown
 from fieldsid.planning.crowd import Crowd, crowd_of, fly_crowd
@@ -17,6 +18,7 @@ from fieldsid.planning.information import information_of
 from fieldsid.planning.judge import Judge, judge_of
 from fieldsid.planning.leg import Expected, Leg, turn_back_s
 from fieldsid.planning.prior import draws_of, scales_of
+from fieldsid.planning.rule_flight import fly_scenes
 from fieldsid.planning.scene import scene_of
 from fieldsid.planning.tune import Effort, Scored, as_switched, catalogue, switching
 
@@ -81,7 +83,6 @@ def risk_of(judge: Judge, crowd: Crowd, candidate: Candidate) -> tuple[float, di
 def leg_of(judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | None = None, purpose: str = "parameters") -> Leg:
     """Return a candidate as a leg: expected errors beside those of the paper's pulses, excursions, risk."""
     scene = judge.scene
-    response = flown(scene, candidate, judge.window, judge.envelope.limits, judge.autopilot)
     risk, excursions = risk_of(judge, crowd or crowd_at(judge, setting), candidate)
     turn = turn_back_s(scene.base.damping, scene.base.authority, judge.envelope.fin)
     return Leg(
@@ -95,8 +96,20 @@ def leg_of(judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | 
         excursions=excursions,
         break_probability=risk,
         purpose=purpose,
-        nominal=response.command,
+        nominal=_nominal(judge, candidate),
     )
+
+
+def _nominal(judge: Judge, candidate: Candidate) -> FloatArray:
+    """Return the fin about trim a rule is expected to ask for on the prior's mean, NaN where the autopilot steers, (n,)."""
+    if candidate.record.rule is None:
+        return np.zeros(0)
+    window = judge.window
+    flight = fly_scenes(
+        [judge.scene], candidate.record, candidate.parameters, limits=judge.envelope.limits, autopilot=judge.autopilot,
+        schedule=Schedule(window.rate_hz, window.lead, window.recover),
+    )  # fmt: skip
+    return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
 
 
 def expected_errors(judge: Judge, setting: Setting, candidate: Candidate) -> dict[str, Expected]:

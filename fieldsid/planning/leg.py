@@ -38,7 +38,7 @@ class Leg:
     """One maneuver at one speed (m/s), flown `passes` times: run-up, window, turn back.
 
     `expected` is for all passes together. `excursions` are 95 % quantiles over the prior (rad, m).
-    `nominal` (n,) is the fin about trim as flown on the prior's mean, rad.
+    `nominal` (n,) is the fin about trim in rad that a rule is expected to ask for, NaN where the autopilot steers.
     """
 
     speed: float

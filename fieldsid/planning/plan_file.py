@@ -68,7 +68,7 @@ def _leg_body(plan: Plan, leg: Leg) -> dict[str, Any]:
         "abort": [asdict(a) for a in aborts_of(plan.axis, leg, plan.envelope)],
     }
     if not leg.open_loop:
-        body["expected_fin_rad"] = [round(v, 5) for v in leg.nominal.tolist()]
+        body["expected_fin_rad"] = [None if math.isnan(v) else round(v, 5) for v in leg.nominal.tolist()]
     return body
 
 
@@ -133,7 +133,7 @@ def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
         break_probability=_within(body["break_probability"], "break_probability", 0.0, 1.0),
         passes=round(_within(body["passes"], "passes", 1, MOST_PASSES)),
         purpose=str(body["purpose"]),
-        nominal=np.clip([_number(v, "expected_fin_rad") for v in body.get("expected_fin_rad", [])], -envelope.fin, envelope.fin),
+        nominal=np.clip([_fin(v) for v in body.get("expected_fin_rad", [])], -envelope.fin, envelope.fin),
     )
 
 
@@ -150,6 +150,10 @@ def _check_fins(candidate: Candidate, envelope: Envelope) -> None:
 
 def _expected(body: Mapping[str, Any]) -> Expected:
     return Expected(**{f: math.nan if body[f] is None else float(body[f]) for f in Expected.__dataclass_fields__})
+
+
+def _fin(value: Any) -> float:
+    return math.nan if value is None else _number(value, "expected_fin_rad")
 
 
 def _number(value: Any, name: str) -> float:

@@ -1,0 +1,18 @@
+"""Gains per speed: `design_schedule` and `verify_schedule` are `sysid schedule design` and `verify`."""
+
+from fieldsid.schedule.design import Wish
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.plant import FinLimits
+from fieldsid.schedule.record import Schedule, load_schedule, save_schedule
+from fieldsid.schedule.verify import Verification, verify_schedule
+
+__all__ = [
+    "FinLimits",
+    "Schedule",
+    "Verification",
+    "Wish",
+    "design_schedule",
+    "load_schedule",
+    "save_schedule",
+    "verify_schedule",
+]

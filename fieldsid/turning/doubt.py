@@ -20,8 +20,8 @@ REACHED = 0.8
 """Share of the turn's fin, rate or duration from which the data count as having reached it."""
 SHAPES_THE_TURN = frozenset({"sway_coupling", "quadratic_damping", "crossflow_drag"})
 """Effects that hold what a steady turn adds to a short pulse."""
-SETTLED_SD = 0.04
-"""What was left in the ensemble of a model with these effects from pulses and a zig-zag: -0.03 +/- 0.04."""
+SETTLED_SD = 0.05
+"""What was left in the ensemble of a model with these effects from pulses and a zig-zag: -0.03 +/- 0.04, rounded up."""
 UNSEEN_SWAY_SD = 0.06
 """More where the fit put a sway mode below what the data could show: its share of the settled turn was never seen."""
 STALL_SD = 0.04

@@ -29,6 +29,8 @@ DRAWS = 500
 SEED = 20240511
 METHODS = ("auto", "u_turn", "steady", "simulated")
 SAME_TURN = 0.05
+NOT_WORTH_SAYING = 0.0025
+"""An offset in rad that moves a radius by a hundredth."""
 
 
 def turn_radius(
@@ -273,7 +275,7 @@ def _notes(source: Source, rows: Sequence[TurnRow], method: str, surge: SurgeMod
             )
         )
     if method == "simulated" and (surge is None or not surge.surge_measured):
-        notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 45 %)"))
+        notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 50 %)"))
     if method == "u_turn":
         notes += _offset_notes(source, fin_zero)
     return notes
@@ -286,7 +288,7 @@ def _offset_notes(source: Source, fin_zero: float) -> list[Note]:
         for p in source.points
         if {names.trim, names.authority} <= set(p.values)
     ]
-    small = [o for _, o in offsets if 0 < abs(o) <= fin_zero]
+    small = [o for _, o in offsets if NOT_WORTH_SAYING < abs(o) <= fin_zero]
     if not small:
         return []
     return [

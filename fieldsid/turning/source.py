@@ -16,9 +16,9 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Model, load_model
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.turning.law import ParameterLaw
 from fieldsid.turning.laws import KIND as FIT_KIND
 from fieldsid.turning.laws import Laws, fit_laws, load_laws, with_own_law
-from fieldsid.turning.line import t_factor
 from fieldsid.turning.points import SAME_SPEED, Point, check_authority, distinct_speeds, points_of
 from fieldsid.turning.table import read_table
 
@@ -80,35 +80,34 @@ class Source:
 
         Else the laws', or the single point's scaled as lift: damping with u, authority with u^2.
         """
-        at = [p for p in self.points if abs(p.speed - speed) <= 1e-6 * speed]
-        out = dict(at[0].values) if at else {}
-        if self.laws is not None:
-            laws = self.laws.at(speed)
-            out = {**laws, **out}
-            out |= {n: laws[n] for n in self.own_laws}
-        elif not at:
-            only = self.points[0]
-            law = SpeedLaw(only.speed)
-            names = NAMES[self.axis]
-            out = dict(only.values)
-            out[names.authority] = law.authority(speed, out[names.authority])
-            if names.damping in out:
-                out[names.damping] *= law.damping_factor(speed)
-        return out
+        here = self._point_at(speed)
+        if self.laws is None:
+            return self._scaled(here or self.points[0], speed)
+        laws = self.laws.at(speed)
+        own = {} if here is None else self._scaled(here, speed)
+        return {**laws, **own, **{n: laws[n] for n in self.own_laws}}
 
     def base_std_at(self, speed: float) -> dict[str, float]:
-        """Return standard errors of the base parameters at a speed: the point's own, else the scatter about the law."""
-        at = [p for p in self.points if abs(p.speed - speed) <= 1e-6 * speed]
-        own = dict(at[0].std_errors) if at else {}
+        """Return standard errors of the base parameters at a speed: the point's own, else the law's with the points' scatter."""
+        here = self._point_at(speed)
+        own = {} if here is None else dict(here.std_errors)
         if self.laws is None:
-            return own
-        spread = {}
-        for name, law in self.laws.by_name.items():
-            line = law.line
-            scatter = line.rms * np.sqrt(law.values.size / line.dof) if line.dof > 0 else 0.0
-            width = float(np.nan_to_num(line.std(speed)[0])) if not at else 0.0
-            spread[name] = float(np.hypot(scatter, width)) * t_factor(line.dof) / t_factor(0)
-        return {**spread, **own}
+            return own or dict(self.points[0].std_errors)
+        return {**{n: _spread(law, speed) for n, law in self.laws.by_name.items()}, **own}
+
+    def _point_at(self, speed: float) -> Point | None:
+        """Return the point whose speed counts as the same, None where there is none."""
+        nearest = min(self.points, key=lambda p: abs(p.speed - speed))
+        return nearest if abs(nearest.speed - speed) <= SAME_SPEED * speed else None
+
+    def _scaled(self, point: Point, speed: float) -> dict[str, float]:
+        law, names = SpeedLaw(point.speed), NAMES[self.axis]
+        out = dict(point.values)
+        if names.authority in out:
+            out[names.authority] = law.authority(speed, out[names.authority])
+        if names.damping in out:
+            out[names.damping] *= law.damping_factor(speed)
+        return out
 
     def base_draws(self, speed: float, count: int, rng: np.random.Generator) -> dict[str, FloatArray]:
         """Return draws (count,) of the base parameters at a speed, the first the estimate."""
@@ -119,6 +118,16 @@ class Source:
             z[0] = 0.0
             out[name] = values.get(name, 0.0) + z * spread.get(name, 0.0)
         return out
+
+
+def _spread(law: ParameterLaw, speed: float) -> float:
+    """Return the error of a law at a speed: its own, and that of one more point (its stated error, or the others' scatter)."""
+    line = law.line
+    width = float(np.nan_to_num(line.std(speed)[0]))
+    if law.std_errors is not None:
+        return float(np.hypot(width, np.interp(speed, law.speeds, law.std_errors)))
+    scatter = line.rms * np.sqrt(law.values.size / line.dof) if line.dof > 0 else 0.0
+    return float(np.hypot(width, scatter))
 
 
 def load_source(paths: Sequence[Path], *, laws: Sequence[str] = ()) -> Source:

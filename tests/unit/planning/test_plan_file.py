@@ -31,7 +31,7 @@ def leg(spec="square_pulses", **changes):
     made = Leg(
         1.4, Candidate(maneuver.name, values), Window(33.0), 10.0, 15.0, Autopilot(-0.4, -0.1, 0.26),
         {"a22": Expected(1.1, 0.05, 0.07, 0.045, 0.1)}, {"heading": 0.4}, 0.02,
-        nominal=np.zeros(0) if maneuver.rule is None else np.linspace(-0.2, 0.2, 600),
+        nominal=np.zeros(0) if maneuver.rule is None else np.append(np.linspace(-0.2, 0.2, 540), np.full(60, np.nan)),
     )  # fmt: skip
     return replace(made, **changes)
 

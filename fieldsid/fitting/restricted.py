@@ -1,0 +1,95 @@
+"""Noise from the residuals of a fit, allowing for what the fit took out of them: restricted likelihood.
+
+    l(noise) = -1/2 [log|S| + log|J' S^-1 J| + r' S^-1 r],   r = e - J (J' S^-1 J)^-1 J' S^-1 e
+e are the residuals at some x, J their sensitivities to all that was estimated: r is what generalised least squares
+under that noise would leave, so that x need not be its own minimum, and slow noise that parameters absorb is counted.
+Source: Patterson and Thompson 1971, Biometrika 58(3), Recovery of inter-block information.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.noise import FAMILIES, estimate_noise
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import innovations
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+GAIN_NEEDED = 4.0
+"""Log likelihood a family must gain over a simpler one for each parameter more (about twice Akaike's 1)."""
+NO_INFORMATION = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One run at x: base dynamics, residual and sensitivities stacked (1 + P, 2, n), and where those belong (P,)."""
+
+    record: Record
+    damping: float
+    stiffness: float
+    stack: FloatArray
+    place: FloatArray
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus simulated, (2, n)."""
+        return np.asarray(self.stack[0])
+
+
+def lines_of(problem: Problem, x: FloatArray) -> list[Line]:
+    """Return the linearisation of every run."""
+    lines = []
+    for run, record in enumerate(problem.records):
+        r = problem.linearise(x, run)
+        stack = np.concatenate([r.residual[None], r.sensitivity])
+        lines.append(Line(record, max(r.base.damping, 1e-3), max(r.base.stiffness, 0.0), stack, np.array(r.slots, dtype=int)))
+    return lines
+
+
+def restricted_likelihood(lines: list[Line], count: int, noise: FloatArray) -> float:
+    """Return the restricted log likelihood, up to its constant, of a noise vector (7,); count is the number of slots."""
+    square, logs = np.zeros((count + 1, count + 1)), 0.0
+    for line in lines:
+        white = np.empty_like(line.stack)
+        r = line.record
+        logs += innovations(r.steps, r.angle_ok, r.rate_ok, line.damping, line.stiffness, noise, line.stack, white)
+        flat = white.reshape(white.shape[0], -1)
+        where = np.concatenate([[0], 1 + line.place]).astype(int)
+        square[np.ix_(where, where)] += flat @ flat.T
+    return -0.5 * (logs + _profiled(square))
+
+
+def _profiled(square: FloatArray) -> float:
+    """Return r' S^-1 r + log|J' S^-1 J| from the products of residual and sensitivities, (1 + F, 1 + F)."""
+    scale = np.sqrt(np.diag(square)[1:])
+    known = np.flatnonzero(scale > 0.0)
+    scale = scale[known]
+    normal = square[1:, 1:][np.ix_(known, known)] / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(normal)
+    kept = values > NO_INFORMATION
+    share = vectors.T[kept] @ (square[1:, 0][known] / scale)
+    return float(square[0, 0] - np.sum(share**2 / values[kept]) + np.sum(np.log(values[kept])) + 2.0 * np.sum(np.log(scale)))
+
+
+def restricted_noise(problem: Problem, lines: list[Line], family: str, start: Noise) -> tuple[Noise, float]:
+    """Return the noise of a family of highest restricted likelihood, and that log likelihood."""
+    dynamics, residuals = [(line.damping, line.stiffness) for line in lines], [line.residual for line in lines]
+    count = len(problem.layout.slots)
+    return estimate_noise(
+        problem.records, dynamics, residuals, family, start, lambda noise: restricted_likelihood(lines, count, noise)
+    )
+
+
+def best_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, Noise, float]:
+    """Return the family, noise and log likelihood that the residuals at x support, by a penalised likelihood."""
+    lines = lines_of(problem, x)
+    best: tuple[str, Noise, float] | None = None
+    for family, names in FAMILIES.items():
+        noise, score = restricted_noise(problem, lines, family, start)
+        if best is None or score - GAIN_NEEDED * len(names) > best[2] - GAIN_NEEDED * len(FAMILIES[best[0]]):
+            best = (family, noise, score)
+    return ("white", start, float("nan")) if best is None else best
