@@ -45,15 +45,19 @@ def command(
     folder = _folder(output, force=force)
     vehicle = hidden_vehicle(effect)
     make_trial(vehicle, folder / "trial", force=force)
-    known = places(folder, vehicle.axis)
+    known = dict(places(folder, vehicle.axis))
     if not as_json:
         sys.stdout.write(_opening(folder))
-    steps = [step for step in STEPS if vehicle.axis in step.axes]
-    done = [_taken(i, step, known, force=force, quiet=as_json) for i, step in enumerate(steps, start=1)]
+    done: list[dict[str, Any]] = []
+    for step in (s for s in STEPS if vehicle.axis in s.axes):
+        if step.possible(known):
+            done.append(_taken(len(done) + 1, step, known, force=force, quiet=as_json))
+            known |= step.learns(done[-1]["result"])
     body = {
         "schema": "fieldsid/demo/1",
         "folder": str(folder),
         "hidden": {"effect": effect, "axis": vehicle.axis, "values": dict(vehicle.values)},
+        "named": known["effects"].split(",") if "effects" in known else [],
         "steps": done,
         "files": sorted(str(p) for p in folder.rglob("*") if p.is_file()),
         "seconds": perf_counter() - began,
@@ -86,7 +90,7 @@ def _taken(place: int, step: Step, known: Mapping[str, str], *, force: bool, qui
         result = run([*expanded(words), *(["--force"] if force else [])])
     meaning = step.means(result)
     if not quiet:
-        sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ')}\n")
+        sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")
         sys.stdout.flush()
     return {"command": "sysid " + " ".join(words), "seconds": perf_counter() - began, "means": meaning, "result": result}
 
@@ -109,7 +113,7 @@ def _opening(folder: Path) -> str:
         f"A small vehicle has flown rudder or elevator pulses at three speeds and zig-zags at two others. Its logs are in "
         f"{folder}/trial. Its dynamics hold one effect more than the textbook's model; the commands below do not know which."
     )
-    return fill(text, WIDTH) + "\n"
+    return fill(text, WIDTH, break_on_hyphens=False) + "\n"
 
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
@@ -119,7 +123,8 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     own = {n: v for n, v in hidden["values"].items() if n not in NAMES[Axis(hidden["axis"])].base}
     numbers = ", ".join(f"{n} = {v:.3g}" for n, v in own.items())
     figures = [f for f in body["files"] if f.endswith(".png")]
-    to.print(f"\nHidden in the trial was {hidden['effect']} ({numbers}).")
+    named = " and ".join(body["named"]) or "nothing"
+    to.print(f"\nHidden in the trial was {hidden['effect']} ({numbers}); diagnose named {named}.", soft_wrap=True)
     to.print(f"{len(body['files'])} files are in {body['folder']}, {len(figures)} of them figures:", soft_wrap=True)
     for file in figures:
         to.print(f"  {file}", soft_wrap=True)

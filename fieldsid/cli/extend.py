@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.extension import Extension
+    from fieldsid.models.effect import Coefficient
     from fieldsid.models.model import Model
 
 SCHEMA = "fieldsid/extend/1"
+NEAR = 1e-6
+"""Share of a coefficient's range from its bound within which it lies at it."""
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
@@ -113,7 +116,7 @@ def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> 
     from fieldsid.effects import pick_effect
     from fieldsid.extension import gain_body, kept_by
 
-    new = [c.name for n in found.gain.added for c in pick_effect(n).shared]
+    new = [c for n in found.gain.added for c in pick_effect(n).shared]
     return {
         "schema": SCHEMA,
         "axis": parent.axis.value,
@@ -125,12 +128,15 @@ def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> 
         "model": str(path if written is None else written),
         "effects": list(parent.effects if written is None else found.model.effects),
         "parent": {"path": str(path), "sha256": sha256_of(path)},
-        "coefficients": {
-            n: {"value": found.model.values[n], "std_error": found.model.std_error(n), "unit": found.model.units.get(n, "")}
-            for n in new
-        },
+        "coefficients": {c.name: _coefficient(found.model, c) for c in new},
         "notes": [{"code": n.code, "message": n.message} for n in found.notes],
     }
+
+
+def _coefficient(model: Model, c: Coefficient) -> dict[str, Any]:
+    value = model.values[c.name]
+    at_bound = min(value - c.low, c.high - value) <= NEAR * (c.high - c.low)
+    return {"value": value, "std_error": model.std_error(c.name), "unit": c.unit, "at_bound": at_bound}
 
 
 def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
@@ -192,7 +198,7 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     ]
     to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
     to.print()
-    found = [(n, _value(c["value"], c["std_error"]), c["unit"]) for n, c in body["coefficients"].items()]
+    found = [(n, _value(c["value"], c["std_error"], at_bound=c["at_bound"]), c["unit"]) for n, c in body["coefficients"].items()]
     to.print(table("", ("coefficient", "value", "unit"), found, left=2))
     to.print()
     to.print(Text(_verdict(body)))
@@ -208,9 +214,11 @@ def _verdict(body: Mapping[str, Any]) -> str:
     return f"not kept: on {data} it does not pay; nothing was written, --keep overrules"
 
 
-def _value(value: float, error: float) -> str:
-    """Return a value with its error, or that these data do not tell it."""
+def _value(value: float, error: float, *, at_bound: bool) -> str:
+    """Return a value with its error, or why it has none."""
     from fieldsid.rounding import number, with_error
 
+    if at_bound:
+        return f"{number(value)} (at its bound)"
     known = error < MUCH * max(abs(value), SMALL)
     return with_error(value, error) if known else f"{number(value)} (these data do not tell)"

@@ -60,6 +60,9 @@ def _entry(g: Generation) -> dict[str, Any]:
 def _drawn(line: Sequence[Generation], model: Path, path: Path | None, *, force: bool) -> str | None:
     if path is None:
         return None
+    if not any(g.step for g in line):
+        say("nothing was added yet: there is no figure to draw")
+        return None
     from fieldsid.figures.canvas import save
     from fieldsid.figures.history import figure
 

@@ -1,7 +1,7 @@
 """The steps of the tour: each a command as a user would type it, and what its result means, in words with its numbers.
 
-A line is a template over the names of `places`; a word with `*` stands for the files it matches. A later step is one more
-entry in STEPS.
+A line is a template over the names of `places` and over what earlier steps have learned; a word with `*` stands for the
+files it matches. A step whose line needs what nobody has learned is left out. A later step is one more entry in STEPS.
 """
 
 from __future__ import annotations
@@ -9,23 +9,35 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
+from fieldsid.demo.trial import CHECK_SPEEDS
 from fieldsid.models.axis import Axis
 from fieldsid.rounding import number, with_error
 
 Result = Mapping[str, Any]
 NEAR_NOISE = 1.15
+CHECKED = " ".join(f"--validate {{runs}}/zigzag_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
+"""The runs that judge; the option stands before each, as a shell gives only the first of a pattern's files to an option."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step: its heading, its command line after `sysid`, what the result means, and the axes it makes sense for."""
+    """One step: its heading, its command line after `sysid`, what the result means, and the axes it makes sense for.
+
+    learns gives, from the result, what later lines may name.
+    """
 
     title: str
     line: str
     means: Callable[[Result], str]
     axes: tuple[Axis, ...] = tuple(Axis)
+    learns: Callable[[Result], Mapping[str, str]] = lambda _result: {}
+
+    def possible(self, known: Mapping[str, str]) -> bool:
+        """Whether everything the line names is known."""
+        return {name for _, name, _, _ in Formatter().parse(self.line) if name} <= set(known)
 
 
 def places(folder: Path, axis: str) -> dict[str, str]:
@@ -35,7 +47,9 @@ def places(folder: Path, axis: str) -> dict[str, str]:
         "mapping": str(folder / "mapping.yaml"),
         "runs": str(folder / "runs"),
         "models": str(folder / "models"),
+        "final": str(folder / "final"),
         "turning": str(folder / "turning"),
+        "fits": str(folder / "models" / f"pulses_*_{axis}.yaml"),
         "axis": axis,
     }
 
@@ -95,8 +109,54 @@ def _compared(result: Result) -> str:
     )
 
 
-def _simulated(result: Result) -> str:
-    return f"{result['seconds']:.0f} s of the model's own motion, kept as a run: any command that takes a log takes it too."
+def _diagnosed(result: Result) -> str:
+    if not result["effects"]:
+        return f"The verdict is {result['verdict']}: no effect of the catalogue is named, and none is added below."
+    first = result["candidates"][0]
+    return (
+        f"Every effect of the catalogue was added in turn and judged on runs it had not seen: {first['effect']} has probability "
+        f"{number(first['probability'], 3)} and explains {100 * first['explained']:.0f} % of what the noise does not."
+    )
+
+
+def _named(result: Result) -> Mapping[str, str]:
+    return {"effects": ",".join(result["effects"])} if result["effects"] else {}
+
+
+def _extended(result: Result) -> str:
+    before, after = (result["over_floor"][when] for when in ("before", "after"))
+    if not result["kept"]:
+        return (
+            f"On runs not seen the error goes from {before:.2f} to {after:.2f} x the noise: it does not pay, so nothing is kept."
+        )
+    return f"On runs not seen the error falls from {before:.2f} to {after:.2f} x the noise. 1 is where the sensors end, so " + (
+        "nothing is left to find." if after <= NEAR_NOISE else "something is left to find."
+    )
+
+
+def _grown(result: Result) -> Mapping[str, str]:
+    return {"extended": str(result["model"])}
+
+
+def _remembered(result: Result) -> str:
+    return (
+        "Each model knows its parent, its data by their hash, and the error before and after: "
+        f"the figure shows it falling to the noise floor, {result['figure']}."
+    )
+
+
+def _held(result: Result) -> str:
+    fits = [float(run["rate_fit_percent"]) for run in result["runs"]]
+    return f"The same runs again, now with the effect: the rate fit is {' and '.join(number(f, 3) for f in fits)} %."
+
+
+def _refitted(result: Result) -> str:
+    left = max(_over_noise(f, f["noise_floor"]) for f in result["fits"])
+    return "With the effect in the model every run may be fitted, zig-zags too, which gives two more speeds. " + _verdict(left)
+
+
+def _replaced(result: Result) -> Mapping[str, str]:
+    return {"fits": str(Path(result["fits"][0]["model"]).parent / "*.yaml")}
 
 
 def _lawful(result: Result) -> str:
@@ -112,7 +172,7 @@ def _turned(result: Result) -> str:
     return (
         f"The tightest turn is {number(tightest['radius_m'], 3)} m at {number(tightest['speed_m_s'], 2)} m/s "
         f"to {tightest['side']}, 95 % between {number(low, 3)} and {number(high, 3)} m, and it is {tightest['trust']}: "
-        "two-second pulses never show a settled turn, and a wide band says so."
+        "pulses and zig-zags never show a settled turn, and a wide band says so."
     )
 
 
@@ -166,24 +226,30 @@ STEPS: tuple[Step, ...] = (
         _compared,
     ),
     Step(
-        "The model's own prediction",
-        "simulate {models}/joint_{axis}.yaml --maneuver zigzag -o {runs}/predicted.csv",
-        _simulated,
+        "Which physical effect is missing?",
+        f"diagnose {{runs}}/pulses_*.parquet --axis {{axis}} {CHECKED} --figure {{models}}/diagnosis.png",
+        _diagnosed,
+        learns=_named,
     ),
     Step(
-        "How do the numbers change with speed?",
-        "fit {models}/pulses_*_{axis}.yaml -o {models}/law_{axis}.yaml",
-        _lawful,
+        "Add it, and watch the error fall",
+        f"extend {{models}}/joint_{{axis}}.yaml {{runs}}/pulses_*.parquet --add {{effects}} {CHECKED}",
+        _extended,
+        learns=_grown,
     ),
+    Step("How did this model come about?", "history {extended} --figure {models}/history.png", _remembered),
+    Step("Does it hold now?", "compare {extended} {runs}/zigzag_*.parquet -o {final}", _held),
     Step(
-        "How tight does it turn?",
-        "turn-radius {models}/pulses_*_yaw.yaml --speeds 1.0,1.4,1.8 -o {turning}",
-        _turned,
-        (Axis.YAW,),
+        "A better model for each speed",
+        "identify {runs}/*.parquet --axis {axis} --effects {effects} -o {final}/speeds --no-figures",
+        _refitted,
+        learns=_replaced,
     ),
+    Step("How do the numbers change with speed?", "fit {fits} -o {final}/law_{axis}.yaml", _lawful),
+    Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", _turned, (Axis.YAW,)),
     Step(
         "Gains for every speed",
-        "schedule design {models}/pulses_*_yaw.yaml --fin-limit 0.26 -o {turning}/gains.yaml",
+        "schedule design {fits} --fin-limit 0.26 -o {turning}/gains.yaml",
         _scheduled,
         (Axis.YAW,),
     ),

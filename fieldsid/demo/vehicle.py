@@ -37,8 +37,8 @@ UNITS = {"a22": "1/s", "b2": "1/s^2", "C0": "rad/s^2", "c22": "1/s", "c23": "1/s
 STRENGTHS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
         "servo_lag": {"lag": 0.35},
-        "sway_coupling": {"cross_damping": 1.0, "cross_rate": -0.6, "cross_fin": 0.2},
-        "heave_coupling": {"cross_damping": 1.0, "cross_rate": -0.6, "cross_fin": 0.2},
+        "sway_coupling": {"cross_damping": 1.0, "cross_rate": -0.6},
+        "heave_coupling": {"cross_damping": 1.0, "cross_rate": -0.6},
     }
 )
 """Strengths chosen by hand; every other effect's follows from its declaration."""

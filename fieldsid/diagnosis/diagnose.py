@@ -57,15 +57,22 @@ def diagnose(
     found = work.best()
     left = remainder_of(found, judged)
     verdict = verdict_of(work, found, left)
-    return _said(work, found, verdict, headline(work, verdict, found, left), skipped, notes)
+    floor = shown_floor(work.floor, found.judged.noise)
+    return _said(work, found, verdict, headline(work, verdict, found, left, floor), floor, skipped, notes)
 
 
 def _said(
-    work: Search, found: Hypothesis, verdict: Verdict, says: str, skipped: Mapping[str, str], notes: tuple[Note, ...]
+    work: Search,
+    found: Hypothesis,
+    verdict: Verdict,
+    says: str,
+    floor: Noise,
+    skipped: Mapping[str, str],
+    notes: tuple[Note, ...],
 ) -> Diagnosis:
     base = work.base()
     named = found if verdict.word in ("effect", "undecided") else base
-    candidates = _candidates(work, found)
+    candidates = _candidates(work, found, floor)
     model = named_model(named)
     added = tuple(n for n in named.names if n not in work.known)
     return Diagnosis(
@@ -75,7 +82,7 @@ def _said(
         says=says,
         base=base.errors,
         final=named.errors,
-        noise_floor=shown_floor(work.floor, found.judged.noise),
+        noise_floor=floor,
         candidates=candidates,
         model=model,
         base_model=named_model(base),
@@ -86,7 +93,7 @@ def _said(
     )
 
 
-def _candidates(work: Search, found: Hypothesis) -> tuple[Candidate, ...]:
+def _candidates(work: Search, found: Hypothesis, floor: Noise) -> tuple[Candidate, ...]:
     """Return the leading hypotheses, the one found first, then by evidence."""
     base = work.base()
     others = [h for h in work.ranked() if h is not found and h is not base]
@@ -100,7 +107,7 @@ def _candidates(work: Search, found: Hypothesis) -> tuple[Candidate, ...]:
             errors=h.errors,
             explained=explained(work, h),
             score=h.score - base.score,
-            evidence=evidence(work, h),
+            evidence=evidence(work, h, floor),
             confusable_with=confusable(work, h, shown),
         )
         for h in shown[:SHOWN]

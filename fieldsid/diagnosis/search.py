@@ -27,6 +27,8 @@ PROMISING, PROMISING_LATER = 5, 4
 LARGEST = 4
 CLEAN = 1.02
 ORDINARY = 0.05
+SLOW_S = 4.0
+"""A disturbance that lasts longer than this may be a drift, a bias or a speed moment in disguise."""
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
 MATTERS = 0.985
@@ -177,8 +179,11 @@ class Search:
 
     def asks_for_more(self, h: Hypothesis) -> bool:
         """Whether something is left above the noise, and it is not what a disturbance would leave."""
-        above = max(self.error(h), h.errors.train.over(self.floor)) > CLEAN
-        return above and remainder_of(h, self.validation).p < ORDINARY
+        if max(self.error(h), h.errors.train.over(self.floor)) <= CLEAN:
+            return False
+        noise = h.judged.noise
+        slow = noise.disturbance > 0.0 and noise.disturbance_time > SLOW_S
+        return slow or remainder_of(h, self.validation).p < ORDINARY
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

@@ -7,26 +7,32 @@ from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.verdict import Verdict, explained
 from fieldsid.models.effect import effect_named
+from fieldsid.models.model import Noise
 
 
-def evidence(search: Search, h: Hypothesis) -> str:
+def over(search: Search, h: Hypothesis, floor: Noise) -> float:
+    """Return a hypothesis's error on the runs it is judged by over a noise floor."""
+    return (h.errors.validation if search.validation else h.errors.train).over(floor)
+
+
+def evidence(search: Search, h: Hypothesis, floor: Noise) -> str:
     """Return what speaks for or against a hypothesis, in one sentence."""
     base = search.base()
     if h is base:
-        return f"base model: error {search.error(h):.2f} x noise floor on unseen runs"
+        return f"base model: error {over(search, h, floor):.2f} x noise floor on unseen runs"
     gain = h.score - base.score
     kind = "unseen runs" if search.validation else "the runs it was fitted to"
     runs = sum(1 for a, b in zip((*h.by_run, *h.unseen), (*base.by_run, *base.unseen), strict=True) if a > b)
     total = len(h.by_run) + len(h.unseen)
     return (
-        f"error on {kind} {search.error(base):.2f} -> {search.error(h):.2f} x noise floor "
+        f"error on {kind} {over(search, base, floor):.2f} -> {over(search, h, floor):.2f} x noise floor "
         f"({100 * explained(search, h):.0f} % of the excess); log evidence {gain:+.1f}; better on {runs} of {total} runs"
     )
 
 
-def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder) -> str:
+def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder, floor: Noise) -> str:
     """Return the verdict as an engineer would say it."""
-    error, base = search.error(found), search.error(search.base())
+    error, base = over(search, found, floor), over(search, search.base(), floor)
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {found.judged.noise.disturbance:.2g} rad/s^2 is there" if _disturbed(found) else ""
         return f"nothing to add: the base model predicts unseen runs at {error:.2f} x the noise floor{tail}"

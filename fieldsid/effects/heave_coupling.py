@@ -29,7 +29,15 @@ EFFECT = Effect(
     equation="q' += x; x' = -cross_damping f x - cross_rate f^2 q, f = (speed/reference)^p, p the damping's exponent",
     coefficients=(
         Coefficient("cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.3, 0.8, 2.5), step=1e-3, says="damping of the heave speed"),
-        Coefficient("cross_rate", "1/s^2", -20.0, 20.0, 0.1, scan=(-0.3, 0.3), says="Munk moment the pitch rate builds up; minus pitches on"),
+        Coefficient(
+            "cross_rate",
+            "1/s^2",
+            -20.0,
+            20.0,
+            0.1,
+            scan=(-0.3, 0.3),
+            says="Munk moment the pitch rate builds up; minus pitches on",
+        ),
     ),
     telltale="the pitch creeps on or overshoots after a command where a second-order pitch would have settled",
     excited_by=("multisine", "three_two_one_one", "square_pulses", "chirp"),

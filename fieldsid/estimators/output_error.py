@@ -6,15 +6,20 @@ missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fieldsid.fitting.colour import chosen_noise
 from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.problem import Problem, RunResult
+from fieldsid.fitting.restricted import lines_of, restricted_likelihood
+from fieldsid.fitting.small_sample import LONG, noise_spread, widened
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.uncertainty import middle
+from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
 
@@ -53,6 +58,12 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent
 def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
     """Return the covariance (F, F) of an output-error estimate under a noise model of any colour."""
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
+    return _sandwich(problem, found, weights, noise_vector(noise), normal, results)
+
+
+def _sandwich(
+    problem: Problem, found: Descent, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult]
+) -> FloatArray:
     sigma = np.array([weights.angle, weights.rate])
     place = {slot: i for i, slot in enumerate(found.free)}
     centre = np.zeros_like(normal)
@@ -65,11 +76,25 @@ def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise:
     return np.asarray(inverse @ centre @ inverse)
 
 
+def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, family: str) -> FloatArray:
+    """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
+    _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
+    vector = noise_vector(noise)
+    if family == "white":
+        return covariance(normal)
+    if sum(len(r) for r in problem.records) > LONG:
+        return _sandwich(problem, found, weights, vector, normal, results)
+    lines, count = lines_of(problem, found.x), len(problem.layout.slots)
+    spread = noise_spread(lambda v: restricted_likelihood(lines, count, v), vector, family)
+    still = found.x[list(found.free)]
+    return widened(lambda v: (still, _sandwich(problem, found, weights, v, normal, results)), vector, family, spread)
+
+
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the output-error solution of a joint problem."""
     found, weights = minimise(problem, start_vector(problem.records, problem.layout), floor_of(problem.records))
-    noise, notes = chosen_noise(problem, found.x, weights)
-    full = coloured_covariance(problem, found, weights, noise)
+    family, noise, notes = chosen_noise(problem, found.x, weights)
+    full = errors(problem, found, weights, noise, family)
     return Solution(found.x, shared_covariance(problem, full, found.free), noise, ESTIMATOR.name, notes)
 
 

@@ -13,8 +13,10 @@ from fieldsid.fitting.descent import Descent, covariance, descend
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.restricted import best_noise, lines_of, restricted_noise
+from fieldsid.fitting.restricted import best_noise, generalised, lines_of, restricted_likelihood, restricted_noise
+from fieldsid.fitting.small_sample import LONG, noise_spread, widened
 from fieldsid.fitting.start import start_vector
+from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
 
@@ -45,7 +47,18 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
             break
         noise, _ = restricted_noise(problem, lines_of(problem, found.x), family, noise)
     notes = (Note("noise_model", f"noise model: {family}", {"family": family}),)
-    return Solution(found.x, shared_covariance(problem, covariance(found.normal), found.free), noise, ESTIMATOR.name, notes)
+    return Solution(
+        found.x, shared_covariance(problem, errors(problem, found, noise, family), found.free), noise, ESTIMATOR.name, notes
+    )
+
+
+def errors(problem: Problem, found: Descent, noise: Noise, family: str) -> FloatArray:
+    """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
+    if family == "white" or sum(len(r) for r in problem.records) > LONG:
+        return covariance(found.normal)
+    lines, count, vector = lines_of(problem, found.x), len(problem.layout.slots), noise_vector(noise)
+    spread = noise_spread(lambda v: restricted_likelihood(lines, count, v), vector, family)
+    return widened(lambda v: generalised(lines, count, v), vector, family, spread)
 
 
 def _moved(found: Descent, before: FloatArray) -> float:

@@ -15,15 +15,21 @@ from fieldsid.figures import canvas, where
 MOST_BARS = 10
 TITLE_WIDTH = 150
 LABEL_WIDTH = 30
+MOST_TIMES = 3.0
+"""Bars longer than so many times the first are cut: an addition that makes things worse needs no scale of its own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """One candidate: its words, its error over the noise floor on fitted and on unseen runs, its probability, if it is named."""
+    """One candidate: its error over the noise floor on fitted and on unseen runs, share explained, probability, if it is named.
+
+    The model as it is has no probability.
+    """
 
     effect: str
     fitted: float
     unseen: float
+    explained: float
     probability: float | None
     named: bool
 
@@ -42,7 +48,7 @@ def figure(found: Diagnosis) -> Figure:
 def bars_of(found: Diagnosis) -> list[Bar]:
     """Return the bars of a diagnosis: the model as it is, then the candidates in their order."""
     floor = found.noise_floor
-    base = Bar("model as it is", found.base.train.over(floor), found.base.validation.over(floor), None, named=False)
+    base = Bar("model as it is", found.base.train.over(floor), found.base.validation.over(floor), 0.0, None, named=False)
     named = "+".join(found.effects)
     return [
         base,
@@ -51,6 +57,7 @@ def bars_of(found: Diagnosis) -> list[Bar]:
                 c.effect,
                 c.errors.train.over(floor),
                 c.errors.validation.over(floor),
+                c.explained,
                 c.probability,
                 named=bool(named) and c.effect == named,
             )
@@ -62,21 +69,30 @@ def bars_of(found: Diagnosis) -> list[Bar]:
 def draw(bars: list[Bar], ax: Axes) -> None:
     """Draw the error over the noise floor of each candidate: bars for unseen runs, rings for fitted ones, the floor at 1."""
     canvas.dress(ax, x="free-run error over the noise floor")
+    judged = any(isfinite(b.unseen) for b in bars)
+    errors = [b.unseen if judged else b.fitted for b in bars]
     rows = list(range(len(bars)))[::-1]
-    unseen = [b.unseen if isfinite(b.unseen) else b.fitted for b in bars]
+    end = min(max(*errors, *(b.fitted for b in bars), 1.0), MOST_TIMES * max(errors[0], 1.0))
     colours = [canvas.SIMULATED if b.named else canvas.QUIET for b in bars]
-    ax.barh(rows, unseen, color=colours, height=0.62, label="unseen runs")
-    fitted = [b.fitted for b in bars]
-    ax.plot(fitted, rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
+    ax.barh(rows, errors, color=colours, height=0.62, label="unseen runs" if judged else "fitted runs")
+    if judged:
+        fitted = [b.fitted for b in bars]
+        ax.plot(fitted, rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
     ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
-    for row, b, value in zip(rows, bars, unseen, strict=True):
-        chance = "" if b.probability is None else f", p {_chance(b.probability)}"
-        place = max(value, b.fitted)
-        ax.annotate(f"{value:.2f} x{chance}", (place, row), xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
+    for row, b, error in zip(rows, bars, errors, strict=True):
+        place = (min(max(error, b.fitted), end), row)
+        ax.annotate(words_of(b, error), place, xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
     ax.set_yticks(rows, [fill(b.effect.replace("+", " +"), LABEL_WIDTH) for b in bars], fontsize=9)
-    ax.set_xlim(0.0, 1.32 * max(*unseen, *fitted, 1.0))
+    ax.set_xlim(0.0, 1.65 * end)
     ax.grid(visible=False, axis="y")
     canvas.legend_above(ax, 3)
+
+
+def words_of(b: Bar, error: float) -> str:
+    """Return what stands beside a bar: the error over the floor, the share of the excess explained, the probability."""
+    if b.probability is None:
+        return f"{error:.2f} x"
+    return f"{error:.2f} x, {100 * b.explained:.0f} % explained, p {_chance(b.probability)}"
 
 
 def _chance(p: float) -> str:

@@ -26,21 +26,23 @@ class Fall:
 
 
 def figure(line: Sequence[Generation], name: str) -> Figure:
-    """Return a sheet with a panel for the rate and one for the angle; channels that were not measured are left out."""
+    """Return a sheet with a panel for the rate and one for the angle of a line with at least one addition.
+
+    A channel that was not measured is left out.
+    """
     gains = [g.step.gain for g in line if g.step]
     labels = [folded(", ".join(line[0].effects) or "plain model")]
     labels += [folded(" ".join(f"+{n}" for n in gain.added)) for gain in gains]
     channels = [(c, falls) for c in ("rate", "angle") if (falls := falls_of(gains, c))]
     sheet = canvas.sheet(max(8.0, 1.6 + 2.6 * len(labels)), 5.2)
     sheet.suptitle(f"{name}: {summary(gains)}", x=0.01, ha="left", fontsize=11)
-    axes = sheet.subplots(1, max(len(channels), 1), squeeze=False)[0]
-    for ax, (channel, falls) in zip(axes, channels, strict=False):
+    axes = sheet.subplots(1, len(channels), squeeze=False)[0]
+    for ax, (channel, falls) in zip(axes, channels, strict=True):
         unit = "deg/s" if channel == "rate" else "deg"
         draw(falls, labels, ax)
         canvas.dress(ax, y=f"free-run {channel} error, rms [{unit}]")
         ax.grid(visible=False, axis="x")
-    if channels:
-        canvas.legend_above(axes[-1], 3)
+    canvas.legend_above(axes[-1], 3)
     return sheet
 
 
@@ -51,8 +53,6 @@ def folded(text: str) -> str:
 
 def summary(gains: Sequence[Gain]) -> str:
     """Return the whole fall in words."""
-    if not gains:
-        return "nothing was added yet"
     where = "unseen runs" if gains[-1].unseen else "the runs fitted to"
     return f"error on {where} from {gains[0].over_floor[0]:.2f} to {gains[-1].over_floor[1]:.2f} x the noise floor"
 

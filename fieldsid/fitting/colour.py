@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.fitting.descent import dynamics_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise
 from fieldsid.fitting.whitening import is_white, whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
+
+__all__ = ["LAGS", "best_noise", "chi_square_tail", "chosen_noise", "dynamics_of", "ljung_box", "residuals_of", "whiteness"]
 
 LAGS = 20
 WHITE_ENOUGH = 0.01
@@ -17,12 +20,6 @@ WHITE_ENOUGH = 0.01
 def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:
     """Return the residual (2, n) of every run."""
     return [problem.residual(x, run)[0] for run in range(len(problem.records))]
-
-
-def dynamics_of(problem: Problem, x: FloatArray) -> list[tuple[float, float]]:
-    """Return (damping, stiffness) of every run's linear base model."""
-    bases = [problem.base_of(x, run) for run in range(len(problem.records))]
-    return [(b.damping, b.stiffness) for b in bases]
 
 
 def whiteness(problem: Problem, x: FloatArray, noise: Noise) -> float:
@@ -61,13 +58,13 @@ def chi_square_tail(statistic: float, freedom: int) -> float:
     return float(gammaincc(0.5 * freedom, 0.5 * statistic))
 
 
-def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[Noise, tuple[Note, ...]]:
-    """Return the noise the standard errors are computed with: white when the residuals are, else the best family."""
+def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, Noise, tuple[Note, ...]]:
+    """Return the noise the standard errors are computed with, and its family: white when the residuals are."""
     p = whiteness(problem, x, weights)
     if p >= WHITE_ENOUGH and is_white(weights):
-        return weights, ()
+        return "white", weights, ()
     family, noise, _ = best_noise(problem, x, weights)
-    return noise, (Note("coloured_residuals", _words(family, p), {"p": p, "limit": WHITE_ENOUGH, "family": family}),)
+    return family, noise, (Note("coloured_residuals", _words(family, p), {"p": p, "limit": WHITE_ENOUGH, "family": family}),)
 
 
 def _words(family: str, p: float) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.errors import EffectError
 from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
@@ -31,20 +32,37 @@ class Descent:
     converged: bool
 
 
-def cost_of(problem: Problem, x: FloatArray, noise: Noise) -> float:
-    """Return the whitened sum of squares at x, infinite where the motion diverges."""
+Dynamics = Sequence[tuple[float, float]]
+"""Damping and stiffness of every run, through which a disturbance moves it."""
+
+
+def dynamics_of(problem: Problem, x: FloatArray) -> list[tuple[float, float]]:
+    """Return (damping, stiffness) of every run's linear base model."""
+    bases = [problem.base_of(x, run) for run in range(len(problem.records))]
+    return [(b.damping, b.stiffness) for b in bases]
+
+
+def cost_of(problem: Problem, x: FloatArray, noise: Noise, dynamics: Dynamics | None = None) -> float:
+    """Return the whitened sum of squares at x, infinite where the motion diverges or an effect refuses its values.
+
+    dynamics are those that the noise is whitened through, by default the ones at x.
+    """
     total = 0.0
     for run, record in enumerate(problem.records):
-        residual, base = problem.residual(x, run)
+        try:
+            residual, base = problem.residual(x, run)
+        except EffectError:
+            return float("inf")
         if not np.isfinite(residual).all():
             return float("inf")
-        white, _ = whiten(record, noise, base.damping, base.stiffness, residual[None])
+        damping, stiffness = (base.damping, base.stiffness) if dynamics is None else dynamics[run]
+        white, _ = whiten(record, noise, damping, stiffness, residual[None])
         total += float(np.vdot(white, white))
     return total
 
 
 def normal_equations(
-    problem: Problem, x: FloatArray, noise: Noise, free: Sequence[int]
+    problem: Problem, x: FloatArray, noise: Noise, free: Sequence[int], dynamics: Dynamics | None = None
 ) -> tuple[float, FloatArray, FloatArray, list[RunResult]]:
     """Return whitened cost, normal matrix (F, F), gradient (F,) and each run's linearisation."""
     place = {slot: i for i, slot in enumerate(free)}
@@ -56,7 +74,8 @@ def normal_equations(
         stack = np.concatenate([result.residual[None], result.sensitivity])
         if not np.isfinite(stack).all():
             return float("inf"), normal, gradient, results
-        white, _ = whiten(record, noise, result.base.damping, result.base.stiffness, stack)
+        damping, stiffness = (result.base.damping, result.base.stiffness) if dynamics is None else dynamics[run]
+        white, _ = whiten(record, noise, damping, stiffness, stack)
         flat = white.reshape(white.shape[0], -1)
         product = flat @ flat.T
         index = np.array([place[s] for s in result.slots], dtype=int)
@@ -72,15 +91,17 @@ def descend(
 ) -> Descent:  # fmt: skip
     """Return the minimum of the whitened sum of squares that a start x leads to.
 
-    A slot at its bound whose gradient points outward is held there for the step. Source: Levenberg-Marquardt
-    with Marquardt's scaling and projected bounds (Nocedal and Wright 2006, section 10.3).
+    The noise is whitened through the dynamics at the start throughout: the sum of squares alone, without the
+    determinant of its covariance, would else be lowered by dynamics that make the noise look larger. A slot at its bound
+    whose gradient points outward is held there for the step. Source: Levenberg-Marquardt with Marquardt's scaling and
+    projected bounds (Nocedal and Wright 2006, section 10.3).
     """
     slots = tuple(range(len(x)) if free is None else free)
     low, high = problem.layout.low[list(slots)], problem.layout.high[list(slots)]
     x = x.copy()
     x[list(slots)] = np.clip(x[list(slots)], low, high)
-    damping = DAMPING_START
-    cost, normal, gradient, _ = normal_equations(problem, x, noise, slots)
+    damping, held = DAMPING_START, dynamics_of(problem, x)
+    cost, normal, gradient, _ = normal_equations(problem, x, noise, slots, held)
     done, count = False, 0
     while count < rounds and not done and np.isfinite(cost):
         count += 1
@@ -89,7 +110,7 @@ def descend(
         trial[list(slots)] = np.clip(x[list(slots)] + step, low, high)
         moved = trial[list(slots)] - x[list(slots)]
         expected = float(2 * gradient @ moved - moved @ normal @ moved)
-        new = cost_of(problem, trial, noise)
+        new = cost_of(problem, trial, noise, held)
         if new < cost:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x = trial
@@ -97,7 +118,7 @@ def descend(
             if done and damping <= DAMPING_START and cost - new <= 1e-3 * tolerance * cost:
                 cost = new
                 break
-            cost, normal, gradient, _ = normal_equations(problem, x, noise, slots)
+            cost, normal, gradient, _ = normal_equations(problem, x, noise, slots, held)
         else:
             done = abs(expected) <= tolerance * cost
             damping = max(damping, 1e-7) * 10.0

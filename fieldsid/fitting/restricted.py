@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.fitting.descent import covariance
 from fieldsid.fitting.noise import FAMILIES, estimate_noise
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import innovations
@@ -50,8 +51,11 @@ def lines_of(problem: Problem, x: FloatArray) -> list[Line]:
     return lines
 
 
-def restricted_likelihood(lines: list[Line], count: int, noise: FloatArray) -> float:
-    """Return the restricted log likelihood, up to its constant, of a noise vector (7,); count is the number of slots."""
+def products(lines: list[Line], count: int, noise: FloatArray) -> tuple[FloatArray, float]:
+    """Return the whitened products of residual and sensitivities (1 + F, 1 + F), and the log determinant of the noise.
+
+    noise is a vector (7,), count the number F of slots.
+    """
     square, logs = np.zeros((count + 1, count + 1)), 0.0
     for line in lines:
         white = np.empty_like(line.stack)
@@ -60,7 +64,20 @@ def restricted_likelihood(lines: list[Line], count: int, noise: FloatArray) -> f
         flat = white.reshape(white.shape[0], -1)
         where = np.concatenate([[0], 1 + line.place]).astype(int)
         square[np.ix_(where, where)] += flat @ flat.T
+    return square, logs
+
+
+def restricted_likelihood(lines: list[Line], count: int, noise: FloatArray) -> float:
+    """Return the restricted log likelihood, up to its constant, of a noise vector (7,); count is the number of slots."""
+    square, logs = products(lines, count, noise)
     return -0.5 * (logs + _profiled(square))
+
+
+def generalised(lines: list[Line], count: int, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the step (F,) to the generalised least squares under a noise vector (7,), and its covariance (F, F)."""
+    square, _ = products(lines, count, noise)
+    inverse = covariance(square[1:, 1:])
+    return inverse @ square[1:, 0], inverse
 
 
 def _profiled(square: FloatArray) -> float:

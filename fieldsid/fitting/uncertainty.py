@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.fitting.whitening import noise_vector, transition
+from fieldsid.fitting.whitening import transition
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import jit
-from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 
@@ -75,11 +74,11 @@ def _middle(
             )
 
 
-def middle(record: Record, noise: Noise, damping: float, stiffness: float, weighted: FloatArray) -> FloatArray:
-    """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise model."""
+def middle(record: Record, noise: FloatArray, damping: float, stiffness: float, weighted: FloatArray) -> FloatArray:
+    """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise vector (7,)."""
     out = np.zeros((weighted.shape[0], weighted.shape[0]))
     _middle(
-        record.steps, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise),
+        record.steps, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
         np.ascontiguousarray(weighted), out,
     )  # fmt: skip
     return np.asarray(out + np.tril(out, -1).T)

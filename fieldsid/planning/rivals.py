@@ -37,8 +37,8 @@ def rivals_named(model: Model, names: Sequence[str]) -> tuple[Model, ...]:
 
 
 def typical(coefficient: Coefficient) -> float:
-    """Return a coefficient's typical value: the middle of its scan, else its start."""
-    return float(np.median(coefficient.scan)) if coefficient.scan else coefficient.start
+    """Return a coefficient's typical value: the middle one of its scan (the upper of two), else its start."""
+    return sorted(coefficient.scan)[len(coefficient.scan) // 2] if coefficient.scan else coefficient.start
 
 
 def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:

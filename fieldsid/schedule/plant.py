@@ -18,6 +18,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Core
 from fieldsid.models.model import Model
 from fieldsid.models.simulate import effects_of
+from fieldsid.turning.plant import EXPONENT
 from fieldsid.turning.source import Source, draw_values
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -134,11 +135,11 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
     ratio = at[names.authority] / model.values[names.authority]
     parts = effects_of(model)
     cores = []
-    for v in values:
+    for v, exponent in zip(values, exponents, strict=True):
         core = Core()
         for effect in parts:
             if effect.core is not None:
-                core = core.plus(effect.core(v, scale))
+                core = core.plus(effect.core({EXPONENT: float(exponent)} | v, scale))
         cores.append(core)
 
     def column(name: str) -> FloatArray:

@@ -23,6 +23,7 @@ from fieldsid.models.simulate import command_record, effects_of
 SETTLE_S = 60.0
 STEP_S = 0.05
 SCALES = np.geomspace(0.2, 5.0, 9)
+EXPONENT = "damping_exponent"
 CROSS = ("cross_damping", "cross_rate", "cross_fin", "quadratic", "crossflow")
 
 
@@ -55,6 +56,7 @@ class Plant:
     damping_more: FloatArray
     factors: tuple[FloatArray, FloatArray]
     law: tuple[FloatArray, FloatArray]
+    sway_seen: FloatArray
 
     @property
     def count(self) -> int:
@@ -87,7 +89,7 @@ class Plant:
         )
 
 
-ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "length", "moment", "damping_more")
+ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "length", "moment", "damping_more", "sway_seen")
 
 
 def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: float, exponents: FloatArray) -> Plant:
@@ -97,7 +99,8 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
     """
     names = NAMES[model.axis]
     parts = effects_of(model)
-    values = [{c.name: c.start for e in parts for c in e.nuisance} | dict(d) for d in draws]
+    starts = {c.name: c.start for e in parts for c in e.nuisance}
+    values = [starts | {EXPONENT: float(e)} | dict(d) for d, e in zip(draws, exponents, strict=True)]
     sign = float(np.sign(model.base[names.authority])) or 1.0
     steady = command_record(Axis.YAW, *_step(0.0), speed=_known(model.law.reference))
     terms = [combined_terms(steady, parts, v) for v in values]
@@ -122,6 +125,7 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
             column([_mean(t.authority_factor, 1.0) for t in terms]),
         ),
         law=_law_table(model),
+        sway_seen=column([_seen_share(model, v) for v in values]),
     )
 
 
@@ -154,6 +158,19 @@ def own_moment(parts: Sequence[Effect], values: Mapping[str, float], rate: Float
             angle = np.linspace(0.0, 2.0 * np.pi, len(record), endpoint=False)
             out[i] += float(np.mean(effect.moment(Motion(angle, np.full(len(record), r)), values, record)))
     return out
+
+
+def _seen_share(model: Model, values: Mapping[str, float]) -> float:
+    """Return the share of the sway mode's settled moment that counts: all of it, or what the longest held turn showed.
+
+    A mode slower than any turn held, that would make the vehicle unstable on a straight course, was not seen by the data:
+    its moment is then counted as far as it had grown by the end of the longest hold.
+    """
+    damping, held = values.get("cross_damping", 0.0), model.trained.get("held_s", np.inf)
+    if damping <= 0.0 or not damping * held < 1.0:
+        return 1.0
+    settled = values[NAMES[model.axis].damping] + values.get("cross_rate", 0.0) / damping
+    return 1.0 if settled > 0.0 else float(-np.expm1(-damping * held))
 
 
 def _law_table(model: Model) -> tuple[FloatArray, FloatArray]:

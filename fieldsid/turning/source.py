@@ -19,6 +19,7 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.turning.law import ParameterLaw
 from fieldsid.turning.laws import KIND as FIT_KIND
 from fieldsid.turning.laws import Laws, fit_laws, load_laws, with_own_law
+from fieldsid.turning.plant import EXPONENT
 from fieldsid.turning.points import SAME_SPEED, Point, check_authority, distinct_speeds, points_of
 from fieldsid.turning.table import read_table
 
@@ -177,8 +178,10 @@ def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[lis
                 low, high = bounds.get(name, (-np.inf, np.inf))
                 own[name] = float(np.clip(own[name] + z[i, j], low, high))
         draws.append(own)
+    if EXPONENT in model.free:
+        return draws, np.array([d[EXPONENT] for d in draws])
     exponent = np.full(count, model.law.damping_exponent)
-    stated = model.info.get("law_parameters", {}).get("damping_exponent", {})
+    stated = model.info.get("law_parameters", {}).get(EXPONENT, {})
     spread = stated.get("std_error") or 0.0
     exponent[1:] += float(spread) * rng.standard_normal(count - 1)
     return draws, exponent

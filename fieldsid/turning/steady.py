@@ -60,7 +60,7 @@ def balance(
     scale = plant.scale(surge)
     core = {n: c.at(scale) for n, c in plant.core.items()}
     coupled = core["cross_damping"] > 0
-    inverse = np.where(coupled, 1.0 / np.where(coupled, core["cross_damping"], 1.0), 0.0)
+    inverse = np.where(coupled, plant.sway_seen / np.where(coupled, core["cross_damping"], 1.0), 0.0)
     linear = plant.damping_at(surge) + core["cross_rate"] * inverse
     push = plant.authority_at(surge) * fin + plant.trim + plant.moment + core["cross_fin"] * inverse * fin
     drive = side * push

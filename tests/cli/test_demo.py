@@ -2,26 +2,69 @@
 
 from __future__ import annotations
 
+import json
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
 import pytest
 
 from fieldsid.cli import demo
+from fieldsid.cli.app import main
 from fieldsid.demo import steps, vehicle
-from fieldsid.demo.steps import STEPS
+from fieldsid.demo.steps import STEPS, Step
 
 
 @pytest.fixture(scope="module")
 def tour(tmp_path_factory):
-    return tmp_path_factory.mktemp("tour") / "demo"
+    """The tour taken once, as its JSON object."""
+    folder = tmp_path_factory.mktemp("tour") / "demo"
+    told = StringIO()
+    with redirect_stdout(told):
+        assert main(["demo", "-o", str(folder), "--json"]) == 0
+    return json.loads(told.getvalue())
 
 
-def test_every_step_runs_and_leaves_files_and_figures(run_cli, tour):
-    body = run_cli("demo", "-o", tour, "--json").json
-    assert body["schema"] == "fieldsid/demo/1"
-    assert [s["command"].split()[1] for s in body["steps"]] == [s.line.split()[0] for s in STEPS]
-    assert all(s["means"] for s in body["steps"])
-    assert body["hidden"]["effect"] == demo.HIDDEN
-    assert any(f.endswith(".png") for f in body["files"])
-    assert any(f.endswith(".yaml") for f in body["files"])
+def results_of(tour, command):
+    return [s["result"] for s in tour["steps"] if s["command"].split()[1] == command]
+
+
+def test_every_step_runs_and_leaves_files_and_figures(tour):
+    assert tour["schema"] == "fieldsid/demo/1"
+    assert [s["command"].split()[1] for s in tour["steps"]] == [s.line.split()[0] for s in STEPS]
+    assert all(s["means"] for s in tour["steps"])
+    names = {Path(f).name for f in tour["files"]}
+    assert {"diagnosis.png", "history.png", "turn_radius.png", "gains.png", "heading_ros2.yaml"} <= names
+
+
+def test_the_hidden_effect_is_named_and_its_strength_comes_back(tour):
+    assert tour["hidden"]["effect"] == demo.HIDDEN
+    assert tour["named"] == [demo.HIDDEN]
+    (extended,) = results_of(tour, "extend")
+    for name, found in extended["coefficients"].items():
+        assert found["value"] == pytest.approx(tour["hidden"]["values"][name], abs=5 * found["std_error"])
+
+
+def test_the_error_on_unseen_runs_falls_to_the_noise(tour):
+    (extended,) = results_of(tour, "extend")
+    assert extended["over_floor"]["before"] > 2.0
+    assert extended["over_floor"]["after"] < 1.1
+    before, after = results_of(tour, "compare")
+    for one, two in zip(before["runs"], after["runs"], strict=True):
+        assert two["rate_rms_rad_s"] < 0.5 * one["rate_rms_rad_s"]
+
+
+def test_a_step_that_needs_what_nobody_learned_is_left_out():
+    step = Step("", "extend {models}/a.yaml --add {effects}", str)
+    assert not step.possible({"models": "m"})
+    assert step.possible({"models": "m", "effects": "stall"})
+
+
+def test_an_undecided_search_that_names_nothing_adds_nothing():
+    (diagnose,) = (s for s in STEPS if s.line.startswith("diagnose"))
+    assert diagnose.learns({"effects": []}) == {}
+    assert diagnose.learns({"effects": ["stall", "delay"]}) == {"effects": "stall,delay"}
+    assert "unexplained" in diagnose.means({"effects": [], "verdict": "unexplained"})
 
 
 def test_the_textbook_model_leaves_more_than_the_noise_on_the_tour(run_cli, tmp_path):

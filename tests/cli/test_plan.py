@@ -128,3 +128,9 @@ def test_an_unstable_prior_is_refused(run_cli, tmp_path):
 def test_the_same_seed_gives_the_same_plan(run_cli):
     one, two = (run_cli(*QUICK, "--json", "--seed", "5").out for _ in range(2))
     assert json.loads(one) == json.loads(two)
+
+
+def test_without_rules_every_leg_can_be_replayed_from_its_table(run_cli):
+    body = run_cli("plan", "--axis", "pitch", "--speeds", "1.6", "--window", "22", "--open-loop", "--json").json
+    assert body["legs"][0]["maneuver"] not in {"zigzag", "turning_circle"}
+    assert "expected_fin_rad" not in body["legs"][0]

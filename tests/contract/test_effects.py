@@ -82,7 +82,7 @@ def absent(effect: Effect) -> dict[str, float]:
 def untouched(name: str, log: Record) -> np.ndarray | float:
     path, motion = log.commanded, motion_of(log)
     plain = {"start": path.start, "end": path.end, "mean": path.mean, "angle": motion.angle, "rate": motion.rate}
-    plain |= {"damping_factor": 1.0, "authority_factor": 1.0}
+    plain |= {"damping_factor": 1.0, "authority_factor": 1.0, "cross_factor": 1.0}
     return plain.get(name, 0.0)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fieldsid.artifacts import save_record
+from fieldsid.effects import all_effects
 from fieldsid.errors import FieldsidError, UsageError
 from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
@@ -17,7 +18,7 @@ from fieldsid.planning.discriminate import separate
 from fieldsid.planning.duel import log_odds, rival_of
 from fieldsid.planning.envelope import Envelope
 from fieldsid.planning.prior import named_prior
-from fieldsid.planning.rivals import rivals_from, rivals_named
+from fieldsid.planning.rivals import rivals_from, rivals_named, typical
 from fieldsid.planning.scene import autopilot_of, scene_of
 
 PRIOR = replace(named_prior("torpedo", Axis.YAW), noise=Noise(0.005, 0.005))
@@ -130,3 +131,11 @@ def test_an_incomplete_diagnosis_is_refused(tmp_path, changes):
     with pytest.raises(FieldsidError) as caught:
         rivals_from(diagnosis(tmp_path, **changes))
     assert caught.value.hint
+
+
+@pytest.mark.parametrize("effect", all_effects().values(), ids=lambda e: e.name)
+def test_the_typical_strength_of_an_effect_is_inside_its_bounds_and_never_nothing(effect):
+    values = [typical(c) for c in effect.shared]
+    assert all(c.low <= v <= c.high for c, v in zip(effect.shared, values, strict=True))
+    # An effect may have no coefficient but a nuisance of every run; one that has some is never left at nothing.
+    assert any(values) or not effect.shared

@@ -106,6 +106,16 @@ def test_a_rudder_below_the_offset_is_refused(tmp_path):
         turn_radius(load_source([path]), [1.37], 0.26)
 
 
+def test_a_sway_mode_slower_than_any_held_turn_is_named_and_does_not_make_the_turn_endless(tmp_path):
+    slow = {"cross_damping": 0.04, "cross_rate": -0.15}
+    effects = ("sway_coupling", "quadratic_damping")
+    row = turn_radius(source_of(tmp_path, {**FULL, "held_s": 5.0}, effects, **slow), [1.5], 0.3).rows[0]
+    assert any("sway settles more slowly" in words for words in row.because)
+    whole = turn_radius(source_of(tmp_path, {**FULL, "held_s": 200.0}, effects, **slow), [1.5], 0.3).rows[0]
+    assert not any("sway" in words for words in whole.because)
+    assert row.radius > 1.3 * whole.radius
+
+
 def test_the_minimum_of_the_upper_branch_is_found(tmp_path):
     source = load_source(table(tmp_path).paths, laws=["a22=1", "b2=-0.2319,-0.3263", "C0=0"])
     prediction = turn_radius(source, [round(0.25 + 0.05 * i, 2) for i in range(96)], 0.26, draws=50)
@@ -126,7 +136,7 @@ def test_doubt_shrinks_as_the_data_reach_further():
         assert a.mean < b.mean
 
 
-def test_doubt_of_a_short_pulse_covers_published_turning_trials():
+def test_doubt_of_a_short_pulse_covers_the_errors_met_in_turning_trials():
     """Formula against turning trials of other vehicles: -43 .. +13 %."""
     doubt = doubt_of((), Reach(float("nan"), float("nan"), float("nan"), speed_flown=True), formula=True)
     low, high = doubt.mean - 1.96 * doubt.sd, doubt.mean + 1.96 * doubt.sd

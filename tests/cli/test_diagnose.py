@@ -1,0 +1,114 @@
+"""`sysid diagnose`: the hidden effect is named with the contract's numbers, kept for `plan`, drawn; bad input is refused."""
+
+from __future__ import annotations
+
+import hidden_lag
+import pytest
+from cli import trial
+
+from fieldsid.artifacts import load_record
+from fieldsid.effects import forget_effects
+from fieldsid.logs import save_run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import save_model
+from fieldsid.planning.rivals import rivals_from
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    return hidden_lag.files(tmp_path_factory.mktemp("lag"))
+
+
+def test_the_hidden_effect_is_named_first_and_kept_and_drawn(run_cli, logs, tmp_path):
+    kept, drawn = tmp_path / "d.yaml", tmp_path / "d.png"
+    asked = ("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen, "-o", kept, "--figure", drawn, "--json")
+    body = run_cli(*asked).json
+    assert body["schema"] == "fieldsid/diagnose/1"
+    assert (body["verdict"], body["effects"]) == ("effect", ["servo_lag"])
+    first = body["candidates"][0]
+    assert first["effect"] == "servo_lag"
+    assert first["parameters"]["lag"] == pytest.approx(hidden_lag.LAG, rel=0.1)
+    assert 0.0 <= first["explained"] <= 1.0
+    assert {"probability", "train", "validation", "evidence", "confusable_with"} <= set(first)
+    assert body["final"]["validation"]["rate_rms_rad_s"] < 0.5 * body["base"]["validation"]["rate_rms_rad_s"]
+    assert body["noise_floor"]["rate_rad_s"] == pytest.approx(hidden_lag.SENSOR, rel=0.2)
+    assert {"condition", "share_of_error", "rms_ratio", "t_start_s", "t_end_s"} <= set(body["where"][0])
+    assert set(body["skipped"]) >= {"roll_coupling", "prop_moment"}
+    assert drawn.read_bytes()[:4] == b"\x89PNG"
+    record = load_record(kept, "fieldsid/diagnosis")
+    assert [len(i["sha256"]) for i in record["inputs"]] == [64] * 3
+    assert rivals_from(kept)[0].effects == ("servo_lag",)
+
+
+def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(run_cli, logs):
+    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
+    assert answer.code == 0
+    assert max(len(line.rstrip()) for line in answer.out.splitlines()) <= 80
+    assert answer.out.startswith("effect: servo_lag (the fin follows")
+    for part in ("as it is", "log evidence", "where the model as it is fails", "not tried: ", "needs roll, which the log lacks"):
+        assert part in answer.out
+    assert "--add servo_lag --validate RUN" in answer.err
+
+
+def test_a_model_of_the_other_axis_is_refused(run_cli, logs, tmp_path):
+    model = save_model(trial.vehicle(Axis.PITCH), tmp_path / "pitch.yaml")
+    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--model", model)
+    assert answer.code == 2
+    assert "is a pitch model" in answer.err
+
+
+def test_an_output_that_exists_is_refused_before_the_work(run_cli, logs, tmp_path):
+    (tmp_path / "d.yaml").write_text("mine")
+    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "-o", tmp_path / "d.yaml")
+    assert (answer.code, answer.out) == (2, "")
+    assert "add `--force`" in answer.err
+    assert (tmp_path / "d.yaml").read_text() == "mine"
+
+
+def test_runs_too_short_to_hold_a_part_back_are_said_to_be_judged_on_themselves(run_cli, tmp_path):
+    run = hidden_lag.runs()[0][0].between(0.0, 9.0)
+    path = save_run(run, tmp_path / "short.parquet")
+    answer = run_cli("diagnose", path, "--axis", "yaw")
+    assert answer.code == 0
+    assert "[nothing_held_back]" in answer.err
+
+
+def test_a_run_cannot_be_learned_from_and_judge(run_cli, logs):
+    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.train[0])
+    assert answer.code == 2
+    assert "is given twice" in answer.err
+
+
+def test_a_fin_that_hardly_moves_is_no_excitation(run_cli, tmp_path):
+    run = hidden_lag.runs()[0][0]
+    still = hidden_lag.replace(run, signals={**run.signals, "rudder_rad": 1e-4 * run["rudder_rad"]})
+    answer = run_cli("diagnose", save_run(still, tmp_path / "still.parquet"), "--axis", "yaw")
+    assert answer.code == 2
+    assert "does not excite yaw" in answer.err
+    assert "\nhint: fly an excitation" in answer.err
+
+
+OWN = "name: own\nmoment: '{}'\ncoefficients: {{k_own: {{unit: rad/s^2, low: 0, high: 20, start: 1.0}}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("moment", "says"),
+    [
+        ("k_own * rr", "there is no signal or coefficient `rr`"),
+        ("k_own * (r +", "cannot be read here"),
+        ("k_own / (r - r)", "divides by zero at t = 0.000 s"),
+        ("k_own * exp(50 * abs(r))", "grows without bound"),
+    ],
+)
+def test_a_users_effect_that_is_wrong_is_refused_with_the_place(run_cli, logs, tmp_path, monkeypatch, moment, says):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "effects").mkdir()
+    (tmp_path / "effects" / "own.yaml").write_text(OWN.format(moment))
+    try:
+        answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
+    finally:
+        forget_effects()
+    assert (answer.code, answer.out) == (2, "")
+    assert says in answer.err
+    assert "\nhint: " in answer.err
+    assert moment in answer.err

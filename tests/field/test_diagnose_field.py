@@ -1,0 +1,40 @@
+"""Diagnose, extend and history on third-party logs: the error falls on runs that were not fitted, as far as is known there."""
+
+from __future__ import annotations
+
+import pytest
+
+pytestmark = pytest.mark.field
+SENSOR_RATE = 0.0035
+"""Yaw-rate noise of the logs in rad/s, from their description."""
+
+
+@pytest.fixture(scope="module")
+def lauv(shared_data):
+    return shared_data / "lauv"
+
+
+def test_a_vehicle_with_a_fin_lag_sway_and_nonlinear_damping_is_not_called_sufficient(run_cli, lauv):
+    asked = ("diagnose", lauv / "rudder_v1.50.csv.gz", "--axis", "yaw", "--validate", lauv / "zigzag_v1.50.csv.gz")
+    body = run_cli(*asked, "--json").json
+    assert body["verdict"] != "sufficient"
+    assert "servo_lag" in body["candidates"][0]["effect"]
+    assert body["noise_floor"]["rate_rad_s"] == pytest.approx(SENSOR_RATE, rel=0.15)
+    assert body["base"]["validation"]["rate_rms_rad_s"] > 2 * SENSOR_RATE
+    assert body["candidates"][0]["validation"]["rate_rms_rad_s"] < 0.7 * body["base"]["validation"]["rate_rms_rad_s"]
+    assert body["candidates"][0]["explained"] > 0.5
+
+
+def test_the_error_on_zigzags_falls_with_each_of_the_effects_that_are_there(run_cli, lauv, tmp_path):
+    runs = [lauv / f"rudder_v{v}.csv.gz" for v in ("1.00", "1.50", "1.90")]
+    unseen = [part for v in ("1.00", "1.90") for part in ("--validate", lauv / f"zigzag_v{v}.csv.gz")]
+    (fit,) = run_cli("identify", *runs, "--axis", "yaw", "--joint", "-o", tmp_path, "--no-figures", "--json").json["fits"]
+    model = fit["model"]
+    for effect in ("servo_lag", "quadratic_damping"):
+        body = run_cli("extend", model, *runs, "--add", effect, *unseen, "--json").json
+        assert body["kept"], effect
+        model = body["model"]
+    line = run_cli("history", model, "--json").json["generations"]
+    errors = [line[1]["over_floor"]["before"], *(g["over_floor"]["after"] for g in line[1:])]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 0.75 * errors[0]

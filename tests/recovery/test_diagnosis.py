@@ -1,0 +1,70 @@
+"""A small blind bank: hidden effects named, nothing named where nothing is hidden, strangers called unexplained.
+
+The whole bank of 200 cases is `python tests/benchmarks/hidden_effects.py --cases 200`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.bank import Case, make_case
+
+from fieldsid.diagnosis import Diagnosis, diagnose
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+
+SEED = 2026
+
+
+def runs_of(logs: list[dict[str, np.ndarray]], tag: str) -> list[Run]:
+    """Return the bank's logs as runs."""
+    return [
+        Run(f"{tag}{i}", np.asarray(log["time_s"], float), {k: np.asarray(v, float) for k, v in log.items() if k != "time_s"})
+        for i, log in enumerate(logs)
+    ]
+
+
+def visible_case(kind: str, first: int) -> Case:
+    """Return the first case of a kind from an index on whose effect can be seen (or that hides none)."""
+    index = first
+    while True:
+        case = make_case(index, SEED, kind=kind)
+        if case.visible or kind == "none":
+            return case
+        index += 1
+
+
+def diagnosed(case: Case) -> Diagnosis:
+    """Return the diagnosis of a case."""
+    return diagnose(runs_of(case.training, "train"), Axis(case.axis), runs_of(case.validation, "unseen"))
+
+
+@pytest.mark.parametrize("first", [0, 10, 20, 30])
+def test_a_single_hidden_effect_is_among_the_first_three_and_its_error_falls(first: int) -> None:
+    case = visible_case("single", first)
+    found = diagnosed(case)
+    leading = [set(c.effects) for c in found.candidates[:3]]
+    assert any(set(case.accepts) & names for names in leading), (case.effects, leading)
+    assert found.verdict in ("effect", "undecided", "unexplained")
+    assert found.final.validation.rate_rms_rad_s <= found.base.validation.rate_rms_rad_s * 1.001
+
+
+@pytest.mark.parametrize("first", [0, 10])
+def test_nothing_is_named_where_nothing_is_hidden(first: int) -> None:
+    found = diagnosed(visible_case("none", first))
+    assert found.verdict == "sufficient"
+    assert found.effects == ()
+    assert found.final == found.base
+
+
+def test_a_cause_that_no_catalogue_has_is_not_given_a_name() -> None:
+    found = diagnosed(visible_case("uncatalogued", 0))
+    assert found.verdict == "unexplained"
+    assert found.effects == ()
+    assert "not in the catalogue" in found.says
+
+
+def test_probabilities_of_all_hypotheses_never_exceed_one() -> None:
+    found = diagnosed(visible_case("single", 40))
+    assert 0.0 < sum(c.probability for c in found.candidates) <= 1.0 + 1e-9
+    assert all(0.0 <= c.explained <= 1.0 for c in found.candidates)

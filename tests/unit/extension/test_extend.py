@@ -1,0 +1,93 @@
+"""Extending a model: the true effect pays on runs that were not fitted, a wrong one does not, and what is written says so."""
+
+from __future__ import annotations
+
+import hidden_lag
+import numpy as np
+import pytest
+from cli.trial import vehicle
+
+from fieldsid.errors import DataError, UsageError
+from fieldsid.extension import extend
+from fieldsid.fitting.predict import predict
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+
+PLAIN = vehicle(Axis.YAW)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return hidden_lag.runs()
+
+
+@pytest.fixture(scope="module")
+def lagged(runs):
+    train, unseen = runs
+    return extend(PLAIN, ["servo_lag"], train, [unseen])
+
+
+def test_the_true_effect_brings_the_error_on_unseen_runs_down_to_the_floor(lagged):
+    before, after = lagged.gain.over_floor
+    assert before > 3.0
+    assert after == pytest.approx(1.0, abs=0.06)
+    assert lagged.pays
+    assert lagged.evidence > 100.0
+
+
+def test_the_truth_lies_within_the_extended_models_errors(lagged):
+    model = lagged.model
+    assert model.effects == ("servo_lag",)
+    for name, truth in {"lag": hidden_lag.LAG, "a22": 1.1, "b2": -1.2, "C0": 0.01}.items():
+        reference = model.at_speed(hidden_lag.REFERENCE).get(name, model.values[name])
+        assert abs(reference - truth) < 4.0 * model.std_error(name) + 0.02 * abs(truth), name
+    assert 0.0 < model.std_error("lag") < 0.05
+
+
+def test_the_model_that_is_kept_is_the_one_whose_error_was_reported(lagged, runs):
+    left = predict(lagged.model, record_of(runs[1], Axis.YAW)).residual
+    angle, rate = np.sqrt(np.mean(left**2, axis=1))
+    assert angle == pytest.approx(lagged.gain.after.validation.angle_rms_rad, rel=1e-3)
+    assert rate == pytest.approx(lagged.gain.after.validation.rate_rms_rad_s, rel=1e-3)
+
+
+def test_an_effect_that_is_not_there_does_not_pay():
+    train, unseen = hidden_lag.runs(lag=0.0)
+    found = extend(PLAIN, ["deadband"], train, [unseen])
+    assert not found.pays
+    assert found.gain.over_floor[1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_where_nothing_can_be_held_back_the_evidence_must_pay():
+    short = hidden_lag.runs(lag=0.0)[0][0].between(0.0, 9.0)
+    found = extend(PLAIN, ["quadratic_damping"], [short])
+    assert not found.gain.unseen
+    assert not found.pays
+    assert [n.code for n in found.notes] == ["nothing_held_back"]
+
+
+def test_a_base_is_refitted_from_the_parents_own_values_as_well(lagged, runs):
+    train, unseen = runs
+    again = extend(lagged.model, ["quadratic_damping"], train, [unseen])
+    assert again.gain.over_floor[0] == pytest.approx(lagged.gain.over_floor[1], rel=0.01)
+    assert again.model.effects == ("servo_lag", "quadratic_damping")
+    assert not again.pays
+
+
+@pytest.mark.parametrize(
+    ("model", "add", "says"),
+    [
+        (PLAIN, [], "no effect to add"),
+        (PLAIN, ["servolag"], "no effect named 'servolag'"),
+        (PLAIN, ["heave_coupling"], "does not act on the yaw axis"),
+        (vehicle(Axis.YAW, "servo_lag", lag=0.3), ["servo_lag"], "is in the model already"),
+    ],
+)
+def test_what_cannot_be_added_is_refused(runs, model, add, says):
+    with pytest.raises(UsageError, match=says):
+        extend(model, add, runs[0])
+
+
+def test_an_effect_whose_signal_the_log_lacks_is_refused_with_its_name(runs):
+    with pytest.raises(DataError, match="`roll_coupling` needs roll, which the log lacks"):
+        extend(PLAIN, ["roll_coupling"], runs[0])
