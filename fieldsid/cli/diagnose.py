@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
 
-MOST_PLACES = 5
+MOST_PLACES, MOST_SPOKEN = 5, 3
+LIKELY = 0.05
+"""Probability from which on the evidence for a rival is spoken out."""
 NAME_WIDTH = 30
 
 KnownModel = Annotated[
@@ -152,10 +154,14 @@ def _candidates(found: Diagnosis) -> Any:
 
 
 def _render_words(to: Console, found: Diagnosis) -> None:
-    """Say the evidence for the first candidate, and what it may be confused with."""
+    """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
     from rich.text import Text
 
-    for c in found.candidates[:1]:
+    if found.verdict == "sufficient":
+        return
+    for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
+        if i and c.probability < LIKELY:
+            continue
         alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
         to.print()
         to.print(Text(f"{c.effect}: {c.evidence}{alike}"))

@@ -7,14 +7,13 @@ import numpy as np
 from fieldsid.fitting.descent import dynamics_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise
+from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, chi_square_tail, ljung_box
 from fieldsid.fitting.whitening import is_white, whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
 
 __all__ = ["LAGS", "best_noise", "chi_square_tail", "chosen_noise", "dynamics_of", "ljung_box", "residuals_of", "whiteness"]
 
-LAGS = 20
-WHITE_ENOUGH = 0.01
 
 
 def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:
@@ -38,24 +37,6 @@ def whiteness(problem: Problem, x: FloatArray, noise: Noise) -> float:
         if freedom:
             smallest = min(smallest, 2.0 * chi_square_tail(statistic, freedom))
     return min(smallest, 1.0)
-
-
-def ljung_box(e: FloatArray) -> float:
-    """Return the Ljung-Box statistic of a series over LAGS lags (chi-square with LAGS degrees when white)."""
-    n = e.size
-    centred = e - e.mean()
-    power = float(centred @ centred)
-    if power == 0.0:
-        return 0.0
-    lags = np.array([float(centred[lag:] @ centred[:-lag]) / power for lag in range(1, LAGS + 1)])
-    return float(n * (n + 2) * np.sum(lags**2 / (n - np.arange(1, LAGS + 1))))
-
-
-def chi_square_tail(statistic: float, freedom: int) -> float:
-    """Return P(chi-square > statistic)."""
-    from scipy.special import gammaincc
-
-    return float(gammaincc(0.5 * freedom, 0.5 * statistic))
 
 
 def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, Noise, tuple[Note, ...]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import DataError, UsageError
+from fieldsid.fitting.choice import is_disturbed, keeps_free_run, white_weights
 from fieldsid.fitting.colour import whiteness
 from fieldsid.fitting.layout import Layout, layout_of
 from fieldsid.fitting.method import Estimator, History, Options, Solution
@@ -93,8 +94,10 @@ def _solve(problem: Problem, method: str, options: Options) -> Solution:
         )
     solution = chosen.solve(problem, options)
     if method == AUTO and is_disturbed(problem, solution):
-        refined: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
-        solution = refined.solve(problem, options)
+        finer: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
+        refined = finer.solve(problem, options)
+        if keeps_free_run(problem, solution, refined, white_weights(problem, solution.x)):
+            solution = refined
     if not solution.own_done:
         x = solution.x
         for run, record in enumerate(problem.records):
@@ -103,44 +106,6 @@ def _solve(problem: Problem, method: str, options: Options) -> Solution:
             x, solution.covariance, solution.noise, solution.method, solution.notes, own_done=True, history=solution.history
         )
     return solution
-
-
-def is_disturbed(problem: Problem, solution: Solution) -> bool:
-    """Whether the residuals are coloured by a disturbance that does not follow the fin.
-
-    The share of the smoothed rate residual that the fin, its history and the simulated motion explain is small
-    under a disturbance and large under a missing effect, where plain output error keeps the better free run.
-    """
-    if solution.noise.disturbance <= 0.0:
-        return False
-    return follows_fin(problem, solution.x) < 0.5
-
-
-def follows_fin(problem: Problem, x: FloatArray) -> float:
-    """Return the share (0..1) of the low-frequency residual that a 2 s history of the fin explains, over all runs."""
-    explained, total = 0.0, 0.0
-    for run, record in enumerate(problem.records):
-        residual, _ = problem.residual(x, run)
-        channel = 1 if record.rate_ok.any() else 0
-        e = _block_means(residual[channel], record)
-        fin = _block_means(record.fin - record.fin.mean(), record)
-        lags = np.stack([np.concatenate([np.zeros(k), fin[: fin.size - k]]) for k in range(8)])
-        columns = np.concatenate([lags, lags * np.abs(lags), np.ones((1, fin.size))]).T
-        if e.size <= 2 * columns.shape[1]:
-            return 1.0
-        centred = e - e.mean()
-        left = e - columns @ np.linalg.lstsq(columns, e, rcond=1e-9)[0]
-        freedom = (e.size - 1) / (e.size - columns.shape[1])
-        total += float(centred @ centred)
-        explained += float(centred @ centred) - float(left @ left) * freedom
-    return max(explained / total, 0.0) if total > 0 else 1.0
-
-
-def _block_means(values: FloatArray, record: Record) -> FloatArray:
-    """Return means over quarter-second blocks: white sensor noise falls, colour stays."""
-    width = max(1, round(0.25 / float(np.median(record.steps))))
-    count = values.size // width
-    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
 
 
 def check(records: Sequence[Record], axis: Axis) -> None:

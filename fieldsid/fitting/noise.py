@@ -16,6 +16,7 @@ from fieldsid.models.record import Record
 ORDER = 3
 SMALLEST_ANGLE = 1e-7
 SMALLEST_RATE = 1e-7
+RESOLUTION = 1e-3
 
 
 def white_floor(values: FloatArray, ok: BoolArray) -> float:
@@ -93,7 +94,7 @@ def estimate_noise(
     floor = floor_of(records)
     rough = _rough_start(records, dynamics, residuals, floor, start)
     off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
-    low, high = _bounds(names, floor)
+    low, high = _bounds(names, floor, _resolution(records))
     place = [NOISE_FIELDS.index(n) for n in names]
     plain = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
 
@@ -115,11 +116,21 @@ def estimate_noise(
     return Noise(*vector(best.x).tolist()), float(-best.fun)
 
 
-def _bounds(names: tuple[str, ...], floor: Noise) -> tuple[FloatArray, FloatArray]:
-    """Return log bounds; white sensor noise stays near what the differences of the signal show of it."""
-    low = {**LOW, "angle": max(0.4 * floor.angle, LOW["angle"]), "rate": max(0.4 * floor.rate, LOW["rate"])}
-    high = {**HIGH, "angle": max(2.0 * floor.angle, 1e-5), "rate": max(2.0 * floor.rate, 1e-5)}
+def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return log bounds; white sensor noise stays near what the differences of the signal show of it, but above `least`."""
+    low = {**LOW, "angle": max(0.4 * floor.angle, least[0]), "rate": max(0.4 * floor.rate, least[1])}
+    high = {**HIGH, "angle": max(2.0 * floor.angle, 2.5 * least[0]), "rate": max(2.0 * floor.rate, 2.5 * least[1])}
     return np.log([low[n] for n in names]), np.log([high[n] for n in names])
+
+
+def _resolution(records: Sequence[Record]) -> tuple[float, float]:
+    """Return a share of each channel's own size, below which no model of the motion can be right.
+
+    A signal that was filtered before it was logged shows no white noise at all.
+    """
+    angle = _rms([r.angle[r.angle_ok] - r.angle[r.angle_ok].mean() for r in records if r.angle_ok.any()])
+    rate = _rms([r.rate[r.rate_ok] - r.rate[r.rate_ok].mean() for r in records if r.rate_ok.any()])
+    return max(RESOLUTION * angle, SMALLEST_ANGLE), max(RESOLUTION * rate, SMALLEST_RATE)
 
 
 def _rough_start(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -116,7 +116,7 @@ def _layout_of_one(layout: Layout, run: int) -> Layout:
     slots = [*layout.slots[: layout.shared], *[_moved(layout.slots[i]) for i in layout.of_run(run)]]
     g = layout.groups
     groups = Groups(g.speeds, (g.of_run[run],), g.reference, (g.run_speeds[run],), g.snapped)
-    return Layout(layout.axis, layout.effects, groups, tuple(slots), layout.shared)
+    return replace(layout, groups=groups, slots=tuple(slots))
 
 
 def _moved(slot: Slot) -> Slot:

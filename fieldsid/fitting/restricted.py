@@ -8,6 +8,7 @@ Source: Patterson and Thompson 1971, Biometrika 58(3), Recovery of inter-block i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from fieldsid.fitting.descent import covariance
 from fieldsid.fitting.noise import FAMILIES, estimate_noise
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.whitening import innovations
+from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, chi_square_tail, ljung_box
+from fieldsid.fitting.whitening import innovations, noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -102,11 +104,38 @@ def restricted_noise(problem: Problem, lines: list[Line], family: str, start: No
 
 
 def best_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, Noise, float]:
-    """Return the family, noise and log likelihood that the residuals at x support, by a penalised likelihood."""
+    """Return the family, noise and log likelihood that the residuals at x support, by a penalised likelihood.
+
+    Both colours together are tried only where the innovations under the better one alone are not white.
+    """
     lines = lines_of(problem, x)
-    best: tuple[str, Noise, float] | None = None
-    for family, names in FAMILIES.items():
-        noise, score = restricted_noise(problem, lines, family, start)
-        if best is None or score - GAIN_NEEDED * len(names) > best[2] - GAIN_NEEDED * len(FAMILIES[best[0]]):
-            best = (family, noise, score)
-    return ("white", start, float("nan")) if best is None else best
+    found: dict[str, tuple[Noise, float]] = {}
+
+    def worth(family: str) -> float:
+        return found[family][1] - GAIN_NEEDED * len(FAMILIES[family])
+
+    for family in FAMILIES:
+        if family == "both" and whitened(lines, max(found, key=worth), found):
+            continue
+        found[family] = restricted_noise(problem, lines, family, start)
+    best = max(found, key=worth)
+    return best, *found[best]
+
+
+def whitened(lines: list[Line], family: str, found: Mapping[str, tuple[Noise, float]]) -> bool:
+    """Whether the innovations of the residuals under a family's noise pass as white."""
+    noise = noise_vector(found[family][0])
+    for channel in range(2):
+        statistic, count = 0.0, 0
+        for line in lines:
+            r = line.record
+            ok = (r.angle_ok, r.rate_ok)[channel]
+            if ok.sum() < 4 * LAGS:
+                continue
+            white = np.empty((1, *line.residual.shape))
+            innovations(r.steps, r.angle_ok, r.rate_ok, line.damping, line.stiffness, noise, line.stack[:1], white)
+            statistic += ljung_box(white[0, channel][ok])
+            count += LAGS
+        if count and chi_square_tail(statistic, count) < WHITE_ENOUGH:
+            return False
+    return True

@@ -1,0 +1,98 @@
+"""The "auto" rule: prediction error under a disturbance, output error under white noise or a missing effect.
+
+Prediction error takes slow residuals for a disturbance and trusts them little. Where a missing effect causes them it
+gives the worse free run. A missing effect follows the fin and the motion; a disturbance of the sea does not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.errors import ModelError
+from fieldsid.fitting.descent import cost_of
+from fieldsid.fitting.method import Solution
+from fieldsid.fitting.predict import refit_own
+from fieldsid.fitting.problem import Problem
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+FOLLOWS = 0.6
+"""Share of the slow residual that fin and motion explain, from which on an effect is missing."""
+WORST_FREE_RUN = 2.0
+"""Free-run error of prediction error over that of output error that a disturbance can explain (at most 1.8 in 48 trials)."""
+MEMORY_S = (0.3, 1.0, 3.0, 10.0, 30.0)
+"""Time constants through which the fin may have left its mark, as far as the record is eight times as long."""
+BLOCK_S = 0.25
+
+
+def is_disturbed(problem: Problem, solution: Solution) -> bool:
+    """Whether the residuals are coloured by a disturbance that does not follow the fin or the motion."""
+    return solution.noise.disturbance > 0.0 and follows_fin(problem, solution.x) < FOLLOWS
+
+
+def keeps_free_run(problem: Problem, plain: Solution, refined: Solution, weights: Noise) -> bool:
+    """Whether the refined solution's free run is no worse than a disturbance can make it, own slots refitted."""
+    x = refined.x
+    try:
+        for run in range(len(problem.records)):
+            x = refit_own(problem, x, run, weights)
+    except ModelError:
+        return False
+    return cost_of(problem, x, weights) <= WORST_FREE_RUN**2 * cost_of(problem, plain.x, weights)
+
+
+def white_weights(problem: Problem, x: FloatArray) -> Noise:
+    """Return the residual standard deviation of both channels, 1 where a channel was not measured."""
+    squares, counts = np.zeros(2), np.zeros(2)
+    for run, record in enumerate(problem.records):
+        residual, _ = problem.residual(x, run)
+        squares += (residual**2).sum(axis=1)
+        counts += (record.angle_ok.sum(), record.rate_ok.sum())
+    sigma = np.where(squares > 0.0, np.sqrt(squares / np.maximum(counts, 1.0)), 1.0)
+    return Noise(float(sigma[0]), float(sigma[1]))
+
+
+def follows_fin(problem: Problem, x: FloatArray) -> float:
+    """Return the share (0..1) of the low-frequency residual that the fin's history and the motion explain, over all runs."""
+    explained, total = 0.0, 0.0
+    for run, record in enumerate(problem.records):
+        motion, _ = problem.simulate(x, run)
+        residual, _ = problem.residual(x, run)
+        channel = 1 if record.rate_ok.any() else 0
+        e = block_means(residual[channel], record, BLOCK_S)
+        columns = _columns(record, motion.rate)
+        if e.size <= 2 * columns.shape[1]:
+            return 1.0
+        centred = e - e.mean()
+        left = e - columns @ np.linalg.lstsq(columns, e, rcond=1e-9)[0]
+        freedom = (e.size - 1) / (e.size - columns.shape[1])
+        total += float(centred @ centred)
+        explained += float(centred @ centred) - float(left @ left) * freedom
+    return max(explained / total, 0.0) if total > 0 else 1.0
+
+
+def _columns(record: Record, rate: FloatArray) -> FloatArray:
+    """Return what a missing effect could follow, block means (m, p) scaled to one: fin, its history, rate, a constant."""
+    fin = block_means(record.fin - record.fin.mean(), record, BLOCK_S)
+    lags = [np.concatenate([np.zeros(k), fin[: fin.size - k]]) for k in range(4)]
+    length = float(record.time[-1] - record.time[0])
+    slow = [_faded(fin, tau) for tau in MEMORY_S if 8.0 * tau < length]
+    speed = block_means(rate, record, BLOCK_S)
+    parts = [*lags, *slow, *(v * np.abs(v) for v in (fin, *slow, speed)), speed, np.ones(fin.size)]
+    return np.column_stack([v / max(float(np.max(np.abs(v))), 1e-12) for v in parts])
+
+
+def _faded(values: FloatArray, tau: float) -> FloatArray:
+    """Return block means (m,) through a first-order lag of time constant tau."""
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-BLOCK_S / tau))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values))
+
+
+def block_means(values: FloatArray, record: Record, seconds: float) -> FloatArray:
+    """Return means (m,) over blocks of so many seconds: white sensor noise falls, colour stays."""
+    width = max(1, round(seconds / float(np.median(record.steps))))
+    count = values.size // width
+    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
