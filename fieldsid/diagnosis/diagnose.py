@@ -12,6 +12,7 @@ from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.advise import next_maneuver
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.records import Candidate, Diagnosis
+from fieldsid.diagnosis.refitted import refitted_model
 from fieldsid.diagnosis.remainder import remainder_of
 from fieldsid.diagnosis.search import Search, search, usable
 from fieldsid.diagnosis.split import held_back
@@ -19,9 +20,7 @@ from fieldsid.diagnosis.verdict import Verdict, explained, probabilities, verdic
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects
 from fieldsid.errors import DataError
-from fieldsid.fitting.descent import covariance, normal_equations
-from fieldsid.fitting.fit import check, model_of
-from fieldsid.fitting.method import Solution, shared_covariance
+from fieldsid.fitting.fit import check
 from fieldsid.fitting.predict import predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
@@ -47,7 +46,6 @@ def diagnose(
     records = [record_of(r, axis) for r in training]
     unseen = tuple(record_of(r, axis) for r in validation)
     check([*records, *unseen], axis)
-    _refuse_constant(records, axis)
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
     catalogue, skipped = usable(all_effects(axis).values(), [*learned, *judged])
     missing = [n for n in known if n in skipped]
@@ -73,7 +71,7 @@ def _said(
     base = work.base()
     named = found if verdict.word in ("effect", "undecided") else base
     candidates = _candidates(work, found, floor)
-    model = named_model(named)
+    model = refitted_model(named)
     added = tuple(n for n in named.names if n not in work.known)
     return Diagnosis(
         axis=work.axis,
@@ -85,7 +83,7 @@ def _said(
         noise_floor=floor,
         candidates=candidates,
         model=model,
-        base_model=named_model(base),
+        base_model=refitted_model(base),
         where=where_of(base, work.validation or work.records),
         next_maneuver=next_maneuver(work, verdict, found, skipped),
         skipped=skipped,
@@ -97,12 +95,14 @@ def _candidates(work: Search, found: Hypothesis, floor: Noise) -> tuple[Candidat
     """Return the leading hypotheses, the one found first, then by evidence."""
     base = work.base()
     others = [h for h in work.ranked() if h is not found and h is not base]
+    others.sort(key=lambda h: not work.admissible(h))
     shown = [*([found] if found is not base else []), *others]
-    p = dict(zip(map(id, [*shown, base]), probabilities([*shown, base]), strict=True))
+    fair = [h for h in (*shown, base) if h is found or h is base or work.admissible(h)]
+    p = dict(zip(map(id, fair), probabilities(fair), strict=True))
     return tuple(
         Candidate(
             effects=tuple(n for n in h.names if n not in work.known),
-            probability=p[id(h)],
+            probability=p.get(id(h), 0.0),
             parameters=dict(h.model.values),
             errors=h.errors,
             explained=explained(work, h),
@@ -124,15 +124,6 @@ def confusable(work: Search, h: Hypothesis, others: Sequence[Hypothesis]) -> tup
     )[:4]
 
 
-def named_model(h: Hypothesis) -> Model:
-    """Return a hypothesis's model with the covariance of its generalised least squares."""
-    trial, noise = h.judged.trial, h.judged.noise
-    slots = tuple(range(len(trial.x)))
-    _, normal, _, _ = normal_equations(trial.problem, trial.x, noise, slots)
-    solution = Solution(trial.x, shared_covariance(trial.problem, covariance(normal), slots), noise, "pem")
-    return model_of(trial.problem, solution)
-
-
 def shown_floor(floor: Noise, noise: Noise) -> Noise:
     """Return the sensor noise of both channels, its coloured part included."""
     return Noise(float(np.hypot(floor.angle, noise.coloured_angle)), float(np.hypot(floor.rate, noise.coloured_rate)))
@@ -145,16 +136,6 @@ def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[Place, ...]:
     worst = max(shown, key=lambda s: float(np.mean(s.residual[channel] ** 2)))
     ok = (worst.record.angle_ok, worst.record.rate_ok)[channel]
     return places(worst.record.time, worst.residual[channel] ** 2, ok, conditions(worst.record, worst.rate, 0.0))
-
-
-def _refuse_constant(records: Sequence[Record], axis: Axis) -> None:
-    for r in records:
-        if float(np.ptp(r.fin)) < 1e-4:
-            raise DataError(
-                f"run {r.name!r} does not excite {axis.value}",
-                found=f"the fin moves by {float(np.ptp(r.fin)):.2g} rad",
-                hint=f"fly an excitation: `sysid plan --axis {axis.value}`",
-            )
 
 
 def body_of(d: Diagnosis) -> dict[str, Any]:

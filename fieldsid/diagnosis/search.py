@@ -72,10 +72,12 @@ class Search:
         return (False, True) if len(groups.speeds) < len(self.records) else (False,)
 
     def _base_trial(self, *, snapped: bool) -> Trial:
-        parts = tuple(e for e in self.catalogue if e.name in self.known)
-        layout = layout_of(self.records, self.axis, parts, speed_groups(self.records, snapped=snapped))
-        problem = Problem(self.records, layout)
-        return refine(problem, start_vector(self.records, layout), self.floor)
+        layout = layout_of(self.records, self.axis, (), speed_groups(self.records, snapped=snapped))
+        trial = refine(Problem(self.records, layout), start_vector(self.records, layout), self.floor)
+        for effect in (e for e in self.catalogue if e.name in self.known):
+            promise = promise_of(ground_of(trial, trial.weights), effect)
+            trial = refine(promise.problem, promise.start, trial.weights)
+        return trial
 
     def _keep(self, judged: Judged) -> Hypothesis:
         key = frozenset(judged.trial.names)
@@ -145,7 +147,13 @@ class Search:
             current = self._swapped(paying) if size else paying
             if not self.asks_for_more(current):
                 break
-        return self._pruned(current)
+        found = self._pruned(current)
+        return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
+
+    def admissible(self, h: Hypothesis) -> bool:
+        """Whether every effect of a hypothesis is worth having: it pays over each smaller one that was tried."""
+        key = frozenset(h.names)
+        return all(self.pays(self.tried[k], h) for k in self.tried if k < key)
 
     def _swapped(self, found: Hypothesis) -> Hypothesis:
         """Drop each effect in turn and add the best other one; keep what scores higher."""

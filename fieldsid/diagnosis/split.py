@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.record import Record
 
 SHARE = 0.65
 SHORTEST_S = 12.0
+QUIET_S = 1.5
+STILL = 0.15
 
 
 def held_back(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[Record, ...], tuple[Note, ...]]:
@@ -35,13 +38,30 @@ def held_back(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[Reco
 
 
 def _cut(record: Record) -> tuple[Record, Record] | None:
-    """Return both parts of a record, cut where the fin's activity has reached SHARE of its whole."""
-    activity = np.cumsum(np.abs(record.fin - np.median(record.fin)))
-    index = int(np.searchsorted(activity, SHARE * activity[-1])) if activity[-1] > 0 else 0
+    """Return both parts of a record, cut where the fin rests nearest to where its activity reaches SHARE of the whole.
+
+    A cut in the middle of a pulse would start the second part with a fin, and a hull, that are still on their way.
+    """
+    off = np.abs(record.fin - np.median(record.fin))
+    if not off.any():
+        return None
+    activity = np.cumsum(off)
+    wanted = record.time[int(np.searchsorted(activity, SHARE * activity[-1]))]
+    resting = quiet_before(record, off)
+    if not resting.any():
+        return None
+    index = int(np.flatnonzero(resting)[np.argmin(np.abs(record.time[resting] - wanted))])
     first, last = record.time[index] - record.time[0], record.time[-1] - record.time[index]
-    if first < SHORTEST_S or last < 0.5 * SHORTEST_S or float(np.ptp(record.fin[index:])) == 0.0:
+    if first < SHORTEST_S or last < 0.5 * SHORTEST_S or float(np.ptp(record.fin[index:])) < STILL * float(off.max()):
         return None
     return part_of(record, slice(0, index)), part_of(record, slice(index, None))
+
+
+def quiet_before(record: Record, off: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return the samples before which the fin was at rest near its median for QUIET_S, (n,)."""
+    moving = off > STILL * float(off.max())
+    last_moved = np.maximum.accumulate(np.where(moving, record.time, record.time[0] - QUIET_S))
+    return np.asarray(record.time - last_moved >= QUIET_S)
 
 
 def part_of(record: Record, samples: slice) -> Record:

@@ -14,7 +14,7 @@ from fieldsid.diagnosis.search import Search
 TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
 RIVAL = 3.0
-"""Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering)."""
+"""Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
 ALIKE = 1.03
 """Rivals predict unseen runs within this factor of each other."""
 BEYOND_CHANCE = 1e-6
@@ -37,24 +37,30 @@ class Verdict:
 def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     """Return the verdict on the hypothesis a search ended at."""
     strange = left.p < BEYOND_CHANCE and search.error(found) > VISIBLE
-    if not found.names:
+    if frozenset(found.names) == search.root:
         return Verdict("unexplained" if strange else "sufficient", ())
     if strange and explained(search, found) < MOSTLY:
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
-        return Verdict("undecided", found.names, rivals)
-    return Verdict("effect", found.names)
+        return Verdict("undecided", added(search, found), rivals)
+    return Verdict("effect", added(search, found))
+
+
+def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
+    """Return the effects of a hypothesis that were not known before."""
+    return tuple(n for n in h.names if n not in search.known)
 
 
 def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
     """Return hypotheses of the same size that the data cannot tell from the one found."""
+    margin = RIVAL if len(search.records) > 1 else 2.0 * RIVAL
     return tuple(
         h
         for h in search.ranked()
         if h is not found
         and len(h.names) == len(found.names)
-        and abs(found.score - h.score) < RIVAL
+        and abs(found.score - h.score) < margin
         and search.error(h) < ALIKE * search.error(found)
     )
 

@@ -33,9 +33,10 @@ def evidence(search: Search, h: Hypothesis, floor: Noise) -> str:
 def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder, floor: Noise) -> str:
     """Return the verdict as an engineer would say it."""
     error, base = over(search, found, floor), over(search, search.base(), floor)
+    runs = "unseen runs" if search.validation else "the runs it was fitted to"
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {found.judged.noise.disturbance:.2g} rad/s^2 is there" if _disturbed(found) else ""
-        return f"nothing to add: the base model predicts unseen runs at {error:.2f} x the noise floor{tail}"
+        return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "unexplained":
         return (
             f"something is there that is not in the catalogue: error {base:.2f} x the noise floor, most of it in "
@@ -44,9 +45,9 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
         )
     names = " and ".join(verdict.effects)
     says = "; ".join(effect_named(n).says for n in verdict.effects)
-    fall = f"the error on unseen runs falls from {base:.2f} to {error:.2f} x the noise floor"
+    fall = f"the error on {runs} falls from {base:.2f} to {error:.2f} x the noise floor"
     if verdict.word == "undecided":
-        others = ", ".join("+".join(r.names) for r in verdict.rivals)
+        others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
         return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
     return f"{names} ({says}): {fall}"
 

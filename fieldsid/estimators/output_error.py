@@ -12,12 +12,12 @@ import numpy as np
 
 from fieldsid.fitting.colour import chosen_noise
 from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations
+from fieldsid.fitting.grow import grown_start
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.restricted import lines_of, restricted_likelihood
 from fieldsid.fitting.small_sample import LONG, noise_spread, widened
-from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
@@ -92,7 +92,8 @@ def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, famil
 
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the output-error solution of a joint problem."""
-    found, weights = minimise(problem, start_vector(problem.records, problem.layout), floor_of(problem.records))
+    floor = floor_of(problem.records)
+    found, weights = minimise(problem, grown_start(problem, floor), floor)
     family, noise, notes = chosen_noise(problem, found.x, weights)
     full = errors(problem, found, weights, noise, family)
     return Solution(found.x, shared_covariance(problem, full, found.free), noise, ESTIMATOR.name, notes)

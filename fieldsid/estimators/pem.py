@@ -10,12 +10,12 @@ import numpy as np
 
 from fieldsid.estimators.output_error import minimise
 from fieldsid.fitting.descent import Descent, covariance, descend
+from fieldsid.fitting.grow import grown_start
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise, generalised, lines_of, restricted_likelihood, restricted_noise
 from fieldsid.fitting.small_sample import LONG, noise_spread, widened
-from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
@@ -27,7 +27,8 @@ SETTLED = 1e-2
 
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the prediction-error solution of a joint problem."""
-    found, weights = minimise(problem, start_vector(problem.records, problem.layout), floor_of(problem.records))
+    floor = floor_of(problem.records)
+    found, weights = minimise(problem, grown_start(problem, floor), floor)
     return solve_from(problem, found.x, weights)
 
 

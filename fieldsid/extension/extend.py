@@ -14,12 +14,12 @@ import numpy as np
 from fieldsid.diagnosis.diagnose import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.refitted import refitted_model
 from fieldsid.diagnosis.search import MATTERS, WORTH, Search, search, usable
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.effects import pick_effect
 from fieldsid.errors import DataError, UsageError
-from fieldsid.extension.refitted import refitted_model
 from fieldsid.fitting.fit import check
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.effect import Effect

@@ -24,11 +24,15 @@ WORST_FREE_RUN = 2.0
 MEMORY_S = (0.3, 1.0, 3.0, 10.0, 30.0)
 """Time constants through which the fin may have left its mark, as far as the record is eight times as long."""
 BLOCK_S = 0.25
+SEA_S = (0.12, 8.0)
+"""Correlation times (s) a disturbance of the sea can have; what is faster or slower is a model error or a drift."""
 
 
 def is_disturbed(problem: Problem, solution: Solution) -> bool:
-    """Whether the residuals are coloured by a disturbance that does not follow the fin or the motion."""
-    return solution.noise.disturbance > 0.0 and follows_fin(problem, solution.x) < FOLLOWS
+    """Whether the residuals are coloured by a disturbance of the sea's own time, that follows neither fin nor motion."""
+    noise = solution.noise
+    of_the_sea = noise.disturbance > 0.0 and SEA_S[0] < noise.disturbance_time < SEA_S[1]
+    return of_the_sea and follows_fin(problem, solution.x) < FOLLOWS
 
 
 def keeps_free_run(problem: Problem, plain: Solution, refined: Solution, weights: Noise) -> bool:

@@ -69,7 +69,7 @@ def _leading(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]
 
 
 def _of_candidate(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, Any]) -> Model:
-    effects = _effects(str(candidate["effect"]))
+    effects = (*map(str, body.get("known", ())), *_effects(str(candidate["effect"])))
     given = {str(k): _value(v) for k, v in candidate["parameters"].items()}
     floor = body["noise_floor"]
     law = body.get("speed_law", {})

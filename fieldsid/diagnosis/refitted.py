@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.diagnosis.diagnose import named_model
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.trial import white_weights
 from fieldsid.estimators.output_error import coloured_covariance
-from fieldsid.fitting.descent import descend
+from fieldsid.fitting.descent import covariance, descend, normal_equations
 from fieldsid.fitting.fit import model_of
 from fieldsid.fitting.method import Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
@@ -27,10 +26,19 @@ def refitted_model(h: Hypothesis) -> Model:
     x = trial.x.copy()
     x[: layout.shared] = [h.model.values[n] for n in layout.names]
     if np.array_equal(x, trial.x):
-        return named_model(h)
+        return _by_likelihood(h)
     for run, record in enumerate(problem.records):
         x = refit_own(problem, x, run, floor_of([record]))
     weights = white_weights(problem, x)
     found = descend(problem, x, weights, rounds=0)
     full = coloured_covariance(problem, found, weights, noise)
     return model_of(problem, Solution(found.x, shared_covariance(problem, full, found.free), noise, "output_error"))
+
+
+def _by_likelihood(h: Hypothesis) -> Model:
+    """Return the model of a hypothesis's generalised least squares."""
+    trial, noise = h.judged.trial, h.judged.noise
+    slots = tuple(range(len(trial.x)))
+    _, normal, _, _ = normal_equations(trial.problem, trial.x, noise, slots)
+    solution = Solution(trial.x, shared_covariance(trial.problem, covariance(normal), slots), noise, "pem")
+    return model_of(trial.problem, solution)

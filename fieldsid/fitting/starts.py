@@ -1,0 +1,206 @@
+"""Where a refit with one effect more should start: how far the error would fall, to first order, at each scan point.
+
+At a point the new residual e and the effect's sensitivity columns C are taken; both are projected off the span of the
+parent's sensitivities, and C is solved for. No descent, so that the whole catalogue costs what one refit does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.fitting.descent import cost_of
+from fieldsid.fitting.layout import Layout, layout_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import whiten
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Coefficient, Effect
+from fieldsid.models.model import Noise
+
+MOST_POINTS = 12
+SHORTENINGS = 4
+WORTHLESS = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """What an effect promises: predicted weighted sum of squares, and the start its refit should take."""
+
+    effect: Effect
+    cost: float
+    problem: Problem
+    start: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """The parent (problem and its x), its residuals (2, n), and orthonormal bases (rows, rank) of its sensitivities."""
+
+    problem: Problem
+    x: FloatArray
+    noise: Noise
+    basis: FloatArray
+    own_basis: tuple[FloatArray, ...]
+    residuals: tuple[FloatArray, ...]
+    cost: float
+
+
+def grown(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[str, float]) -> tuple[Problem, FloatArray]:
+    """Return the problem with one effect more, and the parent's x with the effect's slots at the given values."""
+    layout = layout_of(parent.records, parent.layout.axis, (*parent.layout.effects, effect), parent.layout.groups)
+    return Problem(parent.records, layout), carried(parent.layout, x, layout, values)
+
+
+def carried(old: Layout, x: FloatArray, new: Layout, values: Mapping[str, float] = MappingProxyType({})) -> FloatArray:
+    """Return x of one layout in another's order; slots the first lacks take the given values, else their own start."""
+    known = {(s.name, s.run): v for s, v in zip(old.slots, x, strict=True)}
+    return np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in new.slots])
+
+
+def twin_of(problem: Problem, x: FloatArray, effect: Effect) -> FloatArray | None:
+    """Return the other start that has the same response at one speed, None where the effect has none."""
+    layout = problem.layout
+    values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    twin = None if effect.twin is None else effect.twin(values, layout.axis)
+    if twin is None:
+        return None
+    names, start = NAMES[layout.axis], x.copy()
+    for i, slot in enumerate(layout.slots):
+        if slot.name in twin:
+            start[i] = np.clip(twin[slot.name], slot.low, slot.high)
+        elif slot.name.startswith(f"{names.authority}@") and values[names.authority] != 0.0:
+            start[i] *= twin.get(names.authority, values[names.authority]) / values[names.authority]
+    return start
+
+
+def ground_of(problem: Problem, x: FloatArray, noise: Noise) -> Ground:
+    """Return the parent's sensitivities as orthonormal bases, joint and of each run alone."""
+    columns, own, residuals, total = [], [], [], 0.0
+    for run, record in enumerate(problem.records):
+        result = problem.linearise(x, run)
+        residuals.append(result.residual)
+        stack = np.concatenate([result.residual[None], result.sensitivity])
+        white, _ = whiten(record, noise, result.base.damping, result.base.stiffness, stack)
+        flat = white.reshape(white.shape[0], -1)
+        total += float(flat[0] @ flat[0])
+        block = np.zeros((flat.shape[1], len(problem.layout.slots)))
+        block[:, list(result.slots)] = flat[1:].T
+        columns.append(block)
+        own.append(_orthonormal(flat[1:].T))
+    return Ground(problem, x, noise, _orthonormal(np.concatenate(columns)), tuple(own), tuple(residuals), total)
+
+
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    size = np.linalg.norm(columns, axis=0)
+    kept = columns[:, size > 0] / size[size > 0]
+    q, r = np.linalg.qr(kept)
+    return np.asarray(q[:, np.abs(np.diag(r)) > 1e-8])
+
+
+def promise_of(ground: Ground, effect: Effect) -> Promise:
+    """Return the best scan point of an effect over its shared grid, its per-run grids chosen run by run."""
+    promises = []
+    for values in shared_points(ground, effect):
+        problem, x = grown(ground.problem, ground.x, effect, values)
+        for c in effect.nuisance:
+            x = _best_per_run(ground, problem, x, effect, c)
+        cost, start = _first_order(ground, problem, x, effect)
+        promises.append(Promise(effect, cost, problem, start))
+    return min(promises, key=lambda p: p.cost)
+
+
+def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
+    """Return the starts of an effect's shared coefficients: what it suggests itself, else the points of its grids."""
+    if effect.suggest is not None and (suggested := effect.suggest(ground.problem.records, ground.residuals)):
+        return suggested
+    grids = [c.scan or (c.start,) for c in effect.shared]
+    points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
+    step = -(-len(points) // MOST_POINTS)
+    return points[::step]
+
+
+def _new_slots(problem: Problem, effect: Effect) -> list[int]:
+    names = {c.name for c in effect.coefficients} | ({"cross0"} if effect.extra_states else set())
+    return [i for i, s in enumerate(problem.layout.slots) if s.name in names]
+
+
+def _run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Return one run's whitened residual (m,) and its columns of the new slots (m, k)."""
+    record = problem.records[run]
+    result = problem.linearise(x, run, new)
+    stack = np.concatenate([result.residual[None], result.sensitivity])
+    if not np.isfinite(stack).all():
+        size = 2 * len(record)
+        return np.full(size, 1e6), np.zeros((size, len(new)))
+    white, _ = whiten(record, ground.noise, result.base.damping, result.base.stiffness, stack)
+    flat = white.reshape(white.shape[0], -1)
+    columns = np.zeros((flat.shape[1], len(new)))
+    columns[:, [list(new).index(s) for s in result.slots]] = flat[1:].T
+    return flat[0], columns
+
+
+def _first_order(ground: Ground, problem: Problem, x: FloatArray, effect: Effect) -> tuple[float, FloatArray]:
+    """Return the predicted cost after one step in the new slots, and the stepped, bounded start."""
+    new = _new_slots(problem, effect)
+    parts = [_run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
+    e, c = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+    cost, step = _projected(ground.basis, e, c)
+    low, high = problem.layout.low[new], problem.layout.high[new]
+    start = x.copy()
+    wished = x[new] + step
+    start[new] = np.clip(wished, low + 1e-3 * (x[new] - low), high - 1e-3 * (high - x[new]))
+    if np.any((wished < low) | (wished > high)):
+        cost, _ = _projected(ground.basis, e - c @ (start[new] - x[new]), c[:, :0])
+    return cost, _shortened(ground, problem, x, start)
+
+
+def _shortened(ground: Ground, problem: Problem, x: FloatArray, start: FloatArray) -> FloatArray:
+    """Return the start, drawn back towards x until the free run there is no worse than at x."""
+    limit = cost_of(problem, x, ground.noise)
+    for _ in range(SHORTENINGS):
+        if cost_of(problem, start, ground.noise) <= limit:
+            return start
+        start = 0.6 * x + 0.4 * start
+    return x
+
+
+def _projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, FloatArray]:
+    """Return |residual|^2 after projecting off the basis and the columns c, and the step in c."""
+    left = e - basis @ (basis.T @ e)
+    if c.shape[1] == 0:
+        return float(left @ left), np.zeros(0)
+    free = c - basis @ (basis.T @ c)
+    size = np.linalg.norm(free, axis=0)
+    useful = size > 1e-6 * np.maximum(np.linalg.norm(c, axis=0), WORTHLESS)
+    step = np.zeros(c.shape[1])
+    if not useful.any():
+        return float(left @ left), step
+    scaled = free[:, useful] / size[useful]
+    solved = np.linalg.lstsq(scaled, left, rcond=1e-6)[0]
+    after = left - scaled @ solved
+    step[useful] = solved / size[useful]
+    return float(after @ after), step
+
+
+def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effect, c: Coefficient) -> FloatArray:
+    """Return x with one per-run nuisance at the grid point each run alone likes best."""
+    x = x.copy()
+    new = _new_slots(problem, effect)
+    for run in range(len(problem.records)):
+        slot = next(i for i in problem.layout.of_run(run) if problem.layout.slots[i].name == c.name)
+        others = [i for i in new if i != slot and problem.layout.slots[i].run in (-1, run)]
+        scored = []
+        for value in c.scan or (c.start,):
+            x[slot] = value
+            e, columns = _run_columns(ground, problem, x, run, others)
+            cost, step = _projected(ground.own_basis[run], e, columns)
+            names = [problem.layout.slots[i].name for i in others]
+            wrong = any(s + x[i] < problem.layout.low[i] for s, i, n in zip(step, others, names, strict=True) if n == "amplitude")
+            scored.append((cost if not wrong else cost + ground.cost, value))
+        x[slot] = min(scored)[1]
+    return x
