@@ -5,18 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.verdict import Verdict
+from fieldsid.errors import FieldsidError
 from fieldsid.models.effect import effect_named
+from fieldsid.planning.discriminate import separate
+from fieldsid.planning.envelope import LARGEST_FIN, Envelope
+
+MOST_RIVALS = 3
 
 
 def next_maneuver(search: Search, verdict: Verdict, found: Hypothesis, skipped: Mapping[str, str]) -> dict[str, Any] | None:
-    """Return a maneuver by the effects' own declarations of what excites them; None where nothing is open."""
+    """Return what to fly next; None where nothing is open.
+
+    Rivals: the maneuver inside the fin angles already flown whose refitted predictions stay furthest apart.
+    """
     if verdict.word == "undecided":
-        names = [n for h in (found, *verdict.rivals) for n in h.names if n not in search.known]
-        apart = list(dict.fromkeys(names))
-        return {"separates": apart, **_maneuver(apart), "command": f"sysid plan --separate {','.join(apart[:3])}"}
+        return _deciding(search, [found, *verdict.rivals][:MOST_RIVALS])
     if verdict.word == "unexplained":
         return {
             "maneuver": "repeat the run",
@@ -28,8 +36,23 @@ def next_maneuver(search: Search, verdict: Verdict, found: Hypothesis, skipped: 
     return None
 
 
-def _maneuver(names: list[str]) -> dict[str, Any]:
-    """Return the maneuver that excites most of some effects."""
+def _deciding(search: Search, rivals: list[Hypothesis]) -> dict[str, Any]:
+    names = list(dict.fromkeys(n for h in rivals for n in h.names if n not in search.known))
+    command = {"separates": names, "command": f"sysid plan --separate {','.join('+'.join(h.names) for h in rivals)}"}
+    fin = min(max(float(np.max(np.abs(r.fin - np.median(r.fin)))) for r in search.records), LARGEST_FIN)
+    speeds = [r.speed for r in search.records if np.isfinite(r.speed)]
+    try:
+        found = separate(
+            [h.own_model for h in rivals], Envelope(fin), speeds=(float(np.median(speeds)) if speeds else 1.0,), fast=True
+        )
+    except FieldsidError as error:
+        # nothing inside the limits separates them: what the effects themselves declare is still worth flying
+        return {**_declared(names), **command, "note": error.what}
+    return {**found.plain(), **command, "why": f"expected log odds {found.expected_log_odds:.0f} for the right one"}
+
+
+def _declared(names: list[str]) -> dict[str, Any]:
+    """Return the maneuver that excites most of some effects, by their own declarations."""
     votes: dict[str, int] = {}
     for name in names:
         for rank, maneuver in enumerate(effect_named(name).excited_by):

@@ -24,7 +24,7 @@ from fieldsid.fitting.fit import check
 from fieldsid.fitting.predict import predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.model import Model, Noise
+from fieldsid.models.model import Noise
 from fieldsid.models.record import Record, record_of
 
 SHOWN = 8

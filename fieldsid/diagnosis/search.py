@@ -31,7 +31,7 @@ SLOW_S = 4.0
 """A disturbance that lasts longer than this may be a drift, a bias or a speed moment in disguise."""
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
-MATTERS = 0.985
+MATTERS = 0.97
 """Share the free-run error over the floor must fall to: significant is not important."""
 
 

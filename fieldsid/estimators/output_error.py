@@ -19,6 +19,7 @@ from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.restricted import lines_of, restricted_likelihood
 from fieldsid.fitting.small_sample import LONG, noise_spread, widened
 from fieldsid.fitting.uncertainty import middle
+from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
@@ -28,11 +29,7 @@ REWEIGHTINGS = 2
 
 def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
     """Return the residual standard deviation of both channels, corrected for the parameters estimated."""
-    squares, counts = np.zeros(2), np.zeros(2)
-    for run, record in enumerate(problem.records):
-        residual, _ = problem.residual(x, run)
-        squares += (residual**2).sum(axis=1)
-        counts += (record.angle_ok.sum(), record.rate_ok.sum())
+    squares, counts = squares_of(problem, x)
     lost = parameters * counts / max(float(counts.sum()), 1.0)
     sigma = np.sqrt(squares / np.maximum(counts - lost, 1.0))
     floor = floor_of(problem.records)

@@ -46,17 +46,6 @@ def keeps_free_run(problem: Problem, plain: Solution, refined: Solution, weights
     return cost_of(problem, x, weights) <= WORST_FREE_RUN**2 * cost_of(problem, plain.x, weights)
 
 
-def white_weights(problem: Problem, x: FloatArray) -> Noise:
-    """Return the residual standard deviation of both channels, 1 where a channel was not measured."""
-    squares, counts = np.zeros(2), np.zeros(2)
-    for run, record in enumerate(problem.records):
-        residual, _ = problem.residual(x, run)
-        squares += (residual**2).sum(axis=1)
-        counts += (record.angle_ok.sum(), record.rate_ok.sum())
-    sigma = np.where(squares > 0.0, np.sqrt(squares / np.maximum(counts, 1.0)), 1.0)
-    return Noise(float(sigma[0]), float(sigma[1]))
-
-
 def follows_fin(problem: Problem, x: FloatArray) -> float:
     """Return the share (0..1) of the low-frequency residual that the fin's history and the motion explain, over all runs."""
     explained, total = 0.0, 0.0

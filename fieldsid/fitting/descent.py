@@ -20,6 +20,18 @@ DAMPING_LIMIT = 1e9
 
 
 @dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known of the slots beforehand: centre (N,) and precision (N,), zero where nothing is."""
+
+    centre: FloatArray
+    precision: FloatArray
+
+    def cost(self, x: FloatArray) -> float:
+        """Return the sum of squares it adds at x."""
+        return float(self.precision @ (x - self.centre) ** 2)
+
+
+@dataclass(frozen=True, slots=True)
 class Descent:
     """Where a descent ended: vector (N,), weighted sum of squares, its normal matrix (F, F) over `free`."""
 
@@ -87,7 +99,7 @@ def normal_equations(
 
 def descend(
     problem: Problem, x: FloatArray, noise: Noise, *, free: Sequence[int] | None = None, rounds: int = ROUNDS,
-    tolerance: float = TOLERANCE,
+    tolerance: float = TOLERANCE, prior: Prior | None = None,
 ) -> Descent:  # fmt: skip
     """Return the minimum of the whitened sum of squares that a start x leads to.
 
@@ -98,19 +110,27 @@ def descend(
     """
     slots = tuple(range(len(x)) if free is None else free)
     low, high = problem.layout.low[list(slots)], problem.layout.high[list(slots)]
-    x = x.copy()
-    x[list(slots)] = np.clip(x[list(slots)], low, high)
+    index, x = list(slots), x.copy()
+    x[index] = np.clip(x[index], low, high)
     damping, held = DAMPING_START, dynamics_of(problem, x)
-    cost, normal, gradient, _ = normal_equations(problem, x, noise, slots, held)
+
+    def linear(at: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        cost, normal, gradient, _ = normal_equations(problem, at, noise, slots, held)
+        if prior is None:
+            return cost, normal, gradient
+        pull = prior.precision * (prior.centre - at)
+        return cost + prior.cost(at), normal + np.diag(prior.precision[index]), gradient + pull[index]
+
+    cost, normal, gradient = linear(x)
     done, count = False, 0
     while count < rounds and not done and np.isfinite(cost):
         count += 1
-        step = _step(normal, gradient, damping, x[list(slots)], low, high)
+        step = _step(normal, gradient, damping, x[index], low, high)
         trial = x.copy()
-        trial[list(slots)] = np.clip(x[list(slots)] + step, low, high)
-        moved = trial[list(slots)] - x[list(slots)]
+        trial[index] = np.clip(x[index] + step, low, high)
+        moved = trial[index] - x[index]
         expected = float(2 * gradient @ moved - moved @ normal @ moved)
-        new = cost_of(problem, trial, noise, held)
+        new = cost_of(problem, trial, noise, held) + (0.0 if prior is None else prior.cost(trial))
         if new < cost:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x = trial
@@ -118,7 +138,7 @@ def descend(
             if done and damping <= DAMPING_START and cost - new <= 1e-3 * tolerance * cost:
                 cost = new
                 break
-            cost, normal, gradient, _ = normal_equations(problem, x, noise, slots, held)
+            cost, normal, gradient = linear(x)
         else:
             done = abs(expected) <= tolerance * cost
             damping = max(damping, 1e-7) * 10.0

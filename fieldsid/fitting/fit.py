@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import DataError, UsageError
-from fieldsid.fitting.choice import is_disturbed, keeps_free_run, white_weights
+from fieldsid.fitting.choice import is_disturbed, keeps_free_run
 from fieldsid.fitting.colour import whiteness
 from fieldsid.fitting.layout import Layout, layout_of
 from fieldsid.fitting.method import Estimator, History, Options, Solution
@@ -16,6 +16,7 @@ from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import Prediction, refit_own
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.remarks import remarks
+from fieldsid.fitting.weights import white_weights
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, effect_named

@@ -10,9 +10,11 @@ import numpy as np
 
 from fieldsid.errors import ModelError
 from fieldsid.fitting.descent import cost_of, descend
+from fieldsid.fitting.first_second import first_second
 from fieldsid.fitting.layout import Groups, Layout, Slot, layout_of
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import is_white
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Effect
@@ -73,20 +75,35 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
 
 
 def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatArray:
-    """Return x with a run's own slots (initial state, phases, event times) at their best, the rest untouched."""
+    """Return x with a run's own slots (initial state, phases, event times) at their best, the rest untouched.
+
+    Under white noise, a second pass weighs the run by the residual it leaves and the initial state by what the first
+    second shows of it: an initial state must not wander off to hide an error of the model.
+    """
     own = problem.layout.of_run(run)
     alone = Problem((problem.records[run],), _layout_of_one(problem.layout, run))
     keep = [*range(problem.layout.shared), *own]
-    best: FloatArray | None = None
-    lowest = float("inf")
-    for start in scanned_starts(alone, x[keep]):
-        found = descend(alone, start, noise, free=range(problem.layout.shared, len(keep)), rounds=15)
-        if found.cost < lowest:
-            best, lowest = found.x, found.cost
+    free = range(problem.layout.shared, len(keep))
+    found = [descend(alone, start, noise, free=free, rounds=15) for start in scanned_starts(alone, x[keep])]
+    best = min(found, key=lambda d: d.cost)
     out = x.copy()
-    if best is not None:
-        out[keep] = best
+    if not np.isfinite(best.cost):
+        return out
+    prior = first_second(alone, 0, noise) if is_white(noise) else None
+    if prior is not None:
+        best = descend(alone, best.x, _left_over(alone, best.x, noise), free=free, rounds=15, prior=prior)
+    out[keep] = best.x
     return out
+
+
+def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
+    """Return the residual standard deviations of one run, at least those of its noise."""
+    residual, _ = problem.residual(x, 0)
+    record = problem.records[0]
+    rms = [
+        float(np.sqrt(np.mean(residual[i][ok] ** 2))) if ok.any() else 0.0 for i, ok in enumerate((record.angle_ok, record.rate_ok))
+    ]
+    return Noise(max(rms[0], noise.angle), max(rms[1], noise.rate))
 
 
 def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:

@@ -104,6 +104,11 @@ def _orthonormal(columns: FloatArray) -> FloatArray:
 
 def promise_of(ground: Ground, effect: Effect) -> Promise:
     """Return the best scan point of an effect over its shared grid, its per-run grids chosen run by run."""
+    return promises_of(ground, effect)[0]
+
+
+def promises_of(ground: Ground, effect: Effect) -> list[Promise]:
+    """Return every scan point of an effect over its shared grid, the best first."""
     promises = []
     for values in shared_points(ground, effect):
         problem, x = grown(ground.problem, ground.x, effect, values)
@@ -111,7 +116,7 @@ def promise_of(ground: Ground, effect: Effect) -> Promise:
             x = _best_per_run(ground, problem, x, effect, c)
         cost, start = _first_order(ground, problem, x, effect)
         promises.append(Promise(effect, cost, problem, start))
-    return min(promises, key=lambda p: p.cost)
+    return sorted(promises, key=lambda p: p.cost)
 
 
 def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
