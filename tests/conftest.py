@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,21 @@ from hypothesis import settings
 from fieldsid.cli.app import main
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+def _stamp_of_kernels() -> str:
+    """Return a hash of every file that holds a compiled function."""
+    digest = sha256()
+    for path in sorted((*ROOT.glob("fieldsid/**/*.py"), *ROOT.glob("tests/truth/*.py"))):
+        text = path.read_bytes()
+        if b"jit" in text:
+            digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+# numba looks at a kernel's own file only: one compiled with an older kernel of another file inside would be taken for new.
+# Nothing imported above loads numba, which reads this once.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba" / _stamp_of_kernels()))
 
 # The same examples on every machine, and no verdict that depends on how busy it is.
 settings.register_profile("steady", derandomize=True, deadline=None)

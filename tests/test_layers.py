@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,12 @@ def imports_of(source: str) -> Iterator[str]:
             yield from (a.value for a in node.args if isinstance(a, ast.Constant) and isinstance(a.value, str))
 
 
+@cache
+def libraries_of(path: Path) -> frozenset[str]:
+    """The first part of every module a file imports."""
+    return frozenset(name.split(".")[0] for name in imports_of(path.read_text()))
+
+
 def room_of(path: Path) -> str:
     part = path.relative_to(PACKAGE).parts[0]
     return part.removesuffix(".py")
@@ -75,7 +82,7 @@ def test_a_file_imports_only_from_rooms_before_its_own(path):
 
 @pytest.mark.parametrize("library", ONLY)
 def test_a_heavy_library_is_known_in_its_room_only(library):
-    users = [p.relative_to(ROOT).as_posix() for p in FILES if library in {n.split(".")[0] for n in imports_of(p.read_text())}]
+    users = [p.relative_to(ROOT).as_posix() for p in FILES if library in libraries_of(p)]
     assert [u for u in users if not u.startswith(ONLY[library])] == []
 
 

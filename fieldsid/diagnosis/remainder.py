@@ -2,7 +2,7 @@
 
 A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted
 noise model are white, of even size throughout, and not related to the fin or the motion. Three tests look for what
-is not so: colour (Ljung-Box), relation to fin and motion (F test), and bursts or uneven size (windowed energy).
+is not so: colour (Ljung-Box), relation to fin and motion (F test, and the score test of diagnosis/memory.py), and bursts or uneven size (windowed energy).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from scipy import stats
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.memory import follows
 from fieldsid.fitting.colour import LAGS, ljung_box
 from fieldsid.fitting.predict import frozen_problem, refit_own
 from fieldsid.fitting.problem import Problem
@@ -58,6 +59,9 @@ def remainder_of(h: Hypothesis, validation: Sequence[Record]) -> Remainder:
     runs = [*_training(h), *_unseen(h, validation)]
     colour = _colour(runs)
     relation, name = _relation(runs)
+    memory = follows(h.judged.trial, h.judged.noise)
+    if 2.0 * memory.p < relation:
+        relation, name = 2.0 * memory.p, memory.what
     bursts, run, window, ratio = _bursts(runs)
     start = runs[run].record.time[0] + window * WINDOW_S
     return Remainder(colour, relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)

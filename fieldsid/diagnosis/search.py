@@ -179,7 +179,13 @@ class Search:
     def pays(self, without: Hypothesis, with_: Hypothesis) -> bool:
         """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
         better = with_.score - without.score > WORTH
-        return better and self.error(with_) < MATTERS * self.error(without)
+        return better and self.misfit(with_) < MATTERS * self.misfit(without)
+
+    def misfit(self, h: Hypothesis) -> float:
+        """Return the geometric mean of both channels' errors: the heading, where every error adds up, has no more say."""
+        errors = h.errors.validation if self.validation else h.errors.train
+        known = [e for e in (errors.angle_rms_rad, errors.rate_rms_rad_s) if np.isfinite(e)]
+        return float(np.prod(known) ** (1.0 / len(known))) if known else float("inf")
 
     def error(self, h: Hypothesis) -> float:
         """Return the free-run error over the noise floor on unseen runs, on training runs where there are none."""

@@ -17,8 +17,9 @@ RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
 ALIKE = 1.03
 """Rivals predict unseen runs within this factor of each other."""
-BEYOND_CHANCE = 1e-6
-"""p-value below which what is left is not a disturbance."""
+BEYOND_CHANCE, BESIDE_AN_EFFECT = 1e-3, 1e-6
+"""p-values below which what is left is not a disturbance: where nothing was found, and beside an effect whose form
+is never exact."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
 MOSTLY = 0.7
@@ -36,10 +37,10 @@ class Verdict:
 
 def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     """Return the verdict on the hypothesis a search ended at."""
-    strange = left.p < BEYOND_CHANCE and search.error(found) > VISIBLE
+    visible = search.error(found) > VISIBLE
     if frozenset(found.names) == search.root:
-        return Verdict("unexplained" if strange else "sufficient", ())
-    if strange and explained(search, found) < MOSTLY:
+        return Verdict("unexplained" if visible and left.p < BEYOND_CHANCE else "sufficient", ())
+    if visible and left.p < BESIDE_AN_EFFECT and explained(search, found) < MOSTLY:
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:

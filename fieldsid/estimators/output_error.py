@@ -23,8 +23,13 @@ from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
+from fieldsid.models.record import first_part
 
 REWEIGHTINGS = 2
+ROUGH = 1e-3
+"""Relative change of the cost at which a descent under provisional weights ends."""
+FIRST_PART = 5_000
+"""Samples of the first part of a long record."""
 
 
 def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
@@ -41,7 +46,7 @@ def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
 
 def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent, Noise]:
     """Return the output-error minimum from a start, with weights from its own residuals."""
-    found = descend(problem, start, noise)
+    found = descend(problem, start, noise, tolerance=ROUGH)
     for _ in range(REWEIGHTINGS):
         new = residual_noise(problem, found.x, len(found.free))
         found = descend(problem, found.x, new)
@@ -50,6 +55,16 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent
         if change < 0.02:
             break
     return found, noise
+
+
+def found_minimum(problem: Problem) -> tuple[Descent, Noise]:
+    """Return the output-error minimum of a problem; a long one starts from the minimum of its first part."""
+    floor = floor_of(problem.records)
+    if max(len(r) for r in problem.records) <= 2 * FIRST_PART:
+        return minimise(problem, grown_start(problem, floor), floor)
+    first = Problem(tuple(first_part(r, FIRST_PART) for r in problem.records), problem.layout)
+    early, weights = minimise(first, grown_start(first, floor), floor)
+    return minimise(problem, early.x, weights)
 
 
 def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
@@ -89,8 +104,7 @@ def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, famil
 
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the output-error solution of a joint problem."""
-    floor = floor_of(problem.records)
-    found, weights = minimise(problem, grown_start(problem, floor), floor)
+    found, weights = found_minimum(problem)
     family, noise, notes = chosen_noise(problem, found.x, weights)
     full = errors(problem, found, weights, noise, family)
     return Solution(found.x, shared_covariance(problem, full, found.free), noise, ESTIMATOR.name, notes)

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.estimators.output_error import minimise
+from fieldsid.estimators.output_error import found_minimum
 from fieldsid.fitting.descent import Descent, covariance, descend
-from fieldsid.fitting.grow import grown_start
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
-from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise, generalised, lines_of, restricted_likelihood, restricted_noise
 from fieldsid.fitting.small_sample import LONG, noise_spread, widened
@@ -27,8 +25,7 @@ SETTLED = 1e-2
 
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the prediction-error solution of a joint problem."""
-    floor = floor_of(problem.records)
-    found, weights = minimise(problem, grown_start(problem, floor), floor)
+    found, weights = found_minimum(problem)
     return solve_from(problem, found.x, weights)
 
 

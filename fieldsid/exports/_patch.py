@@ -19,6 +19,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.representer import RoundTripRepresenter
 
 from fieldsid.artifacts import replacing
 from fieldsid.errors import ArtifactError, UsageError
@@ -26,6 +27,16 @@ from fieldsid.exports._target import decimal
 from fieldsid.registry import near
 
 INDENTS = tuple(product((2, 4), ((2, 0), (4, 2), (2, 2), (6, 4), (4, 4)), (True, False)))
+
+
+class _Decimals(RoundTripRepresenter):
+    """Writes plain floats, which are only ours (the file's own are ScalarFloat), with a decimal point and no exponent.
+
+    A class of its own: a representer is registered for the class, and so for every YAML file of the process.
+    """
+
+
+_Decimals.add_representer(float, lambda r, v: r.represent_scalar("tag:yaml.org,2002:float", decimal(v)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +156,7 @@ def _parser(mapping: int, sequence: int, offset: int, *, quotes: bool) -> YAML:
     yaml.preserve_quotes = quotes
     yaml.width = 100_000
     yaml.indent(mapping=mapping, sequence=sequence, offset=offset)
-    # plain floats are only ours (the file's own are ScalarFloat): a decimal point and no exponent
-    yaml.representer.add_representer(float, lambda r, v: r.represent_scalar("tag:yaml.org,2002:float", decimal(v)))
+    yaml.Representer = _Decimals
     return yaml
 
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import EffectError
+from fieldsid.fitting.lean import Lean, lean
 from fieldsid.fitting.problem import Problem, RunResult
+from fieldsid.fitting.stream import streamed, streams
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
@@ -112,16 +114,8 @@ def descend(
     low, high = problem.layout.low[list(slots)], problem.layout.high[list(slots)]
     index, x = list(slots), x.copy()
     x[index] = np.clip(x[index], low, high)
-    damping, held = DAMPING_START, dynamics_of(problem, x)
-
-    def linear(at: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        cost, normal, gradient, _ = normal_equations(problem, at, noise, slots, held)
-        if prior is None:
-            return cost, normal, gradient
-        pull = prior.precision * (prior.centre - at)
-        return cost + prior.cost(at), normal + np.diag(prior.precision[index]), gradient + pull[index]
-
-    cost, normal, gradient = linear(x)
+    damping, hill = DAMPING_START, _Hill(problem, noise, slots, dynamics_of(problem, x), prior, lean(problem, noise, slots))
+    cost, normal, gradient = hill.linear(x)
     done, count = False, 0
     while count < rounds and not done and np.isfinite(cost):
         count += 1
@@ -130,20 +124,53 @@ def descend(
         trial[index] = np.clip(x[index] + step, low, high)
         moved = trial[index] - x[index]
         expected = float(2 * gradient @ moved - moved @ normal @ moved)
-        new = cost_of(problem, trial, noise, held) + (0.0 if prior is None else prior.cost(trial))
+        new, equations = hill.at(trial)
         if new < cost:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x = trial
             damping = max(damping * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)
-            if done and damping <= DAMPING_START and cost - new <= 1e-3 * tolerance * cost:
+            if equations is None and done and damping <= DAMPING_START and cost - new <= 1e-3 * tolerance * cost:
                 cost = new
                 break
-            cost, normal, gradient = linear(x)
+            cost, normal, gradient = hill.linear(x) if equations is None else (new, *equations)
         else:
             done = abs(expected) <= tolerance * cost
             damping = max(damping, 1e-7) * 10.0
             done = done or damping > DAMPING_LIMIT
     return Descent(x, cost, normal, gradient, slots, count, done)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hill:
+    """What is descended: cost and normal equations over the free slots, noise whitened through held dynamics."""
+
+    problem: Problem
+    noise: Noise
+    free: tuple[int, ...]
+    held: Dynamics
+    prior: Prior | None
+    lean: Lean | None
+
+    def linear(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return cost, normal matrix (F, F) and gradient (F,) at x."""
+        if self.lean is not None:
+            cost, normal, gradient = self.lean.linear(x)
+        elif streams(self.problem, self.noise):
+            cost, normal, gradient = streamed(self.problem, x, self.noise, self.free)
+        else:
+            cost, normal, gradient, _ = normal_equations(self.problem, x, self.noise, self.free, self.held)
+        if self.prior is None:
+            return cost, normal, gradient
+        index = list(self.free)
+        pull = self.prior.precision * (self.prior.centre - x)
+        return cost + self.prior.cost(x), normal + np.diag(self.prior.precision[index]), gradient + pull[index]
+
+    def at(self, x: FloatArray) -> tuple[float, tuple[FloatArray, FloatArray] | None]:
+        """Return the cost at x, with the normal equations where they come with it."""
+        if self.lean is not None:
+            cost, normal, gradient = self.linear(x)
+            return cost, (normal, gradient)
+        return cost_of(self.problem, x, self.noise, self.held) + (0.0 if self.prior is None else self.prior.cost(x)), None
 
 
 def _step(

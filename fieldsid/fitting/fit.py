@@ -10,12 +10,14 @@ import numpy as np
 from fieldsid.errors import DataError, UsageError
 from fieldsid.fitting.choice import is_disturbed, keeps_free_run
 from fieldsid.fitting.colour import whiteness
+from fieldsid.fitting.judge import findings
 from fieldsid.fitting.layout import Layout, layout_of
 from fieldsid.fitting.method import Estimator, History, Options, Solution
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import Prediction, refit_own
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.remarks import remarks
+from fieldsid.fitting.suspects import suspects
 from fieldsid.fitting.weights import white_weights
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES, Axis
@@ -140,7 +142,7 @@ def fitted(problem: Problem, solution: Solution) -> Fit:
     """Return the fit record of a solution."""
     floor = floor_of(problem.records)
     names = problem.layout.names
-    notes = (*solution.notes, *remarks(problem, solution, floor))
+    notes = (*remarks(problem, solution, floor), *suspects(problem, solution), *findings(problem, solution), *solution.notes)
     model = model_of(problem, solution)
     predictions = tuple(prediction_of(problem, solution.x, run) for run in range(len(problem.records)))
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from math import comb
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import minimize
 
 from fieldsid.fitting.whitening import NOISE_FIELDS, innovations
@@ -14,6 +15,8 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 ORDER = 3
+ENOUGH, BLOCK = 50_000, 1_000
+"""Samples that tell the floor well enough; of longer records blocks spread over them are taken."""
 SMALLEST_ANGLE = 1e-7
 SMALLEST_RATE = 1e-7
 RESOLUTION = 1e-3
@@ -25,9 +28,11 @@ def white_floor(values: FloatArray, ok: BoolArray) -> float:
     A polynomial of degree 2 leaves nothing in them, white noise leaves binom(6, 3) times its variance; a
     trimmed mean keeps the kinks at fin steps out. Returns NaN with fewer than 20 samples in a row.
     """
-    d = np.diff(values, ORDER)
-    whole = np.lib.stride_tricks.sliding_window_view(ok, ORDER + 1).all(axis=1)
-    d = d[whole]
+    if values.size > ENOUGH:
+        parts = [slice(i, i + BLOCK) for i in range(0, values.size - BLOCK, values.size * BLOCK // ENOUGH)]
+        d = np.concatenate([_differences(values[p], ok[p]) for p in parts])
+    else:
+        d = _differences(values, ok)
     if d.size < 20:
         return float("nan")
     square = np.sort(d * d)
@@ -35,6 +40,12 @@ def white_floor(values: FloatArray, ok: BoolArray) -> float:
     # E[x^2 | x^2 < q90] of a standard normal is 0.5849: the trimmed mean made unbiased
     full, trimmed = float(square.mean()), float(keep.mean()) / 0.5849
     return float(np.sqrt(max(min(full, trimmed), 0.0) / comb(2 * ORDER, ORDER)))
+
+
+def _differences(values: FloatArray, ok: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the third differences of samples that were all measured."""
+    d = np.diff(values, ORDER)
+    return d if ok.all() else d[np.lib.stride_tricks.sliding_window_view(ok, ORDER + 1).all(axis=1)]
 
 
 def floor_of(records: Sequence[Record]) -> Noise:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +84,23 @@ class Problem:
 
     def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
         """Return one run's free run with its sensitivities to the free slots that touch it."""
+        slots, pushes = self._pushes(x, run, free)
+        out, sens = pushes.integrate(slots)
+        motion = Motion(out[:, 0], out[:, 1])
+        shown, sens = pushes.through_sensors(motion, slots, sens)
+        return RunResult(shown.angle, shown.rate, _difference(self.records[run], shown), slots, sens, pushes.base)
+
+    def pieces(
+        self, x: FloatArray, run: int, free: Sequence[int], length: int
+    ) -> tuple[tuple[int, ...], Iterator[tuple[slice, FloatArray, FloatArray]]]:
+        """Return the free slots that touch a run, and its samples in pieces: which, motion (m, 3), sensitivities (P, 2, m).
+
+        For effects without sensor and extra states only: a piece starts from the angle and rate the last one ended at.
+        """
+        slots, pushes = self._pushes(x, run, free)
+        return slots, pushes.integrate_pieces(slots, length)
+
+    def _pushes(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], _Pushes]:
         record, layout = self.records[run], self.layout
         values, base = self.values_of(x, run), self.base_of(x, run)
         start, scale = self.start_of(values), self.scales(run)[0]
@@ -91,18 +108,18 @@ class Problem:
         slots = tuple(i for i in (*range(layout.shared), *layout.of_run(run)) if i in wanted and self._touches(i, run))
         raw = assemble(record, layout.effects, base, values, scale)
         arrays = with_moments(record, raw, layout.effects, values, start)
-        pushes = _Pushes(self, run, base, values, start, scale, raw, arrays)
-        out, sens = pushes.integrate(slots)
-        motion = Motion(out[:, 0], out[:, 1])
-        shown, sens = pushes.through_sensors(motion, slots, sens)
-        return RunResult(shown.angle, shown.rate, _difference(record, shown), slots, sens, base)
+        return slots, _Pushes(self, run, base, values, start, scale, raw, arrays)
+
+    def authority_of(self, run: int) -> str:
+        """Return the name of a run's authority slot."""
+        g = self.layout.groups
+        return group_name(NAMES[self.layout.axis].authority, g, g.of_run[run])
 
     def _touches(self, slot: int, run: int) -> bool:
         """Whether a shared slot enters a run: another speed group's authority does not."""
-        names, g = NAMES[self.layout.axis], self.layout.groups
-        name = self.layout.slots[slot].name
+        names, name = NAMES[self.layout.axis], self.layout.slots[slot].name
         if name == names.authority or name.startswith(f"{names.authority}@"):
-            return name == group_name(names.authority, g, g.of_run[run])
+            return name == self.authority_of(run)
         return True
 
     def start(self) -> FloatArray:
@@ -138,27 +155,44 @@ class _Pushes:
 
     def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Return motion (n, 3) and sensitivities (P, 2, n) before the sensor."""
-        n, count = len(self.record), len(slots)
+        rows, which, d_c, d_start = self._directions(slots)
+        return self._march(slice(0, len(self.record) - 1), rows, which, d_c, self.start, d_start)
+
+    def integrate_pieces(self, slots: tuple[int, ...], length: int) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
+        """Yield the same in pieces of `length` intervals, without the cross state's sensitivity from piece to piece."""
+        rows, which, d_c, d_start = self._directions(slots)
+        start, last = self.start, len(self.record) - 1
+        for first in range(0, last, length):
+            part = slice(first, min(first + length, last))
+            out, sens = self._march(part, rows, which, d_c, start, d_start)
+            start, d_start = out[-1].copy(), np.column_stack([sens[:, :, -1], np.zeros(len(slots))])
+            end = part.stop + 1 if part.stop == last else part.stop
+            yield slice(first, end), out[: end - first], sens[:, :, : end - first]
+
+    def _directions(self, slots: tuple[int, ...]) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
+        """Return what the slots push: drives [(n-1, 8)] and whose they are (P,), constants (P, 9), initial states (P, 3)."""
+        count = len(slots)
         rows: list[FloatArray] = []
-        which = np.full(count, -1.0)
-        d_c = np.zeros((count, len(kernels.CONSTANTS)))
-        d_start = np.zeros((count, 3))
+        which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
         for j, slot in enumerate(slots):
             name = self.problem.layout.slots[slot].name
             if name in STATE_NAMES:
                 d_start[j, STATE_NAMES.index(name)] = 1.0
                 continue
-            d_drive, constants = self._push(name)
-            d_c[j] = constants
+            d_drive, d_c[j] = self._push(name)
             if d_drive is not None:
                 which[j] = len(rows)
                 rows.append(d_drive)
-        d_drive_all = np.stack(rows) if rows else np.zeros((0, n - 1, len(kernels.DRIVES)))
-        out, sens = np.empty((n, 3)), np.empty((count, 2, n))
-        a = self.arrays
-        kernels.tangents(
-            self.record.steps, a.drive, a.constants, self.start, a.pieces, d_drive_all, which, d_c, d_start, out, sens
-        )
+        return rows, which, d_c, d_start
+
+    def _march(
+        self, part: slice, rows: list[FloatArray], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return motion (m + 1, 3) and sensitivities (P, 2, m + 1) over the m intervals of a part."""
+        a, steps = self.arrays, self.record.steps[part]
+        drives = np.stack([r[part] for r in rows]) if rows else np.zeros((0, steps.size, len(kernels.DRIVES)))
+        out, sens = np.empty((steps.size + 1, 3)), np.empty((which.size, 2, steps.size + 1))
+        kernels.tangents(steps, a.drive[part], a.constants, start, a.pieces, drives, which, d_c, d_start, out, sens)
         return out, sens
 
     def _push(self, name: str) -> tuple[FloatArray | None, FloatArray]:

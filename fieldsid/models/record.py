@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -61,6 +61,13 @@ class Record:
         if role not in self.signals:
             raise EffectError(f"run {self.name!r} has no {role} signal", found=", ".join(sorted(self.signals)) or "none")
         return self.signals[role]
+
+
+def first_part(record: Record, samples: int) -> Record:
+    """Return the first samples of a record, with the speed of the whole."""
+    part = slice(0, samples)
+    arrays = {name: getattr(record, name)[part] for name in ("time", "fin", "angle", "rate", "angle_ok", "rate_ok")}
+    return replace(record, **arrays, signals=MappingProxyType({k: v[part] for k, v in record.signals.items()}))
 
 
 def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:

@@ -171,17 +171,16 @@ def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Value
     drive[:, 3] += value[1:] - slope_p * motion.rate[1:] - slope_y * motion.angle[1:]
 
 
+def pieces_for(step: float, *rates: float) -> int:
+    """Return the RK4 pieces of an interval of `step` s whose dynamics have these rates (1/s)."""
+    return int(min(max(1, np.ceil(step * max(rates) / LONGEST_PIECE)), 200))
+
+
 def _pieces(record: Record, drive: FloatArray, constants: FloatArray) -> int:
-    step = float(record.steps.max())
     damping, stiffness = drive[:, 0], drive[:, 1]
-    fastest = max(
-        float(damping.max()),
-        -float(damping.min()),
-        float(np.sqrt(max(float(stiffness.max()), -float(stiffness.min()), 0.0))),
-        abs(float(constants[7])),
-        float(np.sqrt(abs(float(constants[8])))),
-    )
-    return int(min(max(1, np.ceil(step * fastest / LONGEST_PIECE)), 200))
+    slow = float(np.sqrt(max(float(stiffness.max()), -float(stiffness.min()), 0.0)))
+    cross = abs(float(constants[7])), float(np.sqrt(abs(float(constants[8]))))
+    return pieces_for(float(record.steps.max()), float(damping.max()), -float(damping.min()), slow, *cross)
 
 
 def _held(values: FloatArray) -> FloatArray:

@@ -60,8 +60,7 @@ def closed_loop(
         start, end = limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1]
         drive[i, 2] += push[i, 0] * start
         drive[i, 3] += push[i, 1] * end
-        drive[i, 4] += push[i, 2] * start
-        drive[i, 5] += push[i, 2] * end
+        drive[i, 5] += push[i, 2] * 0.5 * (start + end)
         kernels.simulate(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
         state[:] = pair[1]
         out[i + 1] = state
@@ -118,7 +117,7 @@ def prepared(scene: Scene, count: int, rate_hz: float) -> Prepared:
     time = np.arange(count) / rate_hz
     idle = scene.record(time, np.zeros(count))
     arrays = assemble(idle, scene.effects, replace(scene.base, authority=0.0), scene.values, scene.scale)
-    arrays.drive[:, 4:6] = 0.0
+    arrays.drive[:, 5] = 0.0
     return Prepared(time, idle.steps, arrays.drive, arrays.constants, arrays.pieces, fin_push(scene, arrays))
 
 

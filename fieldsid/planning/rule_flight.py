@@ -26,8 +26,7 @@ def advance_all(
         now[0] = drive[i]
         now[0, 2] += push[i, 0] * start[i]
         now[0, 3] += push[i, 1] * end[i]
-        now[0, 4] += push[i, 2] * start[i]
-        now[0, 5] += push[i, 2] * end[i]
+        now[0, 5] += push[i, 2] * 0.5 * (start[i] + end[i])
         kernels.simulate(steps, now, c[i], state[i], pieces, pair)
         state[i] = pair[1]
 

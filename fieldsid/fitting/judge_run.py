@@ -1,0 +1,98 @@
+"""Judge a run before its axis is fitted: the fin that is used, its limits, the other axis, a gain of impossible sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fieldsid.fitting.noise import white_floor
+from fieldsid.logs.run import Note, Run
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import Model
+from fieldsid.vehicle import Vehicle
+
+AT_LIMIT = 0.05
+OTHER_AXIS = 0.3
+FIN_APART = 0.2
+SIGNS = {"port": -1.0, "starboard": 1.0, "nose_down": -1.0, "nose_up": 1.0}
+"""Sign of the turn that a positive fin makes: yaw to starboard and pitch nose up are positive."""
+
+
+def run_findings(run: Run, axis: Axis, vehicle: Vehicle | None = None) -> tuple[Note, ...]:
+    """Return what speaks against fitting an axis to a run; the fin's limit is that of the vehicle, where one is given."""
+    return (*_fins(run, axis), *_limit(run, axis, vehicle), *_other_axis(run, axis))
+
+
+def _fins(run: Run, axis: Axis) -> Iterator[Note]:
+    names = NAMES[axis]
+    if not (run.has(names.fin) and run.has(names.fin_measured)):
+        return
+    command, fin = run[names.fin], run[names.fin_measured]
+    both = np.isfinite(command) & np.isfinite(fin)
+    if not both.any():
+        return
+    apart = float(np.sqrt(np.mean((command[both] - fin[both]) ** 2)) / max(float(np.std(command[both])), 1e-9))
+    if apart > FIN_APART:
+        yield Note(
+            "fin_measured_used",
+            f"run {run.name!r}: the measured fin is used, it is {100 * apart:.0f} % of the command away from it (rms, limit "
+            f"{100 * FIN_APART:.0f} %): the model knows nothing of the servo; for a model from the command, map `{names.fin_measured}` out",
+            {"value": apart, "limit": FIN_APART, "signal": names.fin_measured, "run": run.name},
+        )
+
+
+def _limit(run: Run, axis: Axis, vehicle: Vehicle | None) -> Iterator[Note]:
+    limit = None if vehicle is None else vehicle.fin_max_rad(axis.value)
+    name = NAMES[axis].fin
+    if limit is None or not run.has(name):
+        return
+    values = np.abs(run[name][np.isfinite(run[name])])
+    share = float(np.mean(values >= 0.99 * limit))
+    if share > AT_LIMIT:
+        yield Note(
+            "fin_at_limit",
+            f"run {run.name!r}: {name} is at its limit of {limit:.3g} rad for {100 * share:.0f} % of the time (limit "
+            f"{100 * AT_LIMIT:.0f} %): what it did beyond is not in the log; fly smaller pulses",
+            {"value": share, "limit": AT_LIMIT, "signal": name, "run": run.name},
+        )
+
+
+def _other_axis(run: Run, axis: Axis) -> Iterator[Note]:
+    names = NAMES[axis]
+    if not (run.has(names.rate) and run.has(names.other_rate)):
+        return
+    own, other = (_motion(run, n) for n in (names.rate, names.other_rate))
+    if own > 0.0 and other > OTHER_AXIS * own:
+        yield Note(
+            "other_axis_moving",
+            f"run {run.name!r}: {names.other_rate} moves {other / own:.2f} times as much as {names.rate} (limit {OTHER_AXIS:g}): both "
+            "axes act on each other; fly one axis at a time",
+            {"value": other / own, "limit": OTHER_AXIS, "signal": names.rate, "run": run.name},
+        )
+
+
+def _motion(run: Run, name: str) -> float:
+    """Return the standard deviation of a rate with its white noise taken out."""
+    ok = np.isfinite(run[name])
+    values = run[name][ok]
+    floor = white_floor(np.where(ok, run[name], 0.0), ok)
+    return float(np.sqrt(max(float(np.var(values)) - (floor**2 if np.isfinite(floor) else 0.0), 0.0)))
+
+
+def sign_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
+    """Return the finding that the fin's gain has the sign its vehicle says it cannot have."""
+    side = None if vehicle is None else vehicle.positive_rudder if model.axis is Axis.YAW else vehicle.positive_elevator
+    name = NAMES[model.axis].authority
+    value, error = model.values[name], model.std_error(name)
+    if side is None or value * SIGNS[side] > -2.0 * error:
+        return ()
+    key = "positive_rudder" if model.axis is Axis.YAW else "positive_elevator"
+    return (
+        Note(
+            "impossible_sign",
+            f"{name} = {value:.3g} +/- {error:.2g} 1/s^2 has the wrong sign: the vehicle says that a positive fin goes {side}; "
+            f"correct `sign` of the fin in the mapping, or `{key}` in vehicle.yaml",
+            {"value": value, "std_error": error, "limit": 0.0, "expected": SIGNS[side]},
+        ),
+    )

@@ -1,0 +1,104 @@
+"""The short way through a fit without effects under white noise: normal equations straight from the linear core."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import is_white
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES
+from fieldsid.models.linear_core import PARAMETERS, accumulate
+from fieldsid.models.model import Noise
+from fieldsid.models.signal_path import pieces_for
+
+LARGEST = 1e12
+"""A residual beyond this counts as a motion without bound."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """One run's arrays: fin (2, n-1), measured (2, n), weight (2, n), and which slots are its six numbers, -1 for none."""
+
+    index: int
+    steps: FloatArray
+    longest: float
+    fin: FloatArray
+    measured: FloatArray
+    weight: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """A base problem under white noise, over its free slots."""
+
+    problem: Problem
+    runs: tuple[_Run, ...]
+    free: tuple[int, ...]
+
+    def linear(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return whitened cost, normal matrix (F, F) and gradient (F,) at x."""
+        count = len(self.free)
+        total, normal, gradient = 0.0, np.zeros((count, count)), np.zeros(count)
+        for run in self.runs:
+            square, numbers = self._square(x, run)
+            if not square[0, 0] < LARGEST * run.steps.size:
+                return float("inf"), normal, gradient
+            chain = self._chain(x, run, numbers)
+            normal += chain.T @ square[1:7, 1:7] @ chain
+            gradient += square[1:7, 0] @ chain
+            total += float(square[0, 0])
+        return total, normal, gradient
+
+    def squares(self, x: FloatArray) -> FloatArray:
+        """Return the unweighted sums of squares of angle and rate, (2,)."""
+        return np.asarray(sum((self._square(x, run)[0][7, :2] for run in self.runs), start=np.zeros(2)))
+
+    def _square(self, x: FloatArray, run: _Run) -> tuple[FloatArray, FloatArray]:
+        base = self.problem.base_of(x, run.index)
+        own = [float(x[i]) for i in self.problem.layout.of_run(run.index)[:2]]
+        numbers = np.array([base.damping, base.stiffness, base.authority, base.trim, *own])
+        square = np.zeros((8, 7))
+        pieces = pieces_for(run.longest, abs(base.damping), abs(base.stiffness) ** 0.5)
+        accumulate(run.steps, run.fin, run.measured, run.weight, numbers, pieces, square)
+        upper = square[:7]
+        square[:7] = upper + np.tril(upper, -1).T
+        return square, numbers
+
+    def _chain(self, x: FloatArray, run: _Run, numbers: FloatArray) -> FloatArray:
+        """Return how a run's six numbers move with the free slots, (6, F)."""
+        layout, names = self.problem.layout, NAMES[self.problem.layout.axis]
+        out = np.zeros((len(PARAMETERS), len(self.free)))
+        share, ratio = self.problem.scales(run.index)
+        exponent = x[layout.names.index("damping_exponent")] if "damping_exponent" in layout.names else 1.0
+        authority = self.problem.authority_of(run.index)
+        by_name = {
+            names.damping: (0, share**exponent),
+            "damping_exponent": (0, numbers[0] * np.log(share)),
+            names.stiffness: (1, 1.0),
+            authority: (2, ratio**2),
+            names.trim: (3, 1.0),
+            "angle0": (4, 1.0),
+            "rate0": (5, 1.0),
+        }
+        for column, slot in enumerate(self.free):
+            s = layout.slots[slot]
+            known = by_name.get(s.name) if s.run in (-1, run.index) else None
+            if known is not None:
+                out[known[0], column] = known[1]
+        return out
+
+
+def lean(problem: Problem, noise: Noise, free: Sequence[int]) -> Lean | None:
+    """Return the short way of a problem, None where it has effects or the noise is coloured."""
+    if problem.layout.effects or not is_white(noise):
+        return None
+    runs = []
+    for index, r in enumerate(problem.records):
+        path = r.commanded
+        weight = np.stack([r.angle_ok / noise.angle, r.rate_ok / noise.rate])
+        runs.append(_Run(index, r.steps, float(r.steps.max()), np.stack([path.start, path.end]), np.stack([r.angle, r.rate]), weight))
+    return Lean(problem, tuple(runs), tuple(free))
