@@ -39,7 +39,7 @@ def command(
     """
     from fieldsid.demo.steps import STEPS, places
     from fieldsid.demo.trial import make_trial
-    from fieldsid.demo.vehicle import hidden_vehicle
+    from fieldsid.demo.vehicle import hidden_vehicle, training_maneuver
 
     began = perf_counter()
     folder = _folder(output, force=force)
@@ -47,7 +47,7 @@ def command(
     make_trial(vehicle, folder / "trial", force=force)
     known = dict(places(folder, vehicle.axis))
     if not as_json:
-        sys.stdout.write(_opening(folder))
+        sys.stdout.write(_opening(folder, training_maneuver(vehicle).name))
     done: list[dict[str, Any]] = []
     for step in (s for s in STEPS if vehicle.axis in s.axes):
         if step.possible(known):
@@ -108,10 +108,11 @@ def _aloud() -> Iterator[None]:
     sys.stderr.flush()
 
 
-def _opening(folder: Path) -> str:
+def _opening(folder: Path, maneuver: str) -> str:
     text = (
-        f"A small vehicle has flown rudder or elevator pulses at three speeds and zig-zags at two others. Its logs are in "
-        f"{folder}/trial. Its dynamics hold one effect more than the textbook's model; the commands below do not know which."
+        f"A small vehicle has flown the maneuver {maneuver} at three speeds, to learn from, and zigzag at two others, to judge "
+        f"by. Its logs are in {folder}/trial. Its dynamics hold one effect more than the textbook's model; the commands below "
+        "do not know which."
     )
     return fill(text, WIDTH, break_on_hyphens=False) + "\n"
 

@@ -49,7 +49,7 @@ def places(folder: Path, axis: str) -> dict[str, str]:
         "models": str(folder / "models"),
         "final": str(folder / "final"),
         "turning": str(folder / "turning"),
-        "fits": str(folder / "models" / f"pulses_*_{axis}.yaml"),
+        "fits": str(folder / "models" / f"learn_*_{axis}.yaml"),
         "axis": axis,
     }
 
@@ -216,10 +216,10 @@ def _verdict(ratio: float) -> str:
 
 
 STEPS: tuple[Step, ...] = (
-    Step("What is in the log?", "inspect {trial}/pulses_1.4.csv --write-mapping {mapping}", _inspected),
+    Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", _inspected),
     Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _imported),
-    Step("A model for each speed", "identify {runs}/pulses_*.parquet --axis {axis} -o {models}", _identified),
-    Step("One model for all speeds", "identify {runs}/pulses_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
+    Step("A model for each speed", "identify {runs}/learn_*.parquet --axis {axis} -o {models}", _identified),
+    Step("One model for all speeds", "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
     Step(
         "Does it hold on runs it has not seen?",
         "compare {models}/joint_{axis}.yaml {runs}/zigzag_*.parquet -o {models}",
@@ -227,13 +227,13 @@ STEPS: tuple[Step, ...] = (
     ),
     Step(
         "Which physical effect is missing?",
-        f"diagnose {{runs}}/pulses_*.parquet --axis {{axis}} {CHECKED} --figure {{models}}/diagnosis.png",
+        f"diagnose {{runs}}/learn_*.parquet --axis {{axis}} {CHECKED} --figure {{models}}/diagnosis.png",
         _diagnosed,
         learns=_named,
     ),
     Step(
         "Add it, and watch the error fall",
-        f"extend {{models}}/joint_{{axis}}.yaml {{runs}}/pulses_*.parquet --add {{effects}} {CHECKED}",
+        f"extend {{models}}/joint_{{axis}}.yaml {{runs}}/learn_*.parquet --add {{effects}} {CHECKED}",
         _extended,
         learns=_grown,
     ),

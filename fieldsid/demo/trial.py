@@ -1,4 +1,4 @@
-"""The trial of the tour: pulses at three speeds to learn from and zig-zags to judge by, as the vehicle's own logger writes them.
+"""The trial of the tour: runs at three speeds to learn from and zig-zags to judge by, as the vehicle's own logger writes them.
 
 The files are semicolon-separated text in degrees, with the logger's own column names: nothing the program knows beforehand.
 """
@@ -53,7 +53,7 @@ class Trial:
 def make_trial(model: Model, folder: Path, *, force: bool = False) -> Trial:
     """Fly the trial with a vehicle and write its logs; raises ArtifactError where a file exists."""
     lesson = training_maneuver(model)
-    train = [(f"pulses_{u:.1f}", flown(model, lesson, u, SEED + i)) for i, u in enumerate(TRAIN_SPEEDS)]
+    train = [(f"learn_{u:.1f}", flown(model, lesson, u, SEED + i)) for i, u in enumerate(TRAIN_SPEEDS)]
     zigzag = pick_maneuver("zigzag")
     check = [(f"zigzag_{u:.1f}", flown(model, zigzag, u, SEED + 10 + i)) for i, u in enumerate(CHECK_SPEEDS)]
     return Trial(tuple(_save(train, folder, force=force)), tuple(_save(check, folder, force=force)))

@@ -31,8 +31,12 @@ SLOW_S = 4.0
 """A disturbance that lasts longer than this may be a drift, a bias or a speed moment in disguise."""
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
+LEARNED = 4.0
+"""Log likelihood an addition must gain on the runs it is fitted to, or its numbers come from nowhere."""
 MATTERS = 0.97
-"""Share the free-run error over the floor must fall to: significant is not important."""
+"""Share the free-run error must fall to: significant is not important."""
+MATTERS_MORE = 0.02
+"""What a third and each further effect must bring beyond that: long explanations are the easier to find."""
 
 
 @dataclass(slots=True)
@@ -178,8 +182,10 @@ class Search:
 
     def pays(self, without: Hypothesis, with_: Hypothesis) -> bool:
         """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
-        better = with_.score - without.score > WORTH
-        return better and self.misfit(with_) < MATTERS * self.misfit(without)
+        learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
+        better = learned and with_.score - without.score > WORTH
+        matters = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
+        return better and self.misfit(with_) < matters * self.misfit(without)
 
     def misfit(self, h: Hypothesis) -> float:
         """Return the geometric mean of both channels' errors: the heading, where every error adds up, has no more say."""

@@ -62,7 +62,8 @@ def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
         if h is not found
         and len(h.names) == len(found.names)
         and abs(found.score - h.score) < margin
-        and search.error(h) < ALIKE * search.error(found)
+        and search.misfit(h) < ALIKE * search.misfit(found)
+        and search.admissible(h)
     )
 
 

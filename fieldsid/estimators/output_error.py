@@ -23,11 +23,12 @@ from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
-from fieldsid.models.record import first_part
 
 REWEIGHTINGS = 2
 ROUGH = 1e-3
 """Relative change of the cost at which a descent under provisional weights ends."""
+NEGLIGIBLE = 0.02
+"""Change of both weights, in logs, that does not move the minimum."""
 FIRST_PART = 5_000
 """Samples of the first part of a long record."""
 
@@ -52,7 +53,7 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent
         found = descend(problem, found.x, new)
         change = abs(np.log(new.angle / noise.angle)) + abs(np.log(new.rate / noise.rate))
         noise = new
-        if change < 0.02:
+        if change < NEGLIGIBLE:
             break
     return found, noise
 
@@ -60,11 +61,15 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent
 def found_minimum(problem: Problem) -> tuple[Descent, Noise]:
     """Return the output-error minimum of a problem; a long one starts from the minimum of its first part."""
     floor = floor_of(problem.records)
-    if max(len(r) for r in problem.records) <= 2 * FIRST_PART:
-        return minimise(problem, grown_start(problem, floor), floor)
-    first = Problem(tuple(first_part(r, FIRST_PART) for r in problem.records), problem.layout)
-    early, weights = minimise(first, grown_start(first, floor), floor)
-    return minimise(problem, early.x, weights)
+    first = problem if max(len(r) for r in problem.records) <= 2 * FIRST_PART else problem.first(FIRST_PART)
+    found, weights = minimise(first, grown_start(first, floor), floor)
+    if first is problem:
+        return found, weights
+    found = descend(problem, found.x, weights, tolerance=ROUGH)
+    new = residual_noise(problem, found.x, len(found.free))
+    if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) < NEGLIGIBLE:
+        return found, weights
+    return descend(problem, found.x, new, tolerance=ROUGH), new
 
 
 def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
@@ -90,10 +95,10 @@ def _sandwich(
 
 def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, family: str) -> FloatArray:
     """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
+    if family == "white":
+        return covariance(found.normal)
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
     vector = noise_vector(noise)
-    if family == "white":
-        return covariance(normal)
     if sum(len(r) for r in problem.records) > LONG:
         return _sandwich(problem, found, weights, vector, normal, results)
     lines, count = lines_of(problem, found.x), len(problem.layout.slots)

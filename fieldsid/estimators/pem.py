@@ -12,7 +12,7 @@ from fieldsid.estimators.output_error import found_minimum
 from fieldsid.fitting.descent import Descent, covariance, descend
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.restricted import best_noise, generalised, lines_of, restricted_likelihood, restricted_noise
+from fieldsid.fitting.restricted import ENOUGH, best_noise, generalised, lines_of, restricted_likelihood, restricted_noise
 from fieldsid.fitting.small_sample import LONG, noise_spread, widened
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray, Note
@@ -35,6 +35,7 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
     The family of the noise is chosen again after the first step away from that minimum, whose residuals a
     disturbance fed back through the fin has bent.
     """
+    part = problem.first(ENOUGH // len(problem.records))
     found = descend(problem, x, best_noise(problem, x, weights)[1])
     family, noise, _ = best_noise(problem, found.x, weights)
     for _ in range(ROUNDS):
@@ -43,7 +44,7 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
         settled = _moved(found, before) < SETTLED
         if settled:
             break
-        noise, _ = restricted_noise(problem, lines_of(problem, found.x), family, noise)
+        noise, _ = restricted_noise(problem, lines_of(part, found.x), family, noise)
     notes = (Note("noise_model", f"noise model: {family}", {"family": family}),)
     return Solution(
         found.x, shared_covariance(problem, errors(problem, found, noise, family), found.free), noise, ESTIMATOR.name, notes

@@ -13,6 +13,7 @@ from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.method import Solution
 from fieldsid.fitting.predict import refit_own
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.restricted import ENOUGH
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -32,7 +33,7 @@ def is_disturbed(problem: Problem, solution: Solution) -> bool:
     """Whether the residuals are coloured by a disturbance of the sea's own time, that follows neither fin nor motion."""
     noise = solution.noise
     of_the_sea = noise.disturbance > 0.0 and SEA_S[0] < noise.disturbance_time < SEA_S[1]
-    return of_the_sea and follows_fin(problem, solution.x) < FOLLOWS
+    return of_the_sea and follows_fin(problem.first(ENOUGH), solution.x) < FOLLOWS
 
 
 def keeps_free_run(problem: Problem, plain: Solution, refined: Solution, weights: Noise) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fieldsid.fitting.descent import dynamics_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise
@@ -13,7 +11,6 @@ from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
 
 __all__ = ["LAGS", "best_noise", "chi_square_tail", "chosen_noise", "dynamics_of", "ljung_box", "residuals_of", "whiteness"]
-
 
 
 def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:

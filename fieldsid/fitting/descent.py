@@ -129,7 +129,7 @@ def descend(
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x = trial
             damping = max(damping * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)
-            if equations is None and done and damping <= DAMPING_START and cost - new <= 1e-3 * tolerance * cost:
+            if equations is None and done and (hill.long or _at_rest(damping, cost - new, tolerance * cost)):
                 cost = new
                 break
             cost, normal, gradient = hill.linear(x) if equations is None else (new, *equations)
@@ -138,6 +138,11 @@ def descend(
             damping = max(damping, 1e-7) * 10.0
             done = done or damping > DAMPING_LIMIT
     return Descent(x, cost, normal, gradient, slots, count, done)
+
+
+def _at_rest(damping: float, gained: float, worth: float) -> bool:
+    """Whether a step gained so little that the normal equations before it are those after it."""
+    return damping <= DAMPING_START and gained <= 1e-3 * worth
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +155,11 @@ class _Hill:
     held: Dynamics
     prior: Prior | None
     lean: Lean | None
+
+    @property
+    def long(self) -> bool:
+        """Whether the normal equations are dear: those of one step before the end then stand for those at the end."""
+        return streams(self.problem, self.noise)
 
     def linear(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return cost, normal matrix (F, F) and gradient (F,) at x."""

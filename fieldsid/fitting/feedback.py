@@ -40,7 +40,7 @@ def feedback(record: Record) -> Iterator[Note]:
 
 
 def controller(record: Record) -> tuple[float, float, float, float] | None:
-    """Return the share explained, the gains on angle and rate (s) and the delay (s) of the best controller, None where none can be."""
+    """Return the share explained, gains on angle and rate (s) and delay (s) of the best controller; None where none can be."""
     if not (record.angle_ok.all() and record.rate_ok.all()):
         return None
     step = float(np.median(record.steps))
@@ -60,9 +60,7 @@ def controller(record: Record) -> tuple[float, float, float, float] | None:
 def _explained(record: Record, moved: FloatArray, width: int, lag: int, longest: int) -> tuple[float, float, float]:
     """Return the share of the fin's changes explained at one lag, robustly, and both gains."""
     target = moved[longest:]
-    columns = np.column_stack(
-        [(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, record.rate)]
-    )
+    columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, record.rate)])
     keep = np.abs(target) <= np.quantile(np.abs(target), 1.0 - LEFT_OUT)
     gains = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-9)[0]
     left = target[keep] - columns[keep] @ gains

@@ -28,7 +28,10 @@ def first_second(problem: Problem, run: int, floor: Noise) -> Prior | None:
     turned = np.zeros(len(record))
     if record.rate_ok.all():
         turned[1:] = np.cumsum(0.5 * (record.rate[1:] + record.rate[:-1]) * record.steps)
-    channels = (("angle0", record.angle - turned, record.angle_ok, floor.angle), ("rate0", record.rate, record.rate_ok, floor.rate))
+    channels = (
+        ("angle0", record.angle - turned, record.angle_ok, floor.angle),
+        ("rate0", record.rate, record.rate_ok, floor.rate),
+    )
     for name, values, ok, noise in channels:
         slot = next(i for i in problem.layout.of_run(run) if problem.layout.slots[i].name == name)
         known = line_start(record.time[early & ok] - record.time[0], values[early & ok], noise)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.fitting.feedback import feedback
 from fieldsid.fitting.method import Solution
@@ -30,8 +31,14 @@ def findings(problem: Problem, solution: Solution) -> tuple[Note, ...]:
     return tuple(
         note
         for record, a in zip(problem.records, damping, strict=True)
-        for note in (*feedback(record), *_clipped(record), *_gaps(record), *_short(record, a), *_speed(record, known), *_filtered(record))
+        for note in (*feedback(record), *_clipped(record), *_gaps(record), *_of_motion(record, a, known))
     )
+
+
+def _of_motion(record: Record, damping: float, effects: set[str]) -> Iterator[Note]:
+    yield from _short(record, damping)
+    yield from _speed(record, effects)
+    yield from _filtered(record)
 
 
 def _short(record: Record, damping: float) -> Iterator[Note]:
@@ -56,21 +63,22 @@ def _speed(record: Record, effects: set[str]) -> Iterator[Note]:
     if change > SPEED_RANGE:
         yield Note(
             "speed_changing",
-            f"run {record.name!r}: the speed changes by {100 * change:.0f} % ({low:.2f} to {high:.2f} m/s, limit {100 * SPEED_RANGE:.0f} %): "
-            "the parameters are a mean over it; hold the speed, or use `--effects speed_varying`",
+            f"run {record.name!r}: the speed changes by {100 * change:.0f} % ({low:.2f} to {high:.2f} m/s, limit "
+            f"{100 * SPEED_RANGE:.0f} %): the parameters are a mean over it; hold the speed, or use `--effects speed_varying`",
             {"value": change, "limit": SPEED_RANGE, "run": record.name, "signal": "surge_m_s"},
         )
 
 
 def _gaps(record: Record) -> Iterator[Note]:
     median = float(np.median(record.steps))
-    widest = int(np.argmax(record.steps))
-    if record.steps[widest] > GAP * median:
+    widest, count = int(np.argmax(record.steps)), int((record.steps > GAP * median).sum())
+    if count:
         yield Note(
             "clock_jump",
-            f"run {record.name!r}: {record.steps[widest]:.2f} s between two samples at {record.time[widest]:.2f} s, {median:.3f} s elsewhere "
-            f"(limit {GAP:g} times): the fin in between is taken as held; cut there with `--from` and `--to`",
-            {"value": float(record.steps[widest]), "limit": GAP * median, "count": int((record.steps > GAP * median).sum()), "run": record.name},
+            f"run {record.name!r}: {record.steps[widest]:.2f} s between two samples at {record.time[widest]:.2f} s, "
+            f"{median:.3f} s elsewhere (limit {GAP:g} times): the fin in between is "
+            "taken as held; cut there with `--from` and `--to`",
+            {"value": float(record.steps[widest]), "limit": GAP * median, "count": count, "run": record.name},
         )
 
 
@@ -86,7 +94,7 @@ def _clipped(record: Record) -> Iterator[Note]:
             )
 
 
-def _channels(record: Record) -> Sequence[tuple[str, FloatArray, FloatArray]]:
+def _channels(record: Record) -> Sequence[tuple[str, FloatArray, npt.NDArray[np.bool_]]]:
     names = NAMES[record.axis]
     return [(names.rate, record.rate, record.rate_ok), (names.angle, record.angle, record.angle_ok)]
 
@@ -119,8 +127,7 @@ def _filtered(record: Record) -> Iterator[Note]:
         if floor < FILTERED * size:
             yield Note(
                 "filtered_sensor",
-                f"{name} of run {record.name!r} shows no white noise ({floor:.1e}, limit {FILTERED:g} of its own size {size:.2g}): it was filtered "
-                "before it was logged, or simulated, so that its noise floor is not known; log it unfiltered",
+                f"{name} of run {record.name!r} shows no white noise ({floor:.1e}, limit {FILTERED:g} of its own size "
+                f"{size:.2g}): it was filtered before it was logged, or simulated, so that its noise floor is not known; log it unfiltered",
                 {"value": floor, "limit": FILTERED * size, "signal": name, "run": record.name},
             )
-

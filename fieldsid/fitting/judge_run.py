@@ -37,7 +37,8 @@ def _fins(run: Run, axis: Axis) -> Iterator[Note]:
         yield Note(
             "fin_measured_used",
             f"run {run.name!r}: the measured fin is used, it is {100 * apart:.0f} % of the command away from it (rms, limit "
-            f"{100 * FIN_APART:.0f} %): the model knows nothing of the servo; for a model from the command, map `{names.fin_measured}` out",
+            f"{100 * FIN_APART:.0f} %): the model knows nothing of the servo; for one from the command, leave "
+            f"`{names.fin_measured}` out of the mapping",
             {"value": apart, "limit": FIN_APART, "signal": names.fin_measured, "run": run.name},
         )
 
@@ -66,8 +67,8 @@ def _other_axis(run: Run, axis: Axis) -> Iterator[Note]:
     if own > 0.0 and other > OTHER_AXIS * own:
         yield Note(
             "other_axis_moving",
-            f"run {run.name!r}: {names.other_rate} moves {other / own:.2f} times as much as {names.rate} (limit {OTHER_AXIS:g}): both "
-            "axes act on each other; fly one axis at a time",
+            f"run {run.name!r}: {names.other_rate} moves {other / own:.2f} times as much as {names.rate} (limit {OTHER_AXIS:g}): "
+            "both axes act on each other; fly one axis at a time",
             {"value": other / own, "limit": OTHER_AXIS, "signal": names.rate, "run": run.name},
         )
 

@@ -21,7 +21,7 @@ LARGEST = 1e12
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """One run's arrays: fin (2, n-1), measured (2, n), weight (2, n), and which slots are its six numbers, -1 for none."""
+    """One run's arrays: fin (2, n-1), measured (2, n), weight (2, n), and its longest step in s."""
 
     index: int
     steps: FloatArray
@@ -100,5 +100,6 @@ def lean(problem: Problem, noise: Noise, free: Sequence[int]) -> Lean | None:
     for index, r in enumerate(problem.records):
         path = r.commanded
         weight = np.stack([r.angle_ok / noise.angle, r.rate_ok / noise.rate])
-        runs.append(_Run(index, r.steps, float(r.steps.max()), np.stack([path.start, path.end]), np.stack([r.angle, r.rate]), weight))
+        fin, measured = np.stack([path.start, path.end]), np.stack([r.angle, r.rate])
+        runs.append(_Run(index, r.steps, float(r.steps.max()), fin, measured, weight))
     return Lean(problem, tuple(runs), tuple(free))

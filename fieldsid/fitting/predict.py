@@ -100,9 +100,8 @@ def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
     """Return the residual standard deviations of one run, at least those of its noise."""
     residual, _ = problem.residual(x, 0)
     record = problem.records[0]
-    rms = [
-        float(np.sqrt(np.mean(residual[i][ok] ** 2))) if ok.any() else 0.0 for i, ok in enumerate((record.angle_ok, record.rate_ok))
-    ]
+    masks = (record.angle_ok, record.rate_ok)
+    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else 0.0 for e, ok in zip(residual, masks, strict=True)]
     return Noise(max(rms[0], noise.angle), max(rms[1], noise.rate))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +12,8 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.models import kernels
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Coefficient, Motion
-from fieldsid.models.record import Record
-from fieldsid.models.signal_path import Assembled, Base, assemble, lift, measured, run_core, with_moments
+from fieldsid.models.record import Record, first_part
+from fieldsid.models.signal_path import Assembled, Base, assemble, constants_of, lift, measured, run_core, with_moments
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,12 @@ class Problem:
 
     records: tuple[Record, ...]
     layout: Layout
+
+    def first(self, samples: int) -> Problem:
+        """Return the problem on the first samples of every run; itself where none is longer."""
+        if all(len(r) <= samples for r in self.records):
+            return self
+        return Problem(tuple(first_part(r, samples) for r in self.records), self.layout)
 
     def base_of(self, x: FloatArray, run: int) -> Base:
         """Return a run's base parameters."""
@@ -136,6 +142,10 @@ def _difference(record: Record, motion: Motion) -> FloatArray:
     )
 
 
+Push = Callable[[slice, FloatArray], None]
+"""Fills a part (m, 8), zero before, with the derivatives of the drives by one number."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Pushes:
     """What each slot does to the core's arrays of one run: the input of its tangents."""
@@ -169,89 +179,87 @@ class _Pushes:
             end = part.stop + 1 if part.stop == last else part.stop
             yield slice(first, end), out[: end - first], sens[:, :, : end - first]
 
-    def _directions(self, slots: tuple[int, ...]) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
-        """Return what the slots push: drives [(n-1, 8)] and whose they are (P,), constants (P, 9), initial states (P, 3)."""
+    def _directions(self, slots: tuple[int, ...]) -> tuple[list[Push], FloatArray, FloatArray, FloatArray]:
+        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 9), initial states (P, 3)."""
         count = len(slots)
-        rows: list[FloatArray] = []
+        rows: list[Push] = []
         which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
         for j, slot in enumerate(slots):
             name = self.problem.layout.slots[slot].name
             if name in STATE_NAMES:
                 d_start[j, STATE_NAMES.index(name)] = 1.0
                 continue
-            d_drive, d_c[j] = self._push(name)
-            if d_drive is not None:
+            push, d_c[j] = self._push(name)
+            if push is not None:
                 which[j] = len(rows)
-                rows.append(d_drive)
+                rows.append(push)
         return rows, which, d_c, d_start
 
     def _march(
-        self, part: slice, rows: list[FloatArray], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
+        self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return motion (m + 1, 3) and sensitivities (P, 2, m + 1) over the m intervals of a part."""
         a, steps = self.arrays, self.record.steps[part]
-        drives = np.stack([r[part] for r in rows]) if rows else np.zeros((0, steps.size, len(kernels.DRIVES)))
+        drives = np.zeros((len(rows), steps.size, len(kernels.DRIVES)))
+        for row, push in zip(drives, rows, strict=True):
+            push(part, row)
         out, sens = np.empty((steps.size + 1, 3)), np.empty((which.size, 2, steps.size + 1))
         kernels.tangents(steps, a.drive[part], a.constants, start, a.pieces, drives, which, d_c, d_start, out, sens)
         return out, sens
 
-    def _push(self, name: str) -> tuple[FloatArray | None, FloatArray]:
+    def _push(self, name: str) -> tuple[Push | None, FloatArray]:
         names = NAMES[self.problem.layout.axis]
         none = np.zeros(len(kernels.CONSTANTS))
         share, ratio = self.problem.scales(self.run)
-        exponent = self.values["damping_exponent"]
+        exponent = self.values.get("damping_exponent", 1.0)
         if name == names.damping:
             return self._damping(share**exponent), none
         if name == "damping_exponent":
-            return self._damping(self.base.damping * float(np.log(share))), self._of_exponent()
+            return self._damping(self.base.damping * float(np.log(share))), none
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return self._authority(ratio**2), none
-        d = np.zeros_like(self.arrays.drive)
         if name == names.stiffness:
-            d[:, 1] = 1.0
-            return d, none
+            return _constant(slice(1, 2)), none
         if name == names.trim:
-            d[:, 2:4] = 1.0
-            return d, none
+            return _constant(slice(2, 4)), none
         return self._of_effect(name)
 
-    def _damping(self, factor: float) -> FloatArray:
-        d = np.zeros_like(self.arrays.drive)
+    def _damping(self, factor: float) -> Push:
         shape = self.arrays.terms.damping_factor
-        d[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1] + shape[1:])
-        return d
 
-    def _of_exponent(self) -> FloatArray:
-        """Derivative of the core's constants by the damping exponent: what sway and heave scale with, too."""
-        step, ends = 1e-4, []
-        for sign in (1.0, -1.0):
-            shifted = self.values | {"damping_exponent": self.values["damping_exponent"] + sign * step}
-            ends.append(assemble(self.record, self.problem.layout.effects, self.base, shifted, self.scale).constants)
-        return np.asarray((ends[0] - ends[1]) / (2 * step))
+        def push(part: slice, row: FloatArray) -> None:
+            row[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1][part] + shape[1:][part])
 
-    def _authority(self, factor: float) -> FloatArray:
-        d = np.zeros_like(self.arrays.drive)
+        return push
+
+    def _authority(self, factor: float) -> Push:
         start, end = lift(self.arrays.fin, self.arrays.terms)
-        d[:, 2], d[:, 3] = factor * start, factor * end
-        return d
 
-    def _of_effect(self, name: str) -> tuple[FloatArray | None, FloatArray]:
+        def push(part: slice, row: FloatArray) -> None:
+            row[:, 2], row[:, 3] = factor * start[part], factor * end[part]
+
+        return push
+
+    def _of_effect(self, name: str) -> tuple[Push | None, FloatArray]:
         """Central difference of the arrays by an effect's coefficient; they are cheap, and no motion enters."""
         layout, coefficient = self.problem.layout, self._coefficient(name)
-        owner = [e for e in layout.effects if any(c.name == name for c in e.coefficients)]
-        if owner[0].measure is not None:
+        owner = next(e for e in layout.effects if any(c.name == name for c in e.coefficients))
+        if owner.measure is not None:
             return None, np.zeros(len(kernels.CONSTANTS))
         step = coefficient.step
         high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
-        ends = []
+        if owner.fin is None and owner.terms is None and owner.moment is None and owner.core is not None:
+            ends = [owner.core(self.values | {name: value}, self.scale) for value in (high, low)]
+            if ends[0].cross_fin == ends[1].cross_fin:
+                return None, (constants_of(ends[0]) - constants_of(ends[1])) / (high - low)
+        assembled = []
         for value in (high, low):
             shifted = self.values | {name: value}
             arrays = assemble(self.record, layout.effects, self.base, shifted, self.scale)
-            ends.append(self._with_own_moment(arrays, shifted))
-        width = high - low
-        d_drive = (ends[0].drive - ends[1].drive) / width
-        d_c = (ends[0].constants - ends[1].constants) / width
-        return (d_drive if d_drive.any() else None), d_c
+            assembled.append(self._with_own_moment(arrays, shifted))
+        d_drive = (assembled[0].drive - assembled[1].drive) / (high - low)
+        d_c = (assembled[0].constants - assembled[1].constants) / (high - low)
+        return (_known(d_drive) if d_drive.any() else None), d_c
 
     def _with_own_moment(self, arrays: Assembled, values: dict[str, float]) -> Assembled:
         """Add the state-dependent moments along the converged motion, their slopes left out of the difference."""
@@ -292,6 +300,20 @@ class _Pushes:
             out[j, 0] = (plus.angle - minus.angle) / (2 * step)
             out[j, 1] = (plus.rate - minus.rate) / (2 * step)
         return shown, out
+
+
+def _constant(columns: slice) -> Push:
+    def push(_part: slice, row: FloatArray) -> None:
+        row[:, columns] = 1.0
+
+    return push
+
+
+def _known(d_drive: FloatArray) -> Push:
+    def push(part: slice, row: FloatArray) -> None:
+        row[:] = d_drive[part]
+
+    return push
 
 
 STATE_NAMES = ("angle0", "rate0", "cross0")

@@ -25,6 +25,8 @@ from fieldsid.models.record import Record
 GAIN_NEEDED = 4.0
 """Log likelihood a family must gain over a simpler one for each parameter more (about twice Akaike's 1)."""
 NO_INFORMATION = 1e-12
+ENOUGH = 30_000
+"""Samples over all runs that noise is estimated from; of longer records the first part is taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +93,21 @@ def _profiled(square: FloatArray) -> float:
     values, vectors = np.linalg.eigh(normal)
     kept = values > NO_INFORMATION
     share = vectors.T[kept] @ (square[1:, 0][known] / scale)
-    return float(square[0, 0] - np.sum(share**2 / values[kept]) + np.sum(np.log(values[kept])) + 2.0 * np.sum(np.log(scale)))
+    left = square[0, 0] - np.sum(share**2 / values[kept])
+    return float(left + np.sum(np.log(values[kept])) + 2.0 * np.sum(np.log(scale)))
 
 
 def restricted_noise(problem: Problem, lines: list[Line], family: str, start: Noise) -> tuple[Noise, float]:
     """Return the noise of a family of highest restricted likelihood, and that log likelihood."""
-    dynamics, residuals = [(line.damping, line.stiffness) for line in lines], [line.residual for line in lines]
     count = len(problem.layout.slots)
+    dynamics, residuals = [(line.damping, line.stiffness) for line in lines], [line.residual for line in lines]
     return estimate_noise(
-        problem.records, dynamics, residuals, family, start, lambda noise: restricted_likelihood(lines, count, noise)
+        [line.record for line in lines],
+        dynamics,
+        residuals,
+        family,
+        start,
+        lambda noise: restricted_likelihood(lines, count, noise),
     )
 
 
@@ -108,6 +116,7 @@ def best_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, Nois
 
     Both colours together are tried only where the innovations under the better one alone are not white.
     """
+    problem = problem.first(ENOUGH // len(problem.records))
     lines = lines_of(problem, x)
     found: dict[str, tuple[Noise, float]] = {}
 

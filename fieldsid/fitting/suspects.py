@@ -14,7 +14,7 @@ from fieldsid.errors import FieldsidError
 from fieldsid.fitting.descent import covariance, descend
 from fieldsid.fitting.method import Solution
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.restricted import generalised, lines_of
+from fieldsid.fitting.restricted import ENOUGH, generalised, lines_of
 from fieldsid.fitting.starts import grown
 from fieldsid.fitting.weights import misfit, white_weights
 from fieldsid.fitting.whitening import noise_vector
@@ -33,7 +33,7 @@ HOLDS = ("quadratic_damping", "crossflow_drag")
 
 def suspects(problem: Problem, solution: Solution) -> tuple[Note, ...]:
     """Return the suspicions a fit's residual raises."""
-    known = {e.name for e in problem.layout.effects}
+    problem, known = problem.first(ENOUGH // len(problem.records)), {e.name for e in problem.layout.effects}
     notes: list[Note] = []
     if not known & set(FIN_TIMING):
         notes += _timing(problem, solution)
@@ -63,15 +63,16 @@ def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
     if value > 0.0:
         yield Note(
             "ignored_delay",
-            f"the vehicle answers about {1e3 * value:.0f} +/- {1e3 * error:.0f} ms after the logged fin (limit {1e3 * LEAST_DELAY_S:.0f} ms): "
-            f"left out, it moves {name} by about {bias:+.0f} %; log the measured fin, or use `--effects delay` or `--effects servo_lag`",
+            f"the vehicle answers about {1e3 * value:.0f} +/- {1e3 * error:.0f} ms after the logged fin (limit "
+            f"{1e3 * LEAST_DELAY_S:.0f} ms): left out, it moves {name} by about {bias:+.0f} %; log the measured fin, or "
+            "use `--effects delay` or `--effects servo_lag`",
             data,
         )
     else:
         yield Note(
             "negative_delay",
-            f"the vehicle answers about {-1e3 * value:.0f} +/- {1e3 * error:.0f} ms BEFORE the logged fin: no lag can be negative, it is a "
-            "clock that is off, or a controller; use `--effects clock_offset`, or stamp both by one clock",
+            f"the vehicle answers about {-1e3 * value:.0f} +/- {1e3 * error:.0f} ms BEFORE the logged fin: no lag can be "
+            "negative, it is a clock that is off, or a controller; use `--effects clock_offset`, or stamp both by one clock",
             data,
         )
 
@@ -94,7 +95,8 @@ def _instability(problem: Problem, solution: Solution) -> Iterator[Note]:
     if damping < -2.0 * spread and gained > WORTH:
         yield Note(
             "hidden_instability",
-            f"UNSTABLE: with quadratic damping the fit is far better (log likelihood {gained:+.0f}) and {name} = {damping:.3g} +/- {spread:.2g} 1/s "
-            "is negative: the vehicle turns by itself, the linear fit hides it; use `--effects quadratic_damping`",
+            f"UNSTABLE: with quadratic damping the fit is far better (log likelihood {gained:+.0f}) and {name} = {damping:.3g} "
+            f"+/- {spread:.2g} 1/s is negative: the vehicle turns by itself, the linear fit hides it; "
+            "use `--effects quadratic_damping`",
             {"value": damping, "std_error": spread, "limit": 0.0, "gained": gained},
         )

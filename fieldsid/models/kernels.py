@@ -39,14 +39,41 @@ def crossflow(alpha: float, p: float) -> tuple[float, float, float]:
 
 
 @jit
+def _any(values: FloatArray, first: int, last: int) -> bool:
+    """Whether any of values[first:last] is not zero; loops compile in a fraction of what array expressions take."""
+    found = False
+    for l in range(first, last):
+        found = found or values[l] != 0.0
+    return found
+
+
+@jit
+def _spoil(out: FloatArray, first: int) -> None:
+    """Set the rows of out (n, p) from `first` on to NaN."""
+    for i in range(first, out.shape[0]):
+        for l in range(out.shape[1]):
+            out[i, l] = np.nan
+
+
+@jit
+def _weight(stage: int) -> float:
+    """Return the weight of a stage of the RK4 rule, times six."""
+    return 1.0 + (stage % 3 != 0)
+
+
+@jit
+def _reach(stage: int) -> float:
+    """Return the part of a step at which a stage is taken."""
+    return 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+
+
+@jit
 def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> None:
     """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on."""
     n = steps.shape[0] + 1
-    weight = np.array([1.0, 2.0, 2.0, 1.0])
-    reach = np.array([0.0, 0.5, 0.5, 1.0])
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
-    turning = c[3] != 0.0 or c[4] != 0.0 or c[5] != 0.0 or c[6] != 0.0
+    turning = _any(c, 3, 7)
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
@@ -55,8 +82,8 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
             for stage in range(4):
-                g = reach[stage] * h
-                part = (piece + reach[stage]) / pieces
+                g = _reach(stage) * h
+                part = (piece + _reach(stage)) / pieces
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
                 f = -a * ps - k * ys + m - c[0] * ps * abs(ps) + xs
@@ -67,14 +94,14 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
                 ky, kp, kx = ps, f, -e * xs - f_cross * ps + q
-                ty += weight[stage] * ky
-                tp += weight[stage] * kp
-                tx += weight[stage] * kx
+                ty += _weight(stage) * ky
+                tp += _weight(stage) * kp
+                tx += _weight(stage) * kx
             y += h / 6.0 * ty
             p += h / 6.0 * tp
             x += h / 6.0 * tx
         if not abs(p) < DIVERGED:
-            out[i + 1 :] = np.nan
+            _spoil(out, i + 1)
             return
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
 
@@ -100,18 +127,15 @@ def tangents(
     """
     n = steps.shape[0] + 1
     count = d_c.shape[0]
-    weight = np.array([1.0, 2.0, 2.0, 1.0])
-    reach = np.array([0.0, 0.5, 0.5, 1.0])
     s = d_start.copy()
     kt = np.zeros((count, 3))
     acc = np.zeros((count, 3))
     has_c = np.zeros(count, dtype=np.bool_)
+    turning, flowing = _any(c, 3, 7), c[1] != 0.0
     for j in range(count):
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
-        for l in range(d_c.shape[1]):
-            has_c[j] = has_c[j] or d_c[j, l] != 0.0
-    turning = np.any(c[3:7] != 0.0) or np.any(d_c[:, 3:7] != 0.0)
-    flowing = c[1] != 0.0 or np.any(d_c[:, 1] != 0.0)
+        has_c[j] = _any(d_c[j], 0, d_c.shape[1])
+        turning, flowing = turning or _any(d_c[j], 3, 7), flowing or d_c[j, 1] != 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
     for i in range(n - 1):
@@ -122,12 +146,13 @@ def tangents(
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
-            acc[:] = 0.0
-            kt[:] = 0.0
+            for j in range(count):
+                for l in range(3):
+                    acc[j, l] = kt[j, l] = 0.0
             for stage in range(4):
-                g = reach[stage] * h
-                part = (piece + reach[stage]) / pieces
-                wt = weight[stage]
+                g = _reach(stage) * h
+                part = (piece + _reach(stage)) / pieces
+                wt = _weight(stage)
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
                 drag = ps * abs(ps)
@@ -178,8 +203,9 @@ def tangents(
                     if abs(s[j, l]) < 1e-150:
                         s[j, l] = 0.0
         if not abs(p) < DIVERGED:
-            out[i + 1 :] = np.nan
-            sens[:, :, i + 1 :] = np.nan
+            _spoil(out, i + 1)
+            for j in range(count):
+                _spoil(sens[j].T, i + 1)
             return
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
         for j in range(count):

@@ -50,8 +50,14 @@ def _small(value: float) -> float:
 
 
 @jit
-def accumulate(
-    steps: FloatArray, fin: FloatArray, measured: FloatArray, weight: FloatArray, base: FloatArray, pieces: int, square: FloatArray
+def accumulate(  # noqa: C901  (one loop over the samples: a call in it would double its time)
+    steps: FloatArray,
+    fin: FloatArray,
+    measured: FloatArray,
+    weight: FloatArray,
+    base: FloatArray,
+    pieces: int,
+    square: FloatArray,
 ) -> None:
     """Add products of the weighted residual and its six sensitivities to square (8, 7).
 

@@ -97,8 +97,13 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
         # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
         cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
         drive[:, 6], drive[:, 7] = cross[:-1], cross[1:]
-    constants = np.array([getattr(core, name) for name in kernels.CONSTANTS])
+    constants = constants_of(core)
     return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms)
+
+
+def constants_of(core: Core) -> FloatArray:
+    """Return a core's coefficients as the vector (9,) that the kernel takes; the fin's push on the cross state is a drive."""
+    return np.array([getattr(core, name) for name in kernels.CONSTANTS])
 
 
 def lift(fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,129 @@
+"""Sensitivities against central differences, the short and the piecewise way against the general one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from truth.paper import PITCH, YAW, YawRow, paper_run
+
+from fieldsid.fitting import stream
+from fieldsid.fitting.descent import Prior, cost_of, descend, normal_equations
+from fieldsid.fitting.layout import layout_of
+from fieldsid.fitting.lean import lean
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.start import start_vector
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import effect_named
+from fieldsid.models.model import Noise
+from fieldsid.models.record import record_of
+
+NOISE = Noise(0.005, 0.004)
+
+
+def record(row, seed=1, **change):
+    log = paper_run(row, angle_noise=0.005, rate_noise=0.005, seed=seed)
+    made = record_of(Run(f"run{seed}", log.pop("time_s"), log), Axis.YAW if isinstance(row, YawRow) else Axis.PITCH)
+    return replace(made, **change)
+
+
+def problem_of(records, effects=()):
+    parts = tuple(effect_named(e) for e in effects)
+    return Problem(tuple(records), layout_of(records, records[0].axis, parts))
+
+
+def moved_start(problem):
+    """A start off every symmetric point: base parameters near the truth, effects a little from zero."""
+    x = start_vector(problem.records, problem.layout)
+    for i, slot in enumerate(problem.layout.slots):
+        if x[i] in (slot.low, 0.0):
+            x[i] = min(slot.low + 0.05, 0.5 * slot.high) if slot.low >= 0 else 0.02
+    return x
+
+
+@pytest.mark.parametrize(
+    ("row", "effects"),
+    [
+        (YAW[1], ()), (PITCH[3], ()), (YAW[1], ("quadratic_damping",)), (YAW[1], ("sway_coupling", "servo_lag")),
+        (PITCH[3], ("large_angle_righting",)), (YAW[1], ("gyro_bias",)), (YAW[1], ("crossflow_drag",)),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_sensitivities_are_the_slopes_of_the_free_run(row, effects):
+    problem = problem_of([record(row)], effects)
+    x = moved_start(problem)
+    result = problem.linearise(x, 0)
+    for slot, mine in zip(result.slots, result.sensitivity, strict=True):
+        step = 1e-4 * max(abs(x[slot]), 0.1)
+        ends = [problem.residual(np.where(np.arange(x.size) == slot, x + s, x), 0)[0] for s in (step, -step)]
+        slope = -(ends[0] - ends[1]) / (2 * step)
+        scale = np.abs(slope).max() + 1e-9
+        assert np.abs(mine - slope).max() < 2e-3 * scale, problem.layout.slots[slot].name
+
+
+def test_the_short_way_has_the_normal_equations_of_the_general_core():
+    logs = [record(PITCH[3]), record(PITCH[3], 2, speed=1.2)]
+    ok = logs[0].rate_ok.copy()
+    ok[100:130] = False
+    problem = problem_of([replace(logs[0], rate_ok=ok), logs[1]])
+    x = moved_start(problem)
+    free = tuple(range(x.size))
+    short = lean(problem, NOISE, free)
+    assert short is not None
+    cost, normal, gradient = short.linear(x)
+    expected = normal_equations(problem, x, NOISE, free)
+    assert cost == pytest.approx(expected[0], rel=1e-10)
+    np.testing.assert_allclose(normal, expected[1], rtol=1e-9, atol=1e-9 * np.abs(expected[1]).max())
+    np.testing.assert_allclose(gradient, expected[2], rtol=1e-7, atol=1e-9 * np.abs(expected[2]).max())
+
+
+@pytest.mark.parametrize("noise", [NOISE, Noise(0.005, 0.005, 0.02, 1.0)], ids=["white", "disturbed"])
+def test_only_a_base_problem_under_white_noise_takes_the_short_way(noise):
+    base, longer = problem_of([record(YAW[1])]), problem_of([record(YAW[1])], ["servo_lag"])
+    assert (lean(base, noise, (0,)) is not None) == (noise is NOISE)
+    assert lean(longer, noise, (0,)) is None
+
+
+def test_pieces_of_a_long_record_add_up_to_the_whole(monkeypatch):
+    problem = problem_of([record(YAW[1])], ["quadratic_damping"])
+    x, free = moved_start(problem), (0, 1, 3, 4, 5)
+    monkeypatch.setattr(stream, "CHUNK", 97)
+    assert stream.streams(problem, NOISE)
+    pieces, whole = stream.streamed(problem, x, NOISE, free), normal_equations(problem, x, NOISE, free)
+    assert pieces[0] == pytest.approx(whole[0], rel=1e-12)
+    np.testing.assert_allclose(pieces[1], whole[1], rtol=1e-10, atol=1e-9 * np.abs(whole[1]).max())
+    np.testing.assert_allclose(pieces[2], whole[2], rtol=1e-8, atol=1e-9 * np.abs(whole[2]).max())
+
+
+def test_a_step_that_an_effect_refuses_counts_as_rejected():
+    from fieldsid.errors import EffectError
+
+    def moment(motion, values, record):
+        if values["k"] > 0.1:
+            raise EffectError("k is too large")
+        return values["k"] * motion.rate
+
+    base = effect_named("quadratic_damping")
+    own = replace(base, name="own", core=None, suggest=None, twin=None, moment=moment, coefficients=(replace(base.coefficients[0], name="k", low=-1.0, high=1.0, start=0.0),))  # fmt: skip  # noqa: E501
+    log = record(YAW[1])
+    problem = Problem((log,), layout_of([log], Axis.YAW, (own,)))
+    x = start_vector([log], problem.layout)
+    x[problem.layout.names.index("a22")] += 0.5  # asks for k near 0.5
+    slot = problem.layout.names.index("k")
+    assert cost_of(problem, np.where(np.arange(x.size) == slot, 0.2, x), NOISE) == float("inf")
+    found = descend(problem, x, NOISE, free=[slot], rounds=15)
+    assert 0.0 < found.x[slot] <= 0.1
+
+
+def test_a_prior_holds_a_slot_as_strongly_as_it_says():
+    problem = problem_of([record(YAW[1])])
+    x = start_vector(problem.records, problem.layout)
+    free = descend(problem, x, NOISE)
+    centre, precision = free.x.copy(), np.zeros(x.size)
+    centre[4] += 0.01
+    precision[4] = 1e12
+    assert descend(problem, x, NOISE, prior=Prior(centre, precision)).x[4] == pytest.approx(centre[4], abs=1e-6)
+    precision[4] = 0.0
+    np.testing.assert_allclose(descend(problem, x, NOISE, prior=Prior(centre, precision)).x, free.x, rtol=1e-4, atol=1e-7)

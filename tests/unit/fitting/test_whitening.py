@@ -1,0 +1,97 @@
+"""Whitening, its likelihood and the sandwich's middle against a dense covariance built from the noise's own definition."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from fieldsid.fitting.noise import log_likelihood
+from fieldsid.fitting.uncertainty import middle
+from fieldsid.fitting.whitening import noise_vector, transition, whiten
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+NOISES = {
+    "disturbance": Noise(0.005, 0.004, 0.05, 0.8),
+    "coloured": Noise(0.005, 0.004, 0.0, 1.0, 0.006, 0.003, 0.5),
+    "both": Noise(0.005, 0.004, 0.05, 0.8, 0.006, 0.003, 0.5),
+}
+A, K = 1.2, 0.3
+
+
+def record(*, gaps: bool) -> Record:
+    rng = np.random.default_rng(3)
+    time = np.cumsum(rng.uniform(0.04, 0.06, 40)) if gaps else np.arange(40) * 0.05
+    ok = np.ones((2, 40), dtype=bool)
+    if gaps:
+        ok[0, 10:14], ok[1, 20:22] = False, False
+    zero = np.zeros(40)
+    return Record("short", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], {}, 1.0)
+
+
+def dense(log: Record, noise: Noise) -> np.ndarray:
+    """Covariance (2n, 2n), angle first, of y' = p, p' = -A p - K y + w with everything zero at the start but w and n."""
+    n, vector = len(log), noise_vector(noise)
+    states = np.zeros((5, 5 * n + 5))
+    states[2, 0], states[3, 1], states[4, 2] = vector[2], vector[4], vector[5]
+    rows = []
+    for i in range(n):
+        rows.append(np.stack([states[0] + states[3], states[1] + states[4]]))
+        if i == n - 1:
+            break
+        h = log.steps[i]
+        f = np.zeros((5, 5))
+        f[:3, :3] = expm(np.array([[0, 1, 0], [-K, -A, 1], [0, 0, 0]]) * h)
+        f[2, 2], f[3, 3] = np.exp(-h / vector[3]), np.exp(-h / vector[6])
+        f[4, 4] = f[3, 3]
+        states = f @ states
+        for j, (row, sigma) in enumerate(((2, vector[2]), (3, vector[4]), (4, vector[5]))):
+            states[row, 5 + 5 * i + j] = sigma * np.sqrt(1.0 - f[row, row] ** 2)
+    loading = np.concatenate([np.array([r[ch] for r in rows]) for ch in range(2)])
+    return loading @ loading.T + np.diag(np.repeat(vector[:2] ** 2, n))
+
+
+def seen(log: Record) -> np.ndarray:
+    return np.concatenate([log.angle_ok, log.rate_ok])
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("family", NOISES)
+def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(family, gaps):
+    log, rng = record(gaps=gaps), np.random.default_rng(1)
+    series = np.where(seen(log).reshape(2, -1), rng.standard_normal((3, 2, 40)), 0.0)
+    white, logs = whiten(log, NOISES[family], A, K, series)
+    keep = seen(log)
+    cov = dense(log, NOISES[family])[np.ix_(keep, keep)]
+    flat = series.reshape(3, -1)[:, keep]
+    mine = white.reshape(3, -1) @ white.reshape(3, -1).T
+    np.testing.assert_allclose(mine, flat @ np.linalg.solve(cov, flat.T), rtol=1e-5)
+    assert logs == pytest.approx(np.linalg.slogdet(cov)[1], rel=1e-6)
+
+
+def test_the_likelihood_is_that_of_the_dense_gaussian():
+    log, noise = record(gaps=True), NOISES["both"]
+    keep = seen(log)
+    cov = dense(log, noise)[np.ix_(keep, keep)]
+    e = np.zeros(80)
+    e[keep] = np.random.default_rng(2).multivariate_normal(np.zeros(cov.shape[0]), cov)
+    expected = -0.5 * (np.linalg.slogdet(cov)[1] + e[keep] @ np.linalg.solve(cov, e[keep]))
+    assert log_likelihood([log], [(A, K)], [e.reshape(2, -1)], noise_vector(noise)) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("family", NOISES)
+def test_the_middle_of_the_sandwich_is_the_dense_one(family):
+    log = record(gaps=True)
+    weighted = np.where(seen(log).reshape(2, -1), np.random.default_rng(5).standard_normal((3, 2, 40)), 0.0)
+    flat = weighted.reshape(3, -1)
+    expected = flat @ dense(log, NOISES[family]) @ flat.T
+    np.testing.assert_allclose(middle(log, noise_vector(NOISES[family]), A, K, weighted), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("a", "k", "h"), [(1.2, 0.3, 0.05), (8.0, 0.0, 0.5), (1e-3, 0.0, 2.0), (0.5, 20.0, 0.3)])
+def test_the_transition_is_the_matrix_exponential(a, k, h):
+    yy, yp, py, pp, wy, wp = transition(a, k, h)
+    exact = expm(np.array([[0, 1, 0], [-k, -a, 1], [0, 0, 0]]) * h)
+    np.testing.assert_allclose([[yy, yp, wy], [py, pp, wp]], exact[:2], atol=1e-7)

@@ -1,0 +1,87 @@
+"""The compiled core against a fine-step integration by SciPy, written down a second time; the linear core against itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from fieldsid.models import kernels
+from fieldsid.models.jit import plain_of
+from fieldsid.models.linear_core import accumulate
+from fieldsid.models.signal_path import pieces_for
+
+N, H = 80, 0.05
+C = dict(zip(kernels.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3), strict=True))
+
+
+def drive(seed=4):
+    rng = np.random.default_rng(seed)
+    out = np.zeros((N - 1, 8))
+    out[:, 0], out[:, 1] = 1.1 + 0.2 * rng.random(N - 1), 0.3
+    level = np.repeat(rng.uniform(-0.3, 0.3, N // 10 + 1), 10)[: N - 1]
+    out[:, 2], out[:, 3] = level, level + 0.02
+    out[:, 4], out[:, 5] = 1.0 + 0.1 * rng.random(N - 1), 0.05
+    out[:, 6], out[:, 7] = 0.1 * np.sin(np.arange(N - 1) * 0.1), 0.1 * np.sin(np.arange(1, N) * 0.1)
+    return out
+
+
+def oracle(rows, c, start):
+    """Interval by interval with DOP853: inputs are smooth inside each."""
+    xi = (np.arange(4000) + 0.5) / 4000 - 0.5
+    path, y = [np.array(start)], np.array(start)
+    for a, k, m0, m1, g, q, w0, w1 in rows:
+
+        def slope(t, s, a=a, k=k, m0=m0, m1=m1, g=g, q=q, w0=w0, w1=w1):
+            part = t / H
+            flow = (w0 + (w1 - w0) * part) / c["length"] + xi * s[1]
+            drag = 32.0 * np.mean(flow * np.abs(flow) * xi)
+            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["quadratic"] * s[1] * abs(s[1]) - c["crossflow"] * drag + s[2]
+            p += c["heading_sin"] * np.sin(s[0]) + c["heading_cos"] * np.cos(s[0])
+            p += c["righting_sin"] * (s[0] - np.sin(s[0])) + c["righting_cos"] * (np.cos(s[0]) - 1.0)
+            return [s[1], p, -c["cross_damping"] * g * s[2] - c["cross_rate"] * g * g * s[1] + q]
+
+        y = solve_ivp(slope, (0.0, H), y, method="DOP853", rtol=1e-9, atol=1e-12).y[:, -1]
+        path.append(y)
+    return np.array(path)
+
+
+def test_the_core_is_the_integral_of_its_equation():
+    rows, out = drive(), np.empty((N, 3))
+    kernels.simulate(np.full(N - 1, H), rows, np.array(list(C.values())), np.array([0.1, -0.05, 0.02]), 2, out)
+    np.testing.assert_allclose(out, oracle(rows, C, [0.1, -0.05, 0.02]), atol=2e-6)
+
+
+def test_the_compiled_core_gives_the_numbers_of_its_python_source():
+    steps, c, start = np.full(N - 1, H), np.array(list(C.values())), np.array([0.1, -0.05, 0.02])
+    fast, slow = np.empty((N, 3)), np.empty((N, 3))
+    kernels.simulate(steps, drive(), c, start, 1, fast)
+    plain_of(kernels.simulate)(steps, drive(), c, start, 1, slow)
+    np.testing.assert_allclose(fast, slow, rtol=1e-12, atol=1e-15)
+
+
+def test_a_motion_without_bound_is_nan_from_there_on():
+    rows, out = np.zeros((N - 1, 8)), np.empty((N, 3))
+    rows[:, 0], rows[:, 2:4] = -40.0, 1.0
+    kernels.simulate(np.full(N - 1, H), rows, np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0]), np.zeros(3), 8, out)
+    first = int(np.argmax(np.isnan(out[:, 1])))
+    assert 0 < first < N
+    assert np.isnan(out[first:]).all()
+    assert np.isfinite(out[:first]).all()
+
+
+@pytest.mark.parametrize(("a", "k"), [(1.1, 0.0), (2.4, 0.05), (-0.2, 0.0), (9.0, 4.0)])
+def test_the_linear_core_leaves_the_residual_of_the_general_one(a, k):
+    rng = np.random.default_rng(2)
+    steps = np.where(np.arange(N - 1) % 7 == 0, 0.08, H)
+    fin, measured = rng.uniform(-0.3, 0.3, (2, N - 1)), rng.standard_normal((2, N))
+    weight = np.where(rng.random((2, N)) < 0.9, 3.0, 0.0)
+    pieces = pieces_for(0.08, abs(a), k**0.5)
+    square = np.zeros((8, 7))
+    accumulate(steps, fin, measured, weight, np.array([a, k, -0.8, 0.01, 0.1, 0.05]), pieces, square)
+    rows, out = np.zeros((N - 1, 8)), np.empty((N, 3))
+    rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = a, k, -0.8 * fin[0] + 0.01, -0.8 * fin[1] + 0.01
+    kernels.simulate(steps, rows, np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0]), np.array([0.1, 0.05, 0.0]), pieces, out)
+    left = measured - out[:, :2].T
+    assert square[0, 0] == pytest.approx(float(np.sum((weight * left) ** 2)), rel=1e-10)
+    np.testing.assert_allclose(square[7, :2], np.sum(np.where(weight > 0, left, 0.0) ** 2, axis=1), rtol=1e-10)

@@ -1,0 +1,46 @@
+"""How base parameters move with speed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldsid.models.speed_law import SpeedLaw
+
+GROUPS = SpeedLaw(1.5, 0.8, 2.0, ((1.0, -0.6), (1.5, -1.5), (2.0, -2.4)))
+
+
+def test_one_run_scales_damping_by_u_and_authority_by_u_squared():
+    law = SpeedLaw(1.5)
+    assert law.damping_factor(3.0) == pytest.approx(2.0)
+    assert law.authority(3.0, -1.5) == pytest.approx(-6.0)
+
+
+@pytest.mark.parametrize(("speed", "value"), GROUPS.points)
+def test_a_group_speed_gives_the_groups_own_authority(speed, value):
+    assert GROUPS.authority(speed, -1.5) == pytest.approx(value)
+
+
+def test_beyond_the_groups_the_power_law_goes_on_from_the_nearest():
+    assert GROUPS.authority(4.0, -1.5) == pytest.approx(-2.4 * 4.0)
+    assert GROUPS.authority(0.5, -1.5) == pytest.approx(-0.6 / 4.0)
+
+
+@pytest.mark.parametrize("speed", [float("nan"), 0.0, -1.0])
+def test_a_speed_that_is_not_known_leaves_the_reference_values(speed):
+    assert GROUPS.scale(speed) == 1.0
+    assert SpeedLaw(1.5).authority(speed, -1.5) == -1.5
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(1.08, 1.0), (1.45, 1.5), (1.25, 1.25)])
+def test_a_speed_near_a_group_counts_as_its_speed_where_runs_snap(speed, expected):
+    assert SpeedLaw(1.5, points=GROUPS.points, snap=0.12).effective(speed) == pytest.approx(expected)
+
+
+@given(st.floats(0.3, 5.0), st.floats(0.3, 5.0))
+def test_authority_grows_with_speed(one, two):
+    slow, fast = sorted([one, two])
+    assert abs(GROUPS.authority(slow, -1.5)) <= abs(GROUPS.authority(fast, -1.5)) * (1 + 1e-9)
+    assert np.isfinite(GROUPS.authority(slow, -1.5))
