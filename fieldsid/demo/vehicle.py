@@ -67,7 +67,7 @@ def hidden_vehicle(effect: str) -> Model:
 def varied(role: str, time: FloatArray, speed: float) -> FloatArray:
     """Return a helper signal (n,) that moves as it does on a real dive, so that an effect which needs it shows."""
     shapes = {
-        "surge": speed * (1.0 + 0.15 * np.sin(2 * np.pi * time / 17.0)),
+        "surge": speed * (1.0 + 0.3 * np.sin(2 * np.pi * time / 17.0)),
         "thrust": 50.0 * (1.0 + 0.4 * np.sign(np.sin(2 * np.pi * time / 11.0))),
         "roll": 0.15 * np.sin(2 * np.pi * time / 9.0),
         "depth": 3.0 + 2.0 * np.sin(2 * np.pi * time / 25.0),

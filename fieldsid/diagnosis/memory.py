@@ -1,4 +1,4 @@
-"""Is there a moment that follows the fin or the motion with a memory, which no effect of the catalogue describes?
+"""Whether a moment follows the fin or the motion with a memory that no effect of the catalogue describes.
 
 A score test: moments proportional to fading means of the fin, its square and the square of the rate join the model at
 zero. The fall of the whitened sum of squares, everything else refitted to first order, is chi-square when none of them

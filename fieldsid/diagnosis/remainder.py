@@ -2,7 +2,8 @@
 
 A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted
 noise model are white, of even size throughout, and not related to the fin or the motion. Three tests look for what
-is not so: colour (Ljung-Box), relation to fin and motion (F test, and the score test of diagnosis/memory.py), and bursts or uneven size (windowed energy).
+is not so: colour (Ljung-Box), relation to fin and motion (F test, and the score test of diagnosis/memory.py), and
+bursts or uneven size (windowed energy).
 """
 
 from __future__ import annotations

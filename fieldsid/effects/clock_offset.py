@@ -39,5 +39,5 @@ EFFECT = Effect(
     mistaken_for=("delay", "servo_lag", "rate_limit"),
     source="Ljung 1999, System Identification, chapter 14",
     measure=measure,
-    handicap=5.0,
+    handicap=15.0,
 )

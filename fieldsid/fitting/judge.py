@@ -128,6 +128,7 @@ def _filtered(record: Record) -> Iterator[Note]:
             yield Note(
                 "filtered_sensor",
                 f"{name} of run {record.name!r} shows no white noise ({floor:.1e}, limit {FILTERED:g} of its own size "
-                f"{size:.2g}): it was filtered before it was logged, or simulated, so that its noise floor is not known; log it unfiltered",
+                f"{size:.2g}): it was filtered before it was logged, or simulated: its noise floor is not known; "
+                "log it unfiltered",
                 {"value": floor, "limit": FILTERED * size, "signal": name, "run": record.name},
             )

@@ -16,6 +16,8 @@ from fieldsid.models.speed_law import SpeedLaw
 
 GROUP_WIDTH = 0.08
 """Runs whose speeds differ by less than this share form one speed group."""
+SENSOR_WIDTH = 0.01
+"""Speeds nearer than this are the same: a speed sensor tells no more, and twice the share would go into the authority."""
 SNAP_WIDTH = 0.12
 """A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}
@@ -59,9 +61,15 @@ def speed_groups(records: Sequence[Record], *, snapped: bool = False) -> Groups:
     for previous, index in pairwise(order):
         labels[index] = labels[previous] + int(np.log(speeds[index] / speeds[previous]) > GROUP_WIDTH)
     means = tuple(float(speeds[labels == g].mean()) for g in range(labels.max() + 1))
-    reference = int(np.argmin(np.abs(np.log(np.array(means) / np.median(speeds)))))
+    reference = int(np.argmin(np.abs(np.log(np.array(means) / np.median(means)))))
     of_run = tuple(int(g) for g in labels)
-    return Groups(means, of_run, reference, tuple(means[g] for g in of_run) if snapped else own, snapped)
+    return Groups(means, of_run, reference, _run_speeds(own, means, of_run, snapped=snapped), snapped)
+
+
+def _run_speeds(own: Sequence[float], means: Sequence[float], of_run: Sequence[int], *, snapped: bool) -> tuple[float, ...]:
+    """Return the speed each run counts as flown at."""
+    near = SNAP_WIDTH if snapped else SENSOR_WIDTH
+    return tuple(means[g] if abs(np.log(u / means[g])) <= near else u for u, g in zip(own, of_run, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +109,9 @@ class Layout:
         g = self.groups
         reference = g.speeds[g.reference]
         if len(g.speeds) == 1:
-            return SpeedLaw(reference, snap=SNAP_WIDTH if g.snapped else 0.0)
+            return SpeedLaw(reference, snap=SNAP_WIDTH if g.snapped else SENSOR_WIDTH)
         points = tuple((u, values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
-        return SpeedLaw(reference, values["damping_exponent"], 2.0, points, SNAP_WIDTH if g.snapped else 0.0)
+        return SpeedLaw(reference, values["damping_exponent"], 2.0, points, SNAP_WIDTH if g.snapped else SENSOR_WIDTH)
 
 
 def group_name(authority: str, groups: Groups, index: int) -> str:

@@ -144,6 +144,10 @@ def _resolution(records: Sequence[Record]) -> tuple[float, float]:
     return max(RESOLUTION * angle, SMALLEST_ANGLE), max(RESOLUTION * rate, SMALLEST_RATE)
 
 
+WOKEN = 0.5
+"""Share of its rough size a part starts at where the given start has next to none: from nothing there is no slope."""
+
+
 def _rough_start(
     records: Sequence[Record],
     dynamics: Sequence[tuple[float, float]],
@@ -159,10 +163,10 @@ def _rough_start(
     return {
         "angle": floor.angle,
         "rate": floor.rate,
-        "disturbance": start.disturbance if start.disturbance > 0 else a * extra + 1e-6,
+        "disturbance": max(start.disturbance, WOKEN * (a * extra + 1e-6)),
         "disturbance_time": start.disturbance_time,
-        "coloured_angle": start.coloured_angle if start.coloured_angle > 0 else 0.5 * spare,
-        "coloured_rate": start.coloured_rate if start.coloured_rate > 0 else 0.5 * extra,
+        "coloured_angle": max(start.coloured_angle, WOKEN * spare),
+        "coloured_rate": max(start.coloured_rate, WOKEN * extra),
         "coloured_time": start.coloured_time,
     }
 

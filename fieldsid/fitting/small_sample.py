@@ -20,7 +20,7 @@ STEP = 0.05
 """Half width of differences by the log of a noise number."""
 LEAST_CURVATURE = 0.5
 """A noise number whose likelihood is flatter than this is taken as known to a factor of 4 (one standard deviation)."""
-FEWEST_DEGREES = 4.0
+FEWEST_DEGREES = 8.0
 LONG = 20_000
 """Samples from which on the noise counts as known."""
 

@@ -82,7 +82,8 @@ def test_prediction_error_beats_output_error_under_a_disturbance():
 def test_intervals_cover_what_they_say(row, case, method):
     z = scores(row, case, method, range(200))
     covered = float(np.mean(np.abs(z) < 1.96))
-    print(f"{case} {type(row).__name__} {method}: {100 * covered:.1f} %, each {np.round(100 * np.mean(np.abs(z) < 1.96, axis=0), 1)}")
+    each = np.round(100 * np.mean(np.abs(z) < 1.96, axis=0), 1)
+    print(f"{case} {type(row).__name__} {method}: {100 * covered:.1f} %, each {each}")
     # 200 seeds of 3 or 4 correlated numbers: one standard error of the share is about 1 %
     assert 0.91 <= covered <= 0.985
 
@@ -90,7 +91,7 @@ def test_intervals_cover_what_they_say(row, case, method):
 @pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=["yaw", "pitch"])
 def test_output_error_reaches_the_cramer_rao_bound_in_white_noise(row):
-    """The bound is the inverse information at the truth; efficiency is bound over mean squared error, the mean over parameters."""
+    """The bound is the inverse information at the truth; efficiency is bound over mean squared error, averaged."""
     from fieldsid.fitting.descent import covariance, normal_equations
     from fieldsid.fitting.layout import layout_of
     from fieldsid.fitting.problem import Problem

@@ -37,7 +37,7 @@ X = np.array([1.0, -1.0, -0.008, 2.0, 0.02, 0.01])
 
 def test_the_iterated_moment_moves_the_vehicle_as_the_core_does():
     one, two = (problem(e).simulate(X, 0)[0] for e in (BUILT_IN, OWN))
-    assert two.rate == pytest.approx(one.rate, abs=2e-4 * np.abs(one.rate).max())
+    assert two.rate == pytest.approx(one.rate, abs=5e-4 * np.abs(one.rate).max())
 
 
 def test_its_sensitivities_are_those_of_the_core():
