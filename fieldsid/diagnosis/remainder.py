@@ -56,10 +56,15 @@ class Left:
 
 
 def remainder_of(h: Hypothesis, validation: Sequence[Record]) -> Remainder:
-    """Return the tests of what a hypothesis leaves on training and validation runs."""
-    runs = [*_training(h), *_unseen(h, validation)]
-    colour = _colour(runs)
-    relation, name = _relation(runs)
+    """Return the tests of what a hypothesis leaves.
+
+    Colour and relation are tested on the training runs alone: on unseen runs the parameters' own errors follow the
+    motion, and would be taken for something missing. Bursts are looked for everywhere.
+    """
+    fitted = _training(h)
+    runs = [*fitted, *_unseen(h, validation)]
+    colour = _colour(fitted)
+    relation, name = _relation(fitted)
     memory = follows(h.judged.trial, h.judged.noise)
     if 2.0 * memory.p < relation:
         relation, name = 2.0 * memory.p, memory.what

@@ -17,7 +17,7 @@ from fieldsid.fitting.method import Estimator, Options, Solution, shared_covaria
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.restricted import lines_of, restricted_likelihood
-from fieldsid.fitting.small_sample import LONG, noise_spread, widened
+from fieldsid.fitting.small_sample import FEWEST_DEGREES_PLAIN, LONG, noise_spread, widened
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
@@ -29,8 +29,10 @@ ROUGH = 1e-3
 """Relative change of the cost at which a descent under provisional weights ends."""
 NEGLIGIBLE = 0.02
 """Change of both weights, in logs, that does not move the minimum."""
-FIRST_PART = 5_000
-"""Samples of the first part of a long record."""
+CLOSE = 1e-4
+"""The same on a long record, whose start is near the end."""
+FIRST_PARTS = (5_000, 50_000)
+"""Samples of the first parts of a long record."""
 
 
 def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
@@ -59,17 +61,23 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent
 
 
 def found_minimum(problem: Problem) -> tuple[Descent, Noise]:
-    """Return the output-error minimum of a problem; a long one starts from the minimum of its first part."""
-    floor = floor_of(problem.records)
-    first = problem if max(len(r) for r in problem.records) <= 2 * FIRST_PART else problem.first(FIRST_PART)
+    """Return the output-error minimum of a problem; a long one comes to it over the minima of ever longer first parts.
+
+    Each is so near the next one's that a step or two lead there.
+    """
+    floor, longest = floor_of(problem.records), max(len(r) for r in problem.records)
+    first = problem if longest <= 2 * FIRST_PARTS[0] else problem.first(FIRST_PARTS[0])
     found, weights = minimise(first, grown_start(first, floor), floor)
     if first is problem:
         return found, weights
-    found = descend(problem, found.x, weights, tolerance=ROUGH)
+    for samples in FIRST_PARTS[1:]:
+        if longest > 2 * samples:
+            found = descend(problem.first(samples), found.x, weights, tolerance=ROUGH)
+    found = descend(problem, found.x, weights, tolerance=CLOSE)
     new = residual_noise(problem, found.x, len(found.free))
     if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) < NEGLIGIBLE:
         return found, weights
-    return descend(problem, found.x, new, tolerance=ROUGH), new
+    return descend(problem, found.x, new, tolerance=CLOSE), new
 
 
 def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
@@ -104,7 +112,9 @@ def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, famil
     lines, count = lines_of(problem, found.x), len(problem.layout.slots)
     spread = noise_spread(lambda v: restricted_likelihood(lines, count, v), vector, family)
     still = found.x[list(found.free)]
-    return widened(lambda v: (still, _sandwich(problem, found, weights, v, normal, results)), vector, family, spread)
+    return widened(
+        lambda v: (still, _sandwich(problem, found, weights, v, normal, results)), vector, family, spread, FEWEST_DEGREES_PLAIN
+    )
 
 
 def solve(problem: Problem, _options: Options) -> Solution:

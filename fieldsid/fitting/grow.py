@@ -21,6 +21,8 @@ from fieldsid.models.model import Noise
 ROUNDS = 15
 POINTS = 2
 TOLERANCE = 1e-5
+ALIKE = 1.0
+"""Log likelihood within which two starts fit equally well."""
 
 
 def grown_start(problem: Problem, floor: Noise) -> FloatArray:
@@ -40,7 +42,24 @@ def grown_start(problem: Problem, floor: Noise) -> FloatArray:
         if twin is not None:
             x = _best(current, [x, _refined(current, twin, ground.noise)])
         left.remove(effect)
-    return _best(problem, [carried(current.layout, x, layout), _refined(problem, start_vector(problem.records, layout), floor)])
+    x = _best(problem, [carried(current.layout, x, layout), _refined(problem, start_vector(problem.records, layout), floor)])
+    return plausible(problem, x, floor)
+
+
+def plausible(problem: Problem, x: FloatArray, floor: Noise) -> FloatArray:
+    """Return x, or a twin that fits as well and whose effect is the smaller: a servo is faster than its hull.
+
+    At one speed the two cannot be told apart by any data; the larger lag with the faster hull is possible, not likely.
+    """
+    for effect in problem.layout.effects:
+        twin = twin_of(problem, x, effect)
+        place = problem.layout.names.index(effect.coefficients[0].name)
+        if twin is None or twin[place] >= x[place]:
+            continue
+        other = _refined(problem, twin, floor)
+        if misfit(problem, other) <= misfit(problem, x) + ALIKE and other[place] < x[place]:
+            x = other
+    return x
 
 
 def _best(problem: Problem, candidates: Sequence[FloatArray]) -> FloatArray:
