@@ -53,7 +53,7 @@ def diagnose(
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
     work = search(learned, judged, axis, catalogue, known=known, report=report)
     found = work.best()
-    left = remainder_of(found, judged)
+    left = remainder_of(found)
     verdict = verdict_of(work, found, left)
     floor = shown_floor(work.floor, found.judged.noise)
     return _said(work, found, verdict, headline(work, verdict, found, left, floor), floor, skipped, notes)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from fieldsid.diagnosis.screen import ground_of, projected, run_columns
-from fieldsid.diagnosis.trial import Trial, grown
+from fieldsid.diagnosis.trial import Trial
+from fieldsid.fitting.starts import ground_of, grown, projected, run_columns
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
@@ -80,8 +80,8 @@ MEMORY = Effect(
 
 def follows(trial: Trial, noise: Noise) -> Follows:
     """Return whether what a trial leaves on its training runs follows the fin or the motion with a memory."""
-    ground = ground_of(trial, noise)
-    problem, x = grown(trial, MEMORY, {})
+    ground = ground_of(trial.problem, trial.x, noise)
+    problem, x = grown(trial.problem, trial.x, MEMORY, {})
     new = [i for i, s in enumerate(problem.layout.slots) if s.name in NAMES]
     parts = [run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
     e, c = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])

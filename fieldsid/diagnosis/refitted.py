@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
-from fieldsid.diagnosis.trial import white_weights
 from fieldsid.estimators.output_error import coloured_covariance
 from fieldsid.fitting.descent import covariance, descend, normal_equations
 from fieldsid.fitting.fit import model_of
 from fieldsid.fitting.method import Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import refit_own
+from fieldsid.fitting.weights import white_weights
 from fieldsid.models.model import Model
 
 

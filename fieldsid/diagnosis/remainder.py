@@ -17,7 +17,6 @@ from scipy import stats
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.memory import follows
 from fieldsid.fitting.colour import LAGS, ljung_box
-from fieldsid.fitting.predict import frozen_problem, refit_own
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
@@ -55,35 +54,24 @@ class Left:
     rate: FloatArray
 
 
-def remainder_of(h: Hypothesis, validation: Sequence[Record]) -> Remainder:
-    """Return the tests of what a hypothesis leaves.
+def remainder_of(h: Hypothesis) -> Remainder:
+    """Return the tests of what a hypothesis leaves on the runs it was fitted to.
 
-    Colour and relation are tested on the training runs alone: on unseen runs the parameters' own errors follow the
-    motion, and would be taken for something missing. Bursts are looked for everywhere.
+    Not on unseen runs: there the parameters' own errors follow the motion, and would be taken for something missing.
     """
-    fitted = _training(h)
-    runs = [*fitted, *_unseen(h, validation)]
-    colour = _colour(fitted)
-    relation, name = _relation(fitted)
+    runs = _training(h)
+    relation, name = _relation(runs)
     memory = follows(h.judged.trial, h.judged.noise)
     if 2.0 * memory.p < relation:
         relation, name = 2.0 * memory.p, memory.what
     bursts, run, window, ratio = _bursts(runs)
     start = runs[run].record.time[0] + window * WINDOW_S
-    return Remainder(colour, relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
+    return Remainder(_colour(runs), relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
 
 
 def _training(h: Hypothesis) -> list[Left]:
     problem = h.judged.trial.problem
     return [_left(problem, h.judged.trial.x, run, h) for run in range(len(problem.records))]
-
-
-def _unseen(h: Hypothesis, validation: Sequence[Record]) -> list[Left]:
-    out = []
-    for record in validation:
-        alone, start = frozen_problem(h.own_model, record, h.effects)
-        out.append(_left(alone, refit_own(alone, start, 0, h.judged.noise), 0, h))
-    return out
 
 
 def _left(problem: Problem, x: FloatArray, run: int, h: Hypothesis) -> Left:

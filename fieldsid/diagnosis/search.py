@@ -9,13 +9,13 @@ import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.remainder import remainder_of
-from fieldsid.diagnosis.screen import Promise, ground_of, promise_of
 from fieldsid.diagnosis.trial import Judged, Trial, judge, refine
 from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.models.axis import NAMES, Axis
+from fieldsid.fitting.starts import Promise, ground_of, promise_of, twin_of
+from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -29,6 +29,8 @@ CLEAN = 1.02
 ORDINARY = 0.05
 SLOW_S = 4.0
 """A disturbance that lasts longer than this may be a drift, a bias or a speed moment in disguise."""
+TWINS = 1.0
+"""Log likelihood within which two starts of one hypothesis are alike."""
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
 LEARNED = 4.0
@@ -79,7 +81,7 @@ class Search:
         layout = layout_of(self.records, self.axis, (), speed_groups(self.records, snapped=snapped))
         trial = refine(Problem(self.records, layout), start_vector(self.records, layout), self.floor)
         for effect in (e for e in self.catalogue if e.name in self.known):
-            promise = promise_of(ground_of(trial, trial.weights), effect)
+            promise = promise_of(ground_of(trial.problem, trial.x, trial.weights), effect)
             trial = refine(promise.problem, promise.start, trial.weights)
         return trial
 
@@ -106,20 +108,18 @@ class Search:
         return sorted(children, key=lambda h: -h.score)
 
     def _try_twin(self, judged: Judged, effect: Effect) -> None:
-        """Judge the other start that has the same response at one speed."""
+        """Judge the other start that has the same response at one speed; of two alike the smaller effect is kept."""
         problem, x = judged.trial.problem, judged.trial.x
-        layout = problem.layout
-        values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
-        twin = None if effect.twin is None else effect.twin(values, self.axis)
-        if twin is None:
+        start = twin_of(problem, x, effect)
+        if start is None:
             return
-        names, start = NAMES[self.axis], x.copy()
-        for i, slot in enumerate(layout.slots):
-            if slot.name in twin:
-                start[i] = np.clip(twin[slot.name], slot.low, slot.high)
-            elif slot.name.startswith(f"{names.authority}@"):
-                start[i] *= twin[names.authority] / values[names.authority]
-        self._keep(judge(problem, start, judged.noise, self.family))
+        twin = judge(problem, start, judged.noise, self.family)
+        place = problem.layout.names.index(effect.coefficients[0].name)
+        key = frozenset(judged.trial.names)
+        if twin.likelihood > self.tried[key].judged.likelihood - TWINS and twin.trial.x[place] < x[place]:
+            self.tried[key] = hypothesis_of(twin, self.validation)
+        else:
+            self._keep(twin)
 
     def _free_runs(self, key: frozenset[str]) -> None:
         """Give the best children the free run of plain output error where that predicts unseen runs better."""
@@ -135,7 +135,7 @@ class Search:
         free_run = refine(trial.problem, trial.x, trial.weights)
         found: list[tuple[Promise, bool]] = []
         for at, weights, plain in ((free_run, free_run.weights, True), (trial, noise, False)):
-            ground = ground_of(at, weights)
+            ground = ground_of(at.problem, at.x, weights)
             promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
             found += [(p, plain) for p in promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]]
         return found
@@ -203,7 +203,7 @@ class Search:
             return False
         noise = h.judged.noise
         slow = noise.disturbance > 0.0 and noise.disturbance_time > SLOW_S
-        return slow or remainder_of(h, self.validation).p < ORDINARY
+        return slow or remainder_of(h).p < ORDINARY
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

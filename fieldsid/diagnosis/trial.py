@@ -7,16 +7,16 @@ effect must be paid for by a disturbance; the right effect needs none.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fieldsid.fitting.colour import dynamics_of, residuals_of
 from fieldsid.fitting.descent import descend
-from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.noise import estimate_noise, log_likelihood
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.weights import white_weights
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -68,39 +68,6 @@ def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = RE
         found = descend(problem, found.x, new, rounds=rounds, tolerance=1e-5)
         new = white_weights(problem, found.x)
     return Trial(problem, found.x, new)
-
-
-def white_weights(problem: Problem, x: FloatArray) -> Noise:
-    """Return the residual standard deviations of both channels."""
-    squares, counts = np.zeros(2), np.zeros(2)
-    for run, record in enumerate(problem.records):
-        residual, _ = problem.residual(x, run)
-        squares += (residual**2).sum(axis=1)
-        counts += (record.angle_ok.sum(), record.rate_ok.sum())
-    sigma = np.sqrt(np.maximum(squares, 1e-20) / np.maximum(counts, 1.0))
-    sigma = np.where(np.isfinite(sigma), sigma, 1.0)
-    return Noise(float(max(sigma[0], 1e-9)), float(max(sigma[1], 1e-9)))
-
-
-def grown(parent: Trial, effect: Effect, values: Mapping[str, float]) -> tuple[Problem, FloatArray]:
-    """Return the problem with one effect more, and the parent's vector with the effect's slots at the given values."""
-    records = parent.problem.records
-    layout = layout_of(records, parent.problem.layout.axis, (*parent.effects, effect), parent.problem.layout.groups)
-    known = {(s.name, s.run): v for s, v in zip(parent.problem.layout.slots, parent.x, strict=True)}
-    x = np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in layout.slots])
-    if effect.extra_states and "damping_exponent" in layout.names:
-        # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
-        place = layout.names.index("damping_exponent")
-        x[place] = np.clip(x[place], 0.0, 1.2)
-    return Problem(records, layout), x
-
-
-def without(parent: Trial, effect: Effect) -> tuple[Problem, FloatArray]:
-    """Return the problem with one effect less, at the parent's values."""
-    layout = layout_of(parent.problem.records, parent.problem.layout.axis, tuple(e for e in parent.effects if e is not effect))
-    known = {(s.name, s.run): v for s, v in zip(parent.problem.layout.slots, parent.x, strict=True)}
-    x = np.array([known.get((s.name, s.run), s.start) for s in layout.slots])
-    return Problem(parent.problem.records, layout), x
 
 
 def judge(problem: Problem, x: FloatArray, start: Noise, family: str = FAMILY) -> Judged:

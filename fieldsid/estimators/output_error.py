@@ -31,6 +31,8 @@ NEGLIGIBLE = 0.02
 """Change of both weights, in logs, that does not move the minimum."""
 CLOSE = 1e-4
 """The same on a long record, whose start is near the end."""
+NEAR = 1e-9
+"""Marquardt's damping of its first step: a larger one would stop short of the minimum by more than its error."""
 FIRST_PARTS = (5_000, 50_000)
 """Samples of the first parts of a long record."""
 
@@ -72,12 +74,12 @@ def found_minimum(problem: Problem) -> tuple[Descent, Noise]:
         return found, weights
     for samples in FIRST_PARTS[1:]:
         if longest > 2 * samples:
-            found = descend(problem.first(samples), found.x, weights, tolerance=ROUGH)
-    found = descend(problem, found.x, weights, tolerance=CLOSE)
+            found = descend(problem.first(samples), found.x, weights, tolerance=ROUGH, damping=NEAR)
+    found = descend(problem, found.x, weights, tolerance=CLOSE, damping=NEAR)
     new = residual_noise(problem, found.x, len(found.free))
     if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) < NEGLIGIBLE:
         return found, weights
-    return descend(problem, found.x, new, tolerance=CLOSE), new
+    return descend(problem, found.x, new, tolerance=CLOSE, damping=NEAR), new
 
 
 def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:

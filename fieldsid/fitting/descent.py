@@ -101,20 +101,20 @@ def normal_equations(
 
 def descend(
     problem: Problem, x: FloatArray, noise: Noise, *, free: Sequence[int] | None = None, rounds: int = ROUNDS,
-    tolerance: float = TOLERANCE, prior: Prior | None = None,
+    tolerance: float = TOLERANCE, prior: Prior | None = None, damping: float = DAMPING_START,
 ) -> Descent:  # fmt: skip
     """Return the minimum of the whitened sum of squares that a start x leads to.
 
     The noise is whitened through the dynamics at the start throughout: the sum of squares alone, without the
-    determinant of its covariance, would else be lowered by dynamics that make the noise look larger. A slot at its bound
-    whose gradient points outward is held there for the step. Source: Levenberg-Marquardt with Marquardt's scaling and
-    projected bounds (Nocedal and Wright 2006, section 10.3).
+    determinant of its covariance, would else be lowered by dynamics that make the noise look larger. damping is the
+    first step's, small where x is near. A slot at its bound whose gradient points outward is held there for the step.
+    Source: Levenberg-Marquardt with Marquardt's scaling and projected bounds (Nocedal and Wright 2006, section 10.3).
     """
     slots = tuple(range(len(x)) if free is None else free)
     low, high = problem.layout.low[list(slots)], problem.layout.high[list(slots)]
     index, x = list(slots), x.copy()
     x[index] = np.clip(x[index], low, high)
-    damping, hill = DAMPING_START, _Hill(problem, noise, slots, dynamics_of(problem, x), prior, lean(problem, noise, slots))
+    hill = _Hill(problem, noise, slots, dynamics_of(problem, x), prior, lean(problem, noise, slots))
     cost, normal, gradient = hill.linear(x)
     done, count = False, 0
     while count < rounds and not done and np.isfinite(cost):

@@ -18,8 +18,8 @@ from fieldsid.fitting.weights import misfit, white_weights
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
 
-ROUNDS = 15
-POINTS = 2
+ROUNDS = 40
+POINTS = 3
 TOLERANCE = 1e-5
 ALIKE = 1.0
 """Log likelihood within which two starts fit equally well."""

@@ -24,6 +24,8 @@ from fieldsid.models.model import Noise
 
 MOST_POINTS = 12
 SHORTENINGS = 4
+GENTLE = 0.03
+"""A coefficient of either sign is tried this much weaker too: a slow ship's are far below a small vehicle's."""
 WORTHLESS = 1e-9
 
 
@@ -53,7 +55,12 @@ class Ground:
 def grown(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[str, float]) -> tuple[Problem, FloatArray]:
     """Return the problem with one effect more, and the parent's x with the effect's slots at the given values."""
     layout = layout_of(parent.records, parent.layout.axis, (*parent.layout.effects, effect), parent.layout.groups)
-    return Problem(parent.records, layout), carried(parent.layout, x, layout, values)
+    start = carried(parent.layout, x, layout, values)
+    if effect.extra_states and "damping_exponent" in layout.names:
+        # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
+        place = layout.names.index("damping_exponent")
+        start[place] = np.clip(start[place], 0.0, 1.2)
+    return Problem(parent.records, layout), start
 
 
 def carried(old: Layout, x: FloatArray, new: Layout, values: Mapping[str, float] = MappingProxyType({})) -> FloatArray:
@@ -126,7 +133,9 @@ def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
     grids = [c.scan or (c.start,) for c in effect.shared]
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MOST_POINTS)
-    return points[::step]
+    points = points[::step]
+    signed = {c.name for c in effect.shared if c.low < 0.0 < c.high and c.scan}
+    return points + [{n: GENTLE * v if n in signed else v for n, v in point.items()} for point in points if signed]
 
 
 def _new_slots(problem: Problem, effect: Effect) -> list[int]:
@@ -134,7 +143,7 @@ def _new_slots(problem: Problem, effect: Effect) -> list[int]:
     return [i for i, s in enumerate(problem.layout.slots) if s.name in names]
 
 
-def _run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+def run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Return one run's whitened residual (m,) and its columns of the new slots (m, k)."""
     record = problem.records[run]
     result = problem.linearise(x, run, new)
@@ -152,15 +161,15 @@ def _run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new:
 def _first_order(ground: Ground, problem: Problem, x: FloatArray, effect: Effect) -> tuple[float, FloatArray]:
     """Return the predicted cost after one step in the new slots, and the stepped, bounded start."""
     new = _new_slots(problem, effect)
-    parts = [_run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
+    parts = [run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
     e, c = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
-    cost, step = _projected(ground.basis, e, c)
+    cost, step = projected(ground.basis, e, c)
     low, high = problem.layout.low[new], problem.layout.high[new]
     start = x.copy()
     wished = x[new] + step
     start[new] = np.clip(wished, low + 1e-3 * (x[new] - low), high - 1e-3 * (high - x[new]))
     if np.any((wished < low) | (wished > high)):
-        cost, _ = _projected(ground.basis, e - c @ (start[new] - x[new]), c[:, :0])
+        cost, _ = projected(ground.basis, e - c @ (start[new] - x[new]), c[:, :0])
     return cost, _shortened(ground, problem, x, start)
 
 
@@ -174,7 +183,7 @@ def _shortened(ground: Ground, problem: Problem, x: FloatArray, start: FloatArra
     return x
 
 
-def _projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, FloatArray]:
+def projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, FloatArray]:
     """Return |residual|^2 after projecting off the basis and the columns c, and the step in c."""
     left = e - basis @ (basis.T @ e)
     if c.shape[1] == 0:
@@ -202,8 +211,8 @@ def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effec
         scored = []
         for value in c.scan or (c.start,):
             x[slot] = value
-            e, columns = _run_columns(ground, problem, x, run, others)
-            cost, step = _projected(ground.own_basis[run], e, columns)
+            e, columns = run_columns(ground, problem, x, run, others)
+            cost, step = projected(ground.own_basis[run], e, columns)
             names = [problem.layout.slots[i].name for i in others]
             wrong = any(s + x[i] < problem.layout.low[i] for s, i, n in zip(step, others, names, strict=True) if n == "amplitude")
             scored.append((cost if not wrong else cost + ground.cost, value))

@@ -40,6 +40,10 @@ def test_a_zigzag_is_predicted_better_with_every_effect_that_is_there(ship):
     assert sway > max(drag, 83.0)
 
 
+def product_of_errors(found):
+    return np.prod(np.sqrt(np.mean(found.predictions[0].residual ** 2, axis=1)))
+
+
 def test_a_ship_that_turns_by_itself_is_called_unstable(ship):
     assert "hidden_instability" in {n.code for n in fit([ship["10_05"]], Axis.YAW).notes}
 
@@ -50,8 +54,5 @@ def test_a_ship_that_turns_by_itself_is_called_unstable(ship):
 def test_a_fit_with_effects_is_never_worse_than_the_plain_one(shared_data, effects):
     run = load_run(shared_data / "lauv" / "rudder_v1.50.csv.gz")
     record = record_of(segment(run, Axis.YAW).of(run), Axis.YAW)
-    size = [
-        np.prod([np.sqrt(np.mean(channel**2)) for channel in fit([record], Axis.YAW, method="output_error", effects=e).predictions[0].residual])
-        for e in ((), effects)
-    ]  # fmt: skip
+    size = [product_of_errors(fit([record], Axis.YAW, method="output_error", effects=e)) for e in ((), effects)]
     assert size[1] < 0.99 * size[0]
