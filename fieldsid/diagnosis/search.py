@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
-from fieldsid.diagnosis.remainder import remainder_of
 from fieldsid.diagnosis.trial import Judged, Trial, judge, refine
 from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
@@ -26,9 +25,8 @@ PROMISING, PROMISING_LATER = 5, 4
 """Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise."""
 LARGEST = 4
 CLEAN = 1.02
-ORDINARY = 0.05
-SLOW_S = 4.0
-"""A disturbance that lasts longer than this may be a drift, a bias or a speed moment in disguise."""
+GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
+"""Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
 TWINS = 1.0
 """Log likelihood within which two starts of one hypothesis are alike."""
 WORTH = 6.0
@@ -136,8 +134,10 @@ class Search:
         found: list[tuple[Promise, bool]] = []
         for at, weights, plain in ((free_run, free_run.weights, True), (trial, noise, False)):
             ground = ground_of(at.problem, at.x, weights)
+            worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
             promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
-            found += [(p, plain) for p in promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]]
+            kept = promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]
+            found += [(p, plain) for p in kept if ground.cost - p.cost > worth]
         return found
 
     def best(self) -> Hypothesis:
@@ -198,12 +198,8 @@ class Search:
         return (h.errors.validation if self.validation else h.errors.train).over(self.floor)
 
     def asks_for_more(self, h: Hypothesis) -> bool:
-        """Whether something is left above the noise, and it is not what a disturbance would leave."""
-        if max(self.error(h), h.errors.train.over(self.floor)) <= CLEAN:
-            return False
-        noise = h.judged.noise
-        slow = noise.disturbance > 0.0 and noise.disturbance_time > SLOW_S
-        return slow or remainder_of(h).p < ORDINARY
+        """Whether something is left above the noise, be it a disturbance or not."""
+        return max(self.error(h), h.errors.train.over(self.floor)) > CLEAN
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""
