@@ -20,6 +20,7 @@ from fieldsid.cli.options import (
     OutputDir,
     RunFiles,
     ToS,
+    VehicleFile,
     names_of,
 )
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from fieldsid.logs import Note, Run
     from fieldsid.models.axis import Axis
 
-NO_WARNING = ("mapping", "noise_model")
+NO_WARNING = ("mapping", "noise_model", "fin_measured_used")
 """Notes that tell how it went, not what is wrong."""
 
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
@@ -54,6 +55,7 @@ def command(
     bandwidth: Bandwidth = 4.0,
     forgetting: Forgetting = 1.0,
     mapping: MappingFile = None,
+    vehicle: VehicleFile = None,
     output: OutputDir = None,
     figures: Figures = True,
     force: Force = False,
@@ -69,6 +71,7 @@ def command(
     from fieldsid.cli.inputs import files_of, read_runs
     from fieldsid.fitting.identify import identify
     from fieldsid.fitting.method import Options
+    from fieldsid.vehicle import find_vehicle, load_vehicle
 
     known = read_runs(runs, mapping=mapping, start=start, end=end)
     with progress("fitting", 1 if joint else len(known)) as step:
@@ -78,6 +81,7 @@ def command(
             method=method,
             effects=names_of(effects),
             joint=joint,
+            vehicle=load_vehicle(vehicle) if vehicle is not None else find_vehicle(Path()),
             whole=whole or start is not None or end is not None,
             options=Options(bandwidth, forgetting),
             done=step,
