@@ -8,17 +8,9 @@ Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the pa
 
 from __future__ import annotations
 
+from fieldsid.effects._cross_state import core
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
-
-
-def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients at `scale` times the reference speed."""
-    lift = scale ** values.get("damping_exponent", 1.0)
-    return Core(
-        cross_damping=values["cross_damping"] * lift,
-        cross_rate=values["cross_rate"] * lift**2,
-    )
+from fieldsid.models.effect import Coefficient, Effect, Stage
 
 
 EFFECT = Effect(

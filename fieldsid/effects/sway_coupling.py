@@ -9,17 +9,9 @@ Source: Fossen 2011, section 7.2 (second-order Nomoto: K, T1, T2, T3 are the sam
 
 from __future__ import annotations
 
+from fieldsid.effects._cross_state import core
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
-
-
-def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients at `scale` times the reference speed."""
-    lift = scale ** values.get("damping_exponent", 1.0)
-    return Core(
-        cross_damping=values["cross_damping"] * lift,
-        cross_rate=values["cross_rate"] * lift**2,
-    )
+from fieldsid.models.effect import Coefficient, Effect, Stage
 
 
 EFFECT = Effect(
