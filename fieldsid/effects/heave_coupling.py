@@ -12,7 +12,6 @@ from fieldsid.effects._cross_state import core
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage
 
-
 EFFECT = Effect(
     name="heave_coupling",
     says="the vehicle heaves while it pitches and the heave pitches it further (Munk moment)",

@@ -13,7 +13,6 @@ from fieldsid.effects._cross_state import core
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage
 
-
 EFFECT = Effect(
     name="sway_coupling",
     says="the vehicle drifts sideways in a turn and the drift turns it further (Munk moment)",
