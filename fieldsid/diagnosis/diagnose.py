@@ -28,6 +28,8 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record, record_of
 
 SHOWN = 8
+TRACE = 0.5
+"""Coloured over white sensor noise below which the floor is the white one."""
 
 
 def diagnose(
@@ -125,8 +127,15 @@ def confusable(work: Search, h: Hypothesis, others: Sequence[Hypothesis]) -> tup
 
 
 def shown_floor(floor: Noise, noise: Noise) -> Noise:
-    """Return the sensor noise of both channels, its coloured part included."""
-    return Noise(float(np.hypot(floor.angle, noise.coloured_angle)), float(np.hypot(floor.rate, noise.coloured_rate)))
+    """Return the sensor noise of both channels, its coloured part included where it is more than a trace.
+
+    A trace depends on the hypothesis, and would let the floor move from one generation of a model to the next.
+    """
+    return Noise(_with_colour(floor.angle, noise.coloured_angle), _with_colour(floor.rate, noise.coloured_rate))
+
+
+def _with_colour(white: float, coloured: float) -> float:
+    return float(np.hypot(white, coloured)) if coloured > TRACE * white else white
 
 
 def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[Place, ...]:

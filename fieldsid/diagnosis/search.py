@@ -90,12 +90,12 @@ class Search:
             self.tried[key] = hypothesis_of(judged, self.validation)
         return self.tried[key]
 
-    def grow(self, parent: Hypothesis) -> list[Hypothesis]:
-        """Return the parent with each promising effect added, judged, best first."""
+    def grow(self, parent: Hypothesis, *, forced: bool = False) -> list[Hypothesis]:
+        """Return the parent with each promising effect added, or with every one when forced, judged, best first."""
         key = frozenset(parent.names)
         if key not in self.grown_from:
             self.grown_from.add(key)
-            for promise, plain in self._promising(parent):
+            for promise, plain in self._promising(parent, forced=forced):
                 self.report("+".join((*parent.names, promise.effect.name)))
                 start = refine(promise.problem, promise.start, parent.judged.trial.weights).x if plain else promise.start
                 child = judge(promise.problem, start, parent.judged.noise, self.family)
@@ -125,7 +125,7 @@ class Search:
         for child in children[:FREE_RUNS]:
             self.tried[child] = with_free_run(self.tried[child], self.validation, self.floor)
 
-    def _promising(self, parent: Hypothesis) -> list[tuple[Promise, bool]]:
+    def _promising(self, parent: Hypothesis, *, forced: bool) -> list[tuple[Promise, bool]]:
         """Return the promises worth judging, each with whether plain output error leads the way there."""
         trial, noise = parent.judged.trial, parent.judged.noise
         have = set(trial.names)
@@ -137,7 +137,7 @@ class Search:
             worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
             promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
             kept = promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]
-            found += [(p, plain) for p in kept if ground.cost - p.cost > worth]
+            found += [(p, plain) for p in kept if forced or ground.cost - p.cost > worth]
         return found
 
     def best(self) -> Hypothesis:

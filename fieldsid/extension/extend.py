@@ -131,7 +131,7 @@ def _with_all(work: Search) -> Hypothesis:
     """Return the hypothesis of all effects of the search's catalogue, grown one effect at a time."""
     front = [work.base()]
     for _ in range(len(work.catalogue) - len(work.known)):
-        children = {frozenset(c.names): c for parent in front for c in work.grow(parent)}
+        children = {frozenset(c.names): c for parent in front for c in work.grow(parent, forced=True)}
         front = sorted(children.values(), key=lambda h: -h.score)[:WIDTH]
     return front[0]
 

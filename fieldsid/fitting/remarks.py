@@ -81,7 +81,12 @@ def _identifiability(problem: Problem, solution: Solution) -> Iterator[Note]:
             "not_excited",
             f"{names.authority} = {b:.2g} +/- {s[names.authority]:.2g} 1/s^2 cannot be told from zero: "
             "the fin hardly moved the vehicle",
-            {"value": b, "std_error": s[names.authority], "limit": WEAKEST_AUTHORITY, "hint": "fly larger or longer pulses, or run `sysid diagnose`"},
+            {
+                "value": b,
+                "std_error": s[names.authority],
+                "limit": WEAKEST_AUTHORITY,
+                "hint": "fly longer pulses, or `sysid diagnose`",
+            },
         )
 
 
