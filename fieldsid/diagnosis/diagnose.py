@@ -16,7 +16,7 @@ from fieldsid.diagnosis.refitted import refitted_model
 from fieldsid.diagnosis.remainder import remainder_of
 from fieldsid.diagnosis.search import Search, search, usable
 from fieldsid.diagnosis.split import held_back
-from fieldsid.diagnosis.verdict import Verdict, explained, probabilities, verdict_of
+from fieldsid.diagnosis.verdict import Verdict, added, explained, probabilities, verdict_of
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects
 from fieldsid.errors import DataError
@@ -74,11 +74,10 @@ def _said(
     named = found if verdict.word in ("effect", "undecided") else base
     candidates = _candidates(work, found, floor)
     model = refitted_model(named)
-    added = tuple(n for n in named.names if n not in work.known)
     return Diagnosis(
         axis=work.axis,
         verdict=verdict.word,
-        effects=added,
+        effects=added(work, named),
         says=says,
         base=base.errors,
         final=named.errors,
@@ -103,7 +102,7 @@ def _candidates(work: Search, found: Hypothesis, floor: Noise) -> tuple[Candidat
     p = dict(zip(map(id, fair), probabilities(fair), strict=True))
     return tuple(
         Candidate(
-            effects=tuple(n for n in h.names if n not in work.known),
+            effects=added(work, h),
             probability=p.get(id(h), 0.0),
             parameters=dict(h.model.values),
             errors=h.errors,

@@ -49,8 +49,13 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
 
 
 def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
-    """Return the effects of a hypothesis that were not known before."""
-    return tuple(n for n in h.names if n not in search.known)
+    """Return the effects of a hypothesis that were not known before, the one that says most alone first."""
+
+    def alone(name: str) -> float:
+        single = search.tried.get(search.root | {name})
+        return single.score if single is not None else -float("inf")
+
+    return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -alone(n)))
 
 
 def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
