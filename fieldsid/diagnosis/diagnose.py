@@ -19,7 +19,7 @@ from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.verdict import Verdict, added, explained, probabilities, verdict_of
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects
-from fieldsid.errors import DataError
+from fieldsid.errors import DataError, ModelError
 from fieldsid.fitting.fit import check
 from fieldsid.fitting.predict import predict
 from fieldsid.logs.run import Note, Run
@@ -73,6 +73,7 @@ def _said(
     base = work.base()
     named = found if verdict.word in ("effect", "undecided") else base
     candidates = _candidates(work, found, floor)
+    where, diverged = where_of(base, work.validation or work.records)
     model = refitted_model(named)
     return Diagnosis(
         axis=work.axis,
@@ -85,10 +86,10 @@ def _said(
         candidates=candidates,
         model=model,
         base_model=refitted_model(base),
-        where=where_of(base, work.validation or work.records),
+        where=where,
         next_maneuver=next_maneuver(work, verdict, found, skipped),
         skipped=skipped,
-        notes=notes,
+        notes=(*notes, *diverged),
     )
 
 
@@ -137,13 +138,21 @@ def _with_colour(white: float, coloured: float) -> float:
     return float(np.hypot(white, coloured)) if coloured > TRACE * white else white
 
 
-def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[Place, ...]:
-    """Return where a hypothesis's free run fails, over the run it fails most on."""
-    shown = [predict(h.model, r) for r in records]
+def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[tuple[Place, ...], tuple[Note, ...]]:
+    """Return where a hypothesis's free run fails, over the run it fails most on, and the runs it cannot be simulated on."""
+    shown, notes = [], []
+    for record in records:
+        try:
+            shown.append(predict(h.model, record))
+        except ModelError as error:
+            notes.append(Note("grows_without_bound", f"{error.what}: {error.found}", {"run": record.name}))
+    if not shown:
+        return (), tuple(notes)
     channel = 1 if records[0].rate_ok.any() else 0
     worst = max(shown, key=lambda s: float(np.mean(s.residual[channel] ** 2)))
     ok = (worst.record.angle_ok, worst.record.rate_ok)[channel]
-    return places(worst.record.time, worst.residual[channel] ** 2, ok, conditions(worst.record, worst.rate, 0.0))
+    found = places(worst.record.time, worst.residual[channel] ** 2, ok, conditions(worst.record, worst.rate, 0.0))
+    return found, tuple(notes)
 
 
 def body_of(d: Diagnosis) -> dict[str, Any]:

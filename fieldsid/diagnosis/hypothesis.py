@@ -13,9 +13,10 @@ import numpy as np
 
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
-from fieldsid.fitting.noise import estimate_noise, floor_of
+from fieldsid.fitting.noise import estimate_noise, floor_of, log_likelihood
 from fieldsid.fitting.predict import frozen_problem, refit_own
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -63,7 +64,7 @@ def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
         alone, start = frozen_problem(model, record, judged.trial.effects)
         vector = refit_own(alone, start, 0, judged.noise)
         shown.append((alone, vector))
-        left.append(alone.residual(refit_own(alone, vector, 0, floor_of([record])), 0)[0])
+        left.append(left_over(alone, refit_own(alone, vector, 0, floor_of([record]))))
     return Hypothesis(
         judged,
         likelihood_by_run(problem, x, judged.noise),
@@ -82,10 +83,26 @@ def unseen_likelihood(judged: Judged, validation: Sequence[Record], shown: Seque
     """
     if not validation:
         return np.zeros(0)
-    residuals = [p.residual(x, 0)[0] for p, x in shown]
+    residuals = [left_over(p, x) for p, x in shown]
     dynamics = [(b.damping, b.stiffness) for b in (p.base_of(x, 0) for p, x in shown)]
     noise, _ = estimate_noise(validation, dynamics, residuals, judged.family, judged.noise)
-    return np.array([likelihood_by_run(p, x, noise)[0] for p, x in shown])
+    vector = noise_vector(noise)
+    return np.array(
+        [log_likelihood(p.records, [d], [e], vector) for (p, _), d, e in zip(shown, dynamics, residuals, strict=True)]
+    )
+
+
+def left_over(problem: Problem, x: FloatArray) -> FloatArray:
+    """Return the residual (2, n) of a one-run problem; where the motion grows without bound, all that was measured.
+
+    A model that diverges says nothing of the run: it is judged as one that predicts no motion at all.
+    """
+    residual, _ = problem.residual(x, 0)
+    if np.isfinite(residual).all():
+        return residual
+    r = problem.records[0]
+    channels = ((r.angle, r.angle_ok), (r.rate, r.rate_ok))
+    return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in channels])
 
 
 def with_free_run(h: Hypothesis, validation: Sequence[Record], floor: Noise) -> Hypothesis:
@@ -99,7 +116,7 @@ def with_free_run(h: Hypothesis, validation: Sequence[Record], floor: Noise) -> 
     left = []
     for record in validation:
         alone, start = frozen_problem(model, record, trial.effects)
-        left.append(alone.residual(refit_own(alone, start, 0, floor_of([record])), 0)[0])
+        left.append(left_over(alone, refit_own(alone, start, 0, floor_of([record]))))
     errors = Pair(training_errors(plain), errors_of(validation, left))
     old, new = (e.validation if validation else e.train for e in (h.errors, errors))
     return replace(h, errors=errors, model=model) if new.over(floor) < old.over(floor) else h

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import Judged, Trial, judge, refine
+from fieldsid.fitting.descent import descend
 from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import Promise, ground_of, promise_of, twin_of
+from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, twin_of
+from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Effect
+from fieldsid.models.effect import Effect, Stage
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
@@ -27,6 +29,7 @@ LARGEST = 4
 CLEAN = 1.02
 GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
+SHIFT_ROUNDS = 12
 TWINS = 1.0
 """Log likelihood within which two starts of one hypothesis are alike."""
 WORTH = 6.0
@@ -138,7 +141,26 @@ class Search:
             promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
             kept = promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]
             found += [(p, plain) for p in kept if forced or ground.cost - p.cost > worth]
+            if plain and len(have) == len(self.known):
+                found += [(self._shifted(ground, e), True) for e in left if shifts_time(e)]
         return found
+
+    def _shifted(self, ground: Ground, effect: Effect) -> Promise:
+        """Return the promise of an effect that shifts time, each scan point after a few rounds of descent.
+
+        A model that misses a shift has bent all its numbers to make up for it: no first-order step sees past that, so
+        the base starts anew from the measurement shifted back.
+        """
+        tried = []
+        base = ground.problem.layout
+        for values in shared_points(ground, effect):
+            moved = [shifted(r, next(iter(values.values()))) for r in self.records]
+            x = ground.x.copy()
+            x[: base.shared] = start_vector(moved, base)[: base.shared]
+            problem, start = grown(ground.problem, x, effect, values)
+            found = descend(problem, start, ground.noise, rounds=SHIFT_ROUNDS, tolerance=1e-3)
+            tried.append(Promise(effect, found.cost, problem, found.x))
+        return min(tried, key=lambda p: p.cost)
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""
@@ -204,6 +226,21 @@ class Search:
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""
         return sorted(self.tried.values(), key=lambda h: -h.score)
+
+
+def shifted(record: Record, late_s: float) -> Record:
+    """Return a record whose measurement is taken late_s seconds later, as if it had not been late."""
+    then = record.time + late_s
+
+    def moved(values: FloatArray, ok: BoolArray) -> FloatArray:
+        return np.interp(then, record.time[ok], values[ok]) if ok.any() else values
+
+    return replace(record, angle=moved(record.angle, record.angle_ok), rate=moved(record.rate, record.rate_ok))
+
+
+def shifts_time(effect: Effect) -> bool:
+    """Whether an effect moves command against measurement in time: a scanned coefficient in s outside the hull."""
+    return effect.stage is not Stage.HYDRODYNAMICS and any(c.unit == "s" and c.scan for c in effect.shared)
 
 
 def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tuple[Effect, ...], dict[str, str]]:
