@@ -17,7 +17,7 @@ RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
 ALIKE = 1.03
 """Rivals predict unseen runs within this factor of each other."""
-BEYOND_CHANCE, BESIDE_AN_EFFECT = 3e-3, 1e-6
+BEYOND_CHANCE, BESIDE_AN_EFFECT = 2e-2, 1e-6
 """p-values below which what is left is not a disturbance: where nothing was found, and beside an effect whose form
 is never exact."""
 VISIBLE = 1.15
