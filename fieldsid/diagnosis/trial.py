@@ -19,7 +19,6 @@ from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.weights import white_weights
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -97,8 +96,3 @@ def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArr
 def samples(records: Sequence[Record]) -> int:
     """Return the number of measured values."""
     return int(sum(r.angle_ok.sum() + r.rate_ok.sum() for r in records))
-
-
-def axis_of(trial: Trial) -> Axis:
-    """Return the axis of a trial."""
-    return trial.problem.layout.axis

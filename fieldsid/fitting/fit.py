@@ -11,7 +11,7 @@ from fieldsid.errors import DataError, UsageError
 from fieldsid.fitting.choice import is_disturbed, keeps_free_run
 from fieldsid.fitting.colour import whiteness
 from fieldsid.fitting.judge import findings
-from fieldsid.fitting.layout import Layout, layout_of
+from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.method import Estimator, History, Options, Solution
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import Prediction, refit_own
@@ -21,7 +21,7 @@ from fieldsid.fitting.suspects import suspects
 from fieldsid.fitting.weights import white_weights
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Effect, effect_named
+from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import fin_path
@@ -219,13 +219,3 @@ def longest_hold(record: Record) -> float:
     longest = int(np.argmax(np.diff(edges)))
     first, last = edges[longest] + 1, min(edges[longest + 1], len(record)) - 1
     return float(record.time[last] - record.time[first]) if last > first else 0.0
-
-
-def effects_named(names: Sequence[str]) -> tuple[Effect, ...]:
-    """Return effects by name; raises UsageError for one that is not known."""
-    return tuple(effect_named(n) for n in names)
-
-
-def layout_for(records: Sequence[Record], axis: Axis, effects: Sequence[str]) -> Layout:
-    """Return the layout of a joint fit by effect names."""
-    return layout_of(records, axis, effects_named(effects))

@@ -118,13 +118,6 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
-    """What a user's own moment may use, along a trajectory: arrays (n,) by short name."""
-
-    values: Mapping[str, FloatArray]
-
-
-@dataclass(frozen=True, slots=True)
 class Effect:
     """One physical effect. Exactly the hooks of its stage are given; a hook is a pure function.
 

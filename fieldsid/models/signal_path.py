@@ -5,7 +5,7 @@ One code path for effects present and absent: every hook of every effect is appl
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from fieldsid.logs.run import FloatArray
 from fieldsid.models import kernels
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Core, Effect, FinPath, Motion, Terms, Values
+from fieldsid.models.effect import Core, Effect, FinPath, Motion, Terms, Values, held
 from fieldsid.models.record import Record
 
 LONGEST_PIECE = 0.3
@@ -80,9 +80,9 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
         if effect.core is not None:
             core = core.plus(effect.core(values, scale))
     drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
-    drive[:, 0] = base.damping if terms.damping_factor is None else base.damping * _held(terms.damping_factor)
+    drive[:, 0] = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
     if terms.damping is not None:
-        drive[:, 0] += _held(terms.damping)
+        drive[:, 0] += held(terms.damping)
     drive[:, 1] = base.stiffness
     start, end = lift(fin, terms)
     drive[:, 2] = base.authority * start + base.trim
@@ -90,7 +90,7 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     if terms.moment is not None:
         drive[:, 2] += terms.moment[:-1]
         drive[:, 3] += terms.moment[1:]
-    drive[:, 4] = 1.0 if terms.cross_factor is None else _held(terms.cross_factor)
+    drive[:, 4] = 1.0 if terms.cross_factor is None else held(terms.cross_factor)
     if core.cross_fin != 0.0:
         drive[:, 5] = core.cross_fin * fin.mean
     if core.crossflow != 0.0:
@@ -169,7 +169,7 @@ def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Value
         effect.moment(Motion(motion.angle, motion.rate + step), values, record)
         - effect.moment(Motion(motion.angle, motion.rate - step), values, record)
     ) / (2 * step)
-    slope_y, slope_p = _held(by_angle), _held(by_rate)
+    slope_y, slope_p = held(by_angle), held(by_rate)
     drive[:, 0] -= slope_p
     drive[:, 1] -= slope_y
     drive[:, 2] += value[:-1] - slope_p * motion.rate[:-1] - slope_y * motion.angle[:-1]
@@ -188,10 +188,6 @@ def _pieces(record: Record, drive: FloatArray, constants: FloatArray) -> int:
     return pieces_for(float(record.steps.max()), float(damping.max()), -float(damping.min()), slow, *cross)
 
 
-def _held(values: FloatArray) -> FloatArray:
-    return np.asarray(0.5 * (values[:-1] + values[1:]))
-
-
 def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
     if a is None or b is None:
         return a if b is None else b
@@ -202,8 +198,3 @@ def _plus(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
     if a is None or b is None:
         return a if b is None else b
     return a + b
-
-
-def merged(*parts: Mapping[str, float]) -> dict[str, float]:
-    """Return several sets of values as one."""
-    return {k: v for part in parts for k, v in part.items()}
