@@ -17,6 +17,7 @@ from fieldsid.fitting.starts import ground_of, grown, projected, run_columns
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.jit import jit
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
@@ -33,13 +34,15 @@ class Follows:
 
 def fading_mean(values: FloatArray, record: Record, memory: float) -> FloatArray:
     """Return the exponentially fading mean (n,) of values (n,) over a memory in s, started at their first value."""
-    out = np.empty_like(values)
-    kept = np.exp(-record.steps / memory)
-    state = float(values[0])
-    out[0] = state
-    for i in range(kept.size):
-        state = kept[i] * state + (1.0 - kept[i]) * float(values[i])
-        out[i + 1] = state
+    return _faded(values, np.exp(-record.steps / memory))
+
+
+@jit
+def _faded(values: FloatArray, kept: FloatArray) -> FloatArray:
+    out = np.empty(values.shape[0])
+    out[0] = values[0]
+    for i in range(kept.shape[0]):
+        out[i + 1] = kept[i] * out[i] + (1.0 - kept[i]) * values[i]
     return out
 
 

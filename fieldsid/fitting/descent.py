@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.errors import EffectError
 from fieldsid.fitting.lean import Lean, lean
 from fieldsid.fitting.problem import Problem, RunResult
+from fieldsid.fitting.step import bounded_step
 from fieldsid.fitting.stream import streamed, streams
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
@@ -119,7 +120,7 @@ def descend(
     done, count = False, 0
     while count < rounds and not done and np.isfinite(cost):
         count += 1
-        step = _step(normal, gradient, damping, x[index], low, high)
+        step = bounded_step(normal, gradient, damping, x[index], low, high)
         trial = x.copy()
         trial[index] = np.clip(x[index] + step, low, high)
         moved = trial[index] - x[index]
@@ -181,25 +182,6 @@ class _Hill:
             cost, normal, gradient = self.linear(x)
             return cost, (normal, gradient)
         return cost_of(self.problem, x, self.noise, self.held) + (0.0 if self.prior is None else self.prior.cost(x)), None
-
-
-def _step(
-    normal: FloatArray, gradient: FloatArray, damping: float, x: FloatArray, low: FloatArray, high: FloatArray
-) -> FloatArray:
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-    blocked = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)) | (np.diag(normal) < 1e-24)
-    open_ = np.flatnonzero(~blocked)
-    step = np.zeros_like(x)
-    if open_.size == 0:
-        return step
-    n = normal[np.ix_(open_, open_)] / np.outer(scale[open_], scale[open_])
-    n[np.diag_indices_from(n)] += damping
-    try:
-        solved = np.linalg.solve(n, gradient[open_] / scale[open_])
-    except np.linalg.LinAlgError:
-        solved = np.linalg.lstsq(n, gradient[open_] / scale[open_], rcond=None)[0]
-    step[open_] = solved / scale[open_]
-    return step
 
 
 def covariance(normal: FloatArray) -> FloatArray:

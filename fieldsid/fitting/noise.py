@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import comb
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize
 
-from fieldsid.fitting.whitening import NOISE_FIELDS, innovations
+from fieldsid.fitting.kalman import information, innovations
+from fieldsid.fitting.step import bounded_step
+from fieldsid.fitting.whitening import NOISE_FIELDS
 from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -20,6 +22,12 @@ ENOUGH, BLOCK = 50_000, 1_000
 SMALLEST_ANGLE = 1e-7
 SMALLEST_RATE = 1e-7
 RESOLUTION = 1e-3
+ROUNDS, DAMPING = 30, 1e-3
+LEAP = 1.5
+"""Longest step of a logarithm: the information says little of what is far away."""
+WORTH = 1e-3
+"""Log likelihood that is not worth another round."""
+GRADIENT_STEP = 1e-4
 
 
 def white_floor(values: FloatArray, ok: BoolArray) -> float:
@@ -99,32 +107,80 @@ def estimate_noise(
     """Return the noise of a family with the highest likelihood, and that log likelihood.
 
     dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
-    noise vector (7,), is by default that of the residuals as they are.
+    noise vector (7,), is by default that of the residuals as they are. Fisher scoring on the logarithms of the noise's
+    numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the residuals' the information.
     """
     names = FAMILIES[family]
     floor = floor_of(records)
     rough = _rough_start(records, dynamics, residuals, floor, start)
     off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
     low, high = _bounds(names, floor, _resolution(records))
-    place = [NOISE_FIELDS.index(n) for n in names]
-    plain = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
+    place = np.array([NOISE_FIELDS.index(n) for n in names])
+    known = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
+    slope = _Slope(records, dynamics, residuals, known, place, likelihood)
+    x = np.clip(np.log([rough[n] for n in names]), low, high)
+    value, score, fisher = slope.at(x)
+    damping = DAMPING
+    for _ in range(ROUNDS):
+        moved = bounded_step(fisher, score, damping, x, low, high)
+        moved *= min(1.0, LEAP / max(float(np.max(np.abs(moved))), LEAP))
+        if float(score @ moved) < WORTH:
+            break
+        trial = x + moved
+        new = slope.at(trial)
+        if new[0] > value:
+            gained, x = new[0] - value, trial
+            value, score, fisher = new
+            damping = max(0.1 * damping, DAMPING)
+            if gained < WORTH:
+                break
+        else:
+            damping *= 10.0
+    return Noise(*slope.vector(x).tolist()), value
 
-    def vector(x: FloatArray) -> FloatArray:
-        known = plain.copy()
-        known[place] = np.exp(x)
-        return known
 
-    def cost(x: FloatArray) -> float:
-        known = vector(x)
-        value = -(likelihood(known) if likelihood is not None else log_likelihood(records, dynamics, residuals, known))
-        return value if np.isfinite(value) else 1e15
+@dataclass(frozen=True, slots=True)
+class _Slope:
+    """The likelihood of residuals as a function of the logarithms of some of the noise's numbers."""
 
-    x0 = np.clip(np.log([rough[n] for n in names]), low, high)
-    best = minimize(
-        cost, x0, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
-        options={"maxiter": 30, "eps": 1e-4, "ftol": 1e-8},
-    )  # fmt: skip
-    return Noise(*vector(best.x).tolist()), float(-best.fun)
+    records: Sequence[Record]
+    dynamics: Sequence[tuple[float, float]]
+    residuals: Sequence[FloatArray]
+    known: FloatArray
+    place: npt.NDArray[np.int64]
+    likelihood: Callable[[FloatArray], float] | None
+
+    def vector(self, x: FloatArray) -> FloatArray:
+        """Return the noise vector (7,) of logarithms x (P,)."""
+        noise = self.known.copy()
+        noise[self.place] = np.exp(x)
+        return noise
+
+    def at(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number."""
+        count = x.size
+        score, fisher, total = np.zeros(count), np.zeros((count, count)), 0.0
+        noise = self.vector(x)
+        for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True):
+            total += information(
+                r.steps,
+                r.angle_ok,
+                r.rate_ok,
+                max(a, 1e-3),
+                max(k, 0.0),
+                noise,
+                self.place,
+                np.ascontiguousarray(e),
+                score,
+                fisher,
+            )
+        if self.likelihood is not None:
+            total = self.likelihood(noise)
+            score = np.array(
+                [(self.likelihood(self.vector(x + d)) - total) / GRADIENT_STEP for d in GRADIENT_STEP * np.eye(count)]
+            )
+        known = np.isfinite(total) and np.isfinite(score).all() and np.isfinite(fisher).all()
+        return (total, score, fisher) if known else (-np.inf, np.zeros(count), np.eye(count))
 
 
 def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from fieldsid.fitting.kalman import transition
 from fieldsid.fitting.noise import log_likelihood
 from fieldsid.fitting.uncertainty import middle
-from fieldsid.fitting.whitening import noise_vector, transition, whiten
+from fieldsid.fitting.whitening import noise_vector, whiten
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record

@@ -1,0 +1,40 @@
+"""One Levenberg-Marquardt step within bounds, for whoever climbs or descends with normal equations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
+
+
+def bounded_step(
+    normal: FloatArray, gradient: FloatArray, damping: float, x: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return the step (F,) from a normal matrix (F, F) and the gradient (F,) that points where to go.
+
+    damping is relative to the normal matrix's diagonal. What is at its bound and would leave it, or carries no
+    information, stays; what would cross its bound goes just there, and the rest makes the best of that.
+    Source: Marquardt 1963, SIAM J. 11(2).
+    """
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    free = ~(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)) | (np.diag(normal) < 1e-24))
+    scaled = normal / np.outer(scale, scale)
+    scaled[np.diag_indices_from(scaled)] += damping
+    step = np.zeros_like(x)
+    while free.any():
+        wish = (gradient[free] - normal[np.ix_(free, ~free)] @ step[~free]) / scale[free]
+        step[free] = _solved(scaled[np.ix_(free, free)], wish) / scale[free]
+        allowed = np.clip(x + step, low, high) - x
+        excess = np.where(free, np.abs(step - allowed) * scale, 0.0)
+        worst = int(np.argmax(excess))
+        if excess[worst] == 0.0:
+            break
+        step[worst], free[worst] = allowed[worst], False
+    return step
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])
