@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,16 +24,30 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Hypothesis:
-    """A judged trial: log likelihoods per training and validation run, errors, price of its parameters, its model."""
+    """A judged trial: log likelihoods per training and validation run, price of its parameters, its free run.
+
+    plain is the trial of output error alone, where that predicts unseen runs better.
+    """
 
     judged: Judged
     by_run: FloatArray
     unseen: FloatArray
-    errors: Pair
     cost: float
-    model: Model
+    validation: tuple[Record, ...]
+    plain: Trial | None = None
+
+    @property
+    def model(self) -> Model:
+        """The model whose free run is shown."""
+        trial = self.plain or self.judged.trial
+        return bare_model(trial.problem, trial.x, self.judged.noise)
+
+    @cached_property
+    def errors(self) -> Pair:
+        """Errors of the model on the runs it was fitted to and on the runs it was not, each run's own start at its best."""
+        return errors_under(self.plain or self.judged.trial, self.model, self.validation)
 
     @property
     def own_model(self) -> Model:
@@ -56,22 +71,19 @@ class Hypothesis:
 
 
 def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
-    """Return a judged trial with its errors on the runs it was fitted to and on the runs it was not."""
+    """Return a judged trial with its likelihood on the runs it was fitted to and on the runs it was not."""
     problem, x = judged.trial.problem, judged.trial.x
     model = bare_model(problem, x, judged.noise)
-    shown, left = [], []
+    shown = []
     for record in validation:
         alone, start = frozen_problem(model, record, judged.trial.effects)
-        vector = refit_own(alone, start, 0, judged.noise)
-        shown.append((alone, vector))
-        left.append(left_over(alone, refit_own(alone, vector, 0, floor_of([record]))))
+        shown.append((alone, refit_own(alone, start, 0, judged.noise)))
     return Hypothesis(
         judged,
         likelihood_by_run(problem, x, judged.noise),
         unseen_likelihood(judged, validation, shown),
-        Pair(training_errors(judged.trial), errors_of(validation, left)),
         _price(judged, validation),
-        model,
+        tuple(validation),
     )
 
 
@@ -105,21 +117,24 @@ def left_over(problem: Problem, x: FloatArray) -> FloatArray:
     return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in channels])
 
 
-def with_free_run(h: Hypothesis, validation: Sequence[Record], floor: Noise) -> Hypothesis:
-    """Return the hypothesis with the errors and model of plain output error where unseen runs are predicted better so.
+def with_free_run(h: Hypothesis, floor: Noise) -> Hypothesis:
+    """Return the hypothesis with the free run of plain output error where that predicts unseen runs better.
 
     Generalised least squares is efficient when the hypothesis is right and may lose the free run when it is not.
     """
     trial = h.judged.trial
-    plain = refine(trial.problem, trial.x, trial.weights)
-    model = bare_model(plain.problem, plain.x, h.judged.noise)
+    other = replace(h, plain=refine(trial.problem, trial.x, trial.weights))
+    old, new = (e.validation if h.validation else e.train for e in (h.errors, other.errors))
+    return other if new.over(floor) < old.over(floor) else h
+
+
+def errors_under(trial: Trial, model: Model, validation: Sequence[Record]) -> Pair:
+    """Return the errors of a trial and its model on training and on unseen runs."""
     left = []
     for record in validation:
         alone, start = frozen_problem(model, record, trial.effects)
         left.append(left_over(alone, refit_own(alone, start, 0, floor_of([record]))))
-    errors = Pair(training_errors(plain), errors_of(validation, left))
-    old, new = (e.validation if validation else e.train for e in (h.errors, errors))
-    return replace(h, errors=errors, model=model) if new.over(floor) < old.over(floor) else h
+    return Pair(training_errors(trial), errors_of(validation, left))
 
 
 def training_errors(trial: Trial) -> Errors:

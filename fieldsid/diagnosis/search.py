@@ -14,7 +14,7 @@ from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, twin_of
+from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, shortened, twin_of
 from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect, Stage
@@ -70,7 +70,7 @@ class Search:
             judged = max((judge(trial.problem, trial.x, self.floor, f) for f in NOISES), key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)
-            self.tried[self.root] = with_free_run(self.tried[self.root], self.validation, self.floor)
+            self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
         return self.tried[self.root]
 
     def _laws(self) -> tuple[bool, ...]:
@@ -82,7 +82,8 @@ class Search:
         layout = layout_of(self.records, self.axis, (), speed_groups(self.records, snapped=snapped))
         trial = refine(Problem(self.records, layout), start_vector(self.records, layout), self.floor)
         for effect in (e for e in self.catalogue if e.name in self.known):
-            promise = promise_of(ground_of(trial.problem, trial.x, trial.weights), effect)
+            ground = ground_of(trial.problem, trial.x, trial.weights)
+            promise = shortened(ground, promise_of(ground, effect))
             trial = refine(promise.problem, promise.start, trial.weights)
         return trial
 
@@ -123,24 +124,25 @@ class Search:
             self._keep(twin)
 
     def _free_runs(self, key: frozenset[str]) -> None:
-        """Give the best children the free run of plain output error where that predicts unseen runs better."""
+        """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
         children = sorted((k for k in self.tried if len(k) == len(key) + 1 and key < k), key=lambda k: -self.tried[k].score)
         for child in children[:FREE_RUNS]:
-            self.tried[child] = with_free_run(self.tried[child], self.validation, self.floor)
+            if self.tried[child].score > self.tried[key].score:
+                self.tried[child] = with_free_run(self.tried[child], self.floor)
 
     def _promising(self, parent: Hypothesis, *, forced: bool) -> list[tuple[Promise, bool]]:
         """Return the promises worth judging, each with whether plain output error leads the way there."""
         trial, noise = parent.judged.trial, parent.judged.noise
         have = set(trial.names)
         left = [e for e in self.catalogue if e.name not in have]
-        free_run = refine(trial.problem, trial.x, trial.weights)
+        free_run = parent.plain or refine(trial.problem, trial.x, trial.weights)
         found: list[tuple[Promise, bool]] = []
         for at, weights, plain in ((free_run, free_run.weights, True), (trial, noise, False)):
             ground = ground_of(at.problem, at.x, weights)
             worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
             promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
             kept = promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]
-            found += [(p, plain) for p in kept if forced or ground.cost - p.cost > worth]
+            found += [(shortened(ground, p), plain) for p in kept if forced or ground.cost - p.cost > worth]
             if plain and len(have) == len(self.known):
                 found += [(self._shifted(ground, e), True) for e in left if shifts_time(e)]
         return found
@@ -154,12 +156,12 @@ class Search:
         tried = []
         base = ground.problem.layout
         for values in shared_points(ground, effect):
-            moved = [shifted(r, next(iter(values.values()))) for r in self.records]
+            moved = [earlier(r, next(iter(values.values()))) for r in self.records]
             x = ground.x.copy()
             x[: base.shared] = start_vector(moved, base)[: base.shared]
             problem, start = grown(ground.problem, x, effect, values)
             found = descend(problem, start, ground.noise, rounds=SHIFT_ROUNDS, tolerance=1e-3)
-            tried.append(Promise(effect, found.cost, problem, found.x))
+            tried.append(Promise(effect, found.cost, start, found.x, problem))
         return min(tried, key=lambda p: p.cost)
 
     def best(self) -> Hypothesis:
@@ -228,7 +230,7 @@ class Search:
         return sorted(self.tried.values(), key=lambda h: -h.score)
 
 
-def shifted(record: Record, late_s: float) -> Record:
+def earlier(record: Record, late_s: float) -> Record:
     """Return a record whose measurement is taken late_s seconds later, as if it had not been late."""
     then = record.time + late_s
 

@@ -123,7 +123,7 @@ def base_from(work: Search, parent: Model) -> Hypothesis:
     start = refine(problem, x, base.judged.trial.weights)
     again = judge(problem, start.x, base.judged.noise, work.family)
     if again.likelihood > base.judged.likelihood + SAME:
-        work.tried[work.root] = with_free_run(hypothesis_of(again, work.validation), work.validation, work.floor)
+        work.tried[work.root] = with_free_run(hypothesis_of(again, work.validation), work.floor)
     return work.base()
 
 

@@ -13,7 +13,7 @@ from fieldsid.fitting.descent import descend
 from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import carried, ground_of, promises_of, twin_of
+from fieldsid.fitting.starts import carried, ground_of, promises_of, shortened, twin_of
 from fieldsid.fitting.weights import misfit, white_weights
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
@@ -37,7 +37,7 @@ def grown_start(problem: Problem, floor: Noise) -> FloatArray:
         ground = ground_of(current, x, white_weights(current, x))
         points = min((promises_of(ground, effect) for effect in left), key=lambda p: p[0].cost)[:POINTS]
         effect, current = points[0].effect, points[0].problem
-        x = _best(current, [_refined(current, p.start, ground.noise) for p in points])
+        x = _best(current, [_refined(current, shortened(ground, p).start, ground.noise) for p in points])
         twin = twin_of(current, x, effect)
         if twin is not None:
             x = _best(current, [x, _refined(current, twin, ground.noise)])

@@ -7,7 +7,7 @@ parent's sensitivities, and C is solved for. No descent, so that the whole catal
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from types import MappingProxyType
 
@@ -31,12 +31,13 @@ WORTHLESS = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """What an effect promises: predicted weighted sum of squares, and the start its refit should take."""
+    """What an effect promises: predicted weighted sum of squares, the scan point, and where a whole step from it leads."""
 
     effect: Effect
     cost: float
-    problem: Problem
+    point: FloatArray
     start: FloatArray
+    problem: Problem
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,14 +116,13 @@ def promise_of(ground: Ground, effect: Effect) -> Promise:
 
 
 def promises_of(ground: Ground, effect: Effect) -> list[Promise]:
-    """Return every scan point of an effect over its shared grid, the best first."""
+    """Return every scan point of an effect over its shared grid, the best first, their starts a whole step away."""
     promises = []
     for values in shared_points(ground, effect):
         problem, x = grown(ground.problem, ground.x, effect, values)
         for c in effect.nuisance:
             x = _best_per_run(ground, problem, x, effect, c)
-        cost, start = _first_order(ground, problem, x, effect)
-        promises.append(Promise(effect, cost, problem, start))
+        promises.append(Promise(effect, *_first_order(ground, problem, x, effect), problem))
     return sorted(promises, key=lambda p: p.cost)
 
 
@@ -158,8 +158,8 @@ def run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new: 
     return flat[0], columns
 
 
-def _first_order(ground: Ground, problem: Problem, x: FloatArray, effect: Effect) -> tuple[float, FloatArray]:
-    """Return the predicted cost after one step in the new slots, and the stepped, bounded start."""
+def _first_order(ground: Ground, problem: Problem, x: FloatArray, effect: Effect) -> tuple[float, FloatArray, FloatArray]:
+    """Return the predicted cost after one step in the new slots, where the step begins, and its bounded end."""
     new = _new_slots(problem, effect)
     parts = [run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
     e, c = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
@@ -170,17 +170,18 @@ def _first_order(ground: Ground, problem: Problem, x: FloatArray, effect: Effect
     start[new] = np.clip(wished, low + 1e-3 * (x[new] - low), high - 1e-3 * (high - x[new]))
     if np.any((wished < low) | (wished > high)):
         cost, _ = projected(ground.basis, e - c @ (start[new] - x[new]), c[:, :0])
-    return cost, _shortened(ground, problem, x, start)
+    return cost, x, start
 
 
-def _shortened(ground: Ground, problem: Problem, x: FloatArray, start: FloatArray) -> FloatArray:
-    """Return the start, drawn back towards x until the free run there is no worse than at x."""
+def shortened(ground: Ground, promise: Promise) -> Promise:
+    """Return a promise with its start drawn back towards the scan point until the free run is no worse than there."""
+    problem, x, start = promise.problem, promise.point, promise.start
     limit = cost_of(problem, x, ground.noise)
     for _ in range(SHORTENINGS):
         if cost_of(problem, start, ground.noise) <= limit:
-            return start
+            return replace(promise, start=start)
         start = 0.6 * x + 0.4 * start
-    return x
+    return replace(promise, start=x)
 
 
 def projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, FloatArray]:

@@ -24,12 +24,12 @@ def bounded_step(
     while free.any():
         wish = (gradient[free] - normal[np.ix_(free, ~free)] @ step[~free]) / scale[free]
         step[free] = _solved(scaled[np.ix_(free, free)], wish) / scale[free]
-        allowed = np.clip(x + step, low, high) - x
-        excess = np.where(free, np.abs(step - allowed) * scale, 0.0)
-        worst = int(np.argmax(excess))
-        if excess[worst] == 0.0:
+        end = x + step
+        beyond = np.maximum(end - high, low - end) * scale * free
+        worst = int(np.argmax(beyond))
+        if beyond[worst] <= 0.0:
             break
-        step[worst], free[worst] = allowed[worst], False
+        step[worst], free[worst] = min(max(end[worst], low[worst]), high[worst]) - x[worst], False
     return step
 
 
