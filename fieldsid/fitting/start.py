@@ -16,6 +16,8 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
 
 WINDOW_S = 0.6
+SLOW = 0.3
+"""Damping in 1/s to start from where the equation asks for an unstable vehicle."""
 
 
 def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
@@ -40,12 +42,20 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
     matrix, target = np.concatenate(rows), np.concatenate(targets)
     if len(target) < len(base):
         return x
-    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
-    solution = np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale
+    solution = _solved(matrix, target)
+    if solution[0] <= 0.0:
+        # a free run that grows leads nowhere: measured late or early, a stable vehicle looks like an unstable one
+        held = SLOW * matrix[:, 0]
+        solution = np.concatenate([[SLOW], _solved(matrix[:, 1:], target - held)])
     for name, value in zip(base, solution, strict=True):
         slot = layout.slots[columns.index(name)]
-        x[columns.index(name)] = float(np.clip(value, max(slot.low, -0.5) if name == base[0] else slot.low, slot.high))
+        x[columns.index(name)] = float(np.clip(value, slot.low, slot.high))
     return x
+
+
+def _solved(matrix: FloatArray, target: FloatArray) -> FloatArray:
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
+    return np.asarray(np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale)
 
 
 def _share(speed: float, reference: float) -> float:

@@ -37,9 +37,13 @@ class ModelPlant:
     def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 - the clock is the record's
         """Hold the fin (1,) over the next interval and return angle (1,) rad and rate (1,) rad/s at its end."""
         self.fin[self.sample :] = fin[0] + self.scene.trim_fin
-        motion = simulate(self.scene.model, replace(self.record, fin=self.fin), state=(0.0, 0.0, 0.0), effects=self.scene.effects)
+        motion = self.logged()
         self.sample = min(self.sample + 1, self.fin.size - 1)
         return motion.angle[self.sample : self.sample + 1], motion.rate[self.sample : self.sample + 1]
+
+    def logged(self) -> Trajectory:
+        """Return what the sensors log of the fin so far, the last one held to the record's end."""
+        return simulate(self.scene.model, replace(self.record, fin=self.fin), state=(0.0, 0.0, 0.0), effects=self.scene.effects)
 
 
 def rehearse(
@@ -66,7 +70,9 @@ def rehearse(
     plant = ModelPlant(scene, record)
     flight = fly(maneuver, parameters, plant, limits=limits, autopilot=autopilot_of(scene.base, limits), schedule=schedule)
     fin = flight.fin[:, 0] + scene.trim_fin
-    run = run_of(model, flight.time, fin, flight.angle[:, 0], flight.rate[:, 0], speed=speed, name=maneuver.name)
+    # the loop saw what had been measured by then; the log of a clock that runs early holds what came after as well
+    logged, count = plant.logged(), flight.time.size
+    run = run_of(model, flight.time, fin, logged.angle[:count], logged.rate[:count], speed=speed, name=maneuver.name)
     columns = {**ROLES, "cross": NAMES[model.axis].cross}
     return replace(run, signals={**run.signals, **{columns[role]: values[: len(run)] for role, values in given.items()}})
 
