@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fieldsid.fitting.kalman import transition
+from fieldsid.fitting.kalman import information, transition
 from fieldsid.fitting.noise import log_likelihood
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.whitening import noise_vector, whiten
@@ -30,6 +30,13 @@ def record(*, gaps: bool) -> Record:
         ok[0, 10:14], ok[1, 20:22] = False, False
     zero = np.zeros(40)
     return Record("short", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], {}, 1.0)
+
+
+def settled_record() -> Record:
+    """Long enough for the gains to settle, twice: the step changes on the way."""
+    time = np.cumsum(np.concatenate([np.full(250, 0.05), np.full(150, 0.08)]))
+    zero, ok = np.zeros(400), np.ones(400, dtype=bool)
+    return Record("long", Axis.YAW, time, zero, True, False, zero, zero, ok, ok, {}, 1.0)
 
 
 def dense(log: Record, noise: Noise) -> np.ndarray:
@@ -58,11 +65,11 @@ def seen(log: Record) -> np.ndarray:
     return np.concatenate([log.angle_ok, log.rate_ok])
 
 
-@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("log", [record(gaps=False), record(gaps=True), settled_record()], ids=["even", "gaps", "settled"])
 @pytest.mark.parametrize("family", NOISES)
-def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(family, gaps):
-    log, rng = record(gaps=gaps), np.random.default_rng(1)
-    series = np.where(seen(log).reshape(2, -1), rng.standard_normal((3, 2, 40)), 0.0)
+def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(family, log):
+    rng = np.random.default_rng(1)
+    series = np.where(seen(log).reshape(2, -1), rng.standard_normal((3, 2, len(log))), 0.0)
     white, logs = whiten(log, NOISES[family], A, K, series)
     keep = seen(log)
     cov = dense(log, NOISES[family])[np.ix_(keep, keep)]
@@ -80,6 +87,51 @@ def test_the_likelihood_is_that_of_the_dense_gaussian():
     e[keep] = np.random.default_rng(2).multivariate_normal(np.zeros(cov.shape[0]), cov)
     expected = -0.5 * (np.linalg.slogdet(cov)[1] + e[keep] @ np.linalg.solve(cov, e[keep]))
     assert log_likelihood([log], [(A, K)], [e.reshape(2, -1)], noise_vector(noise)) == pytest.approx(expected, rel=1e-6)
+
+
+def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
+    return np.where(np.arange(7) == place, noise * np.exp(by), noise)
+
+
+def informed(log: Record, noise: np.ndarray, place: np.ndarray, residual: np.ndarray):
+    score, fisher = np.zeros(place.size), np.zeros((place.size, place.size))
+    total = information(log.steps, log.angle_ok, log.rate_ok, A, K, noise, place, residual, score, fisher)
+    return total, score, fisher
+
+
+PLACES = {"disturbance": np.array([0, 1, 2, 3]), "coloured": np.array([0, 1, 4, 5, 6]), "both": np.arange(7)}
+
+
+@pytest.mark.parametrize("log", [record(gaps=True), settled_record()], ids=["gaps", "settled"])
+@pytest.mark.parametrize("family", NOISES)
+def test_the_score_is_the_slope_of_the_likelihood(family, log):
+    noise, step = noise_vector(NOISES[family]), 1e-4
+    residual = np.where(seen(log), 0.01 * np.random.default_rng(4).standard_normal(2 * len(log)), 0.0).reshape(2, -1)
+    total, score, fisher = informed(log, noise, PLACES[family], residual)
+
+    def likelihood(v: np.ndarray) -> float:
+        return log_likelihood([log], [(A, K)], [residual], v)
+
+    assert total == pytest.approx(likelihood(noise), rel=1e-12)
+    slopes = [(likelihood(moved(noise, p, step)) - likelihood(moved(noise, p, -step))) / (2 * step) for p in PLACES[family]]
+    # forward differences are off by half a step of the information
+    np.testing.assert_allclose(score, slopes, atol=5e-4 * float(np.diag(fisher).max()))
+
+
+@pytest.mark.parametrize("family", NOISES)
+def test_the_information_is_on_average_that_of_the_dense_covariance(family):
+    """F = 1/2 tr(S^-1 dS S^-1 dS')."""
+    log, noise, step, rng = record(gaps=True), noise_vector(NOISES[family]), 1e-4, np.random.default_rng(5)
+    keep, place = seen(log), PLACES[family]
+    block = np.ix_(keep, keep)
+    cov = dense(log, NOISES[family])[block]
+    slopes = [(dense(log, Noise(*moved(noise, p, step))) - dense(log, Noise(*moved(noise, p, -step))))[block] for p in place]
+    share = [np.linalg.solve(cov, s / (2 * step)) for s in slopes]
+    expected = np.array([[0.5 * np.sum(a * b.T) for b in share] for a in share])
+    drawn = np.zeros((300, 80))
+    drawn[:, keep] = rng.multivariate_normal(np.zeros(cov.shape[0]), cov, size=300)
+    found = np.mean([informed(log, noise, place, e.reshape(2, -1))[2] for e in drawn], axis=0)
+    np.testing.assert_allclose(found, expected, rtol=0.15, atol=0.05 * float(np.diag(expected).max()))
 
 
 @pytest.mark.parametrize("family", NOISES)

@@ -45,6 +45,13 @@ def test_a_zigzag_turns_its_rudder_at_the_heading_the_lagging_vehicle_shows():
     np.testing.assert_allclose(np.abs(yaw[turned]), 15.0, atol=1.0)
 
 
+def test_the_log_of_an_early_clock_shows_the_motion_before_its_cause():
+    run = rehearse(model("clock_offset", offset=-0.4), *parse_spec("square_pulses"), speed=1.4, limits=LIMITS)
+    late = rehearse(model(), *parse_spec("square_pulses"), speed=1.4, limits=LIMITS)
+    np.testing.assert_allclose(run["yaw_rate_rad_s"][:100], late["yaw_rate_rad_s"][8:108], atol=1e-9)
+    assert np.abs(late["yaw_rate_rad_s"][8:108]).max() > 0.1
+
+
 def test_helper_signals_reach_the_model_and_the_run():
     vehicle = model("roll_coupling", roll_moment=0.5)
     run = rehearse(vehicle, *parse_spec("square_pulses"), speed=1.4, limits=LIMITS, helpers=lambda t: {"roll": 0.1 * np.sin(t)})
