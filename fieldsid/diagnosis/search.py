@@ -23,8 +23,9 @@ from fieldsid.models.record import Record
 
 NOISES = ("disturbance", "coloured")
 FREE_RUNS = 3
-PROMISING, PROMISING_LATER = 5, 4
-"""Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise."""
+PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
+"""Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise. Of
+the base, of a hypothesis with effects, and of one that is only tried in another order."""
 LARGEST = 4
 CLEAN = 1.02
 GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
@@ -94,12 +95,13 @@ class Search:
             self.tried[key] = hypothesis_of(judged, self.validation)
         return self.tried[key]
 
-    def grow(self, parent: Hypothesis, *, forced: bool = False) -> list[Hypothesis]:
+    def grow(self, parent: Hypothesis, *, most: int | None = None, forced: bool = False) -> list[Hypothesis]:
         """Return the parent with each promising effect added, or with every one when forced, judged, best first."""
         key = frozenset(parent.names)
         if key not in self.grown_from:
             self.grown_from.add(key)
-            for promise, plain in self._promising(parent, forced=forced):
+            most = most or (PROMISING if key == self.root else PROMISING_LATER)
+            for promise, plain in self._promising(parent, most, forced=forced):
                 self.report("+".join((*parent.names, promise.effect.name)))
                 start = refine(promise.problem, promise.start, parent.judged.trial.weights).x if plain else promise.start
                 child = judge(promise.problem, start, parent.judged.noise, self.family)
@@ -130,7 +132,7 @@ class Search:
             if self.tried[child].score > self.tried[key].score:
                 self.tried[child] = with_free_run(self.tried[child], self.floor)
 
-    def _promising(self, parent: Hypothesis, *, forced: bool) -> list[tuple[Promise, bool]]:
+    def _promising(self, parent: Hypothesis, most: int, *, forced: bool) -> list[tuple[Promise, bool]]:
         """Return the promises worth judging, each with whether plain output error leads the way there."""
         trial, noise = parent.judged.trial, parent.judged.noise
         have = set(trial.names)
@@ -141,8 +143,8 @@ class Search:
             ground = ground_of(at.problem, at.x, weights)
             worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
             promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
-            kept = promises[: PROMISING if len(have) == len(self.known) else PROMISING_LATER]
-            found += [(shortened(ground, p), plain) for p in kept if forced or ground.cost - p.cost > worth]
+            kept = promises if forced else [p for p in promises[:most] if ground.cost - p.cost > worth]
+            found += [(shortened(ground, p), plain) for p in kept]
             if plain and len(have) == len(self.known):
                 found += [(self._shifted(ground, e), True) for e in left if shifts_time(e)]
         return found
@@ -192,7 +194,7 @@ class Search:
             rest = frozenset(n for n in found.names if n != gone.name)
             if rest not in self.tried:
                 continue
-            for child in self.grow(self.tried[rest])[:1]:
+            for child in self.grow(self.tried[rest], most=PROMISING_INSTEAD)[:1]:
                 if len(child.effects) == len(found.effects) and child.score > best.score:
                     best = child
         return best

@@ -28,6 +28,8 @@ ALTERNATIONS = 3
 POLISH_ROUNDS = 8
 SETTLED = 0.5
 REFINE_ROUNDS = 25
+COARSE, FINE = 1e-4, 1e-5
+"""Share of the sum of squares a round must gain: of free runs that are compared to the percent, of likelihoods to a half."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +63,10 @@ class Judged:
 
 def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = REFINE_ROUNDS) -> Trial:
     """Return the output-error trial a start leads to, reweighted once by its own residuals."""
-    found = descend(problem, start, weights, rounds=rounds, tolerance=1e-5)
+    found = descend(problem, start, weights, rounds=rounds, tolerance=COARSE)
     new = white_weights(problem, found.x)
     if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) > 0.1:
-        found = descend(problem, found.x, new, rounds=rounds, tolerance=1e-5)
+        found = descend(problem, found.x, new, rounds=rounds, tolerance=COARSE)
         new = white_weights(problem, found.x)
     return Trial(problem, found.x, new)
 
@@ -73,7 +75,7 @@ def judge(problem: Problem, x: FloatArray, start: Noise, family: str = FAMILY) -
     """Return a hypothesis under the noise of highest likelihood, parameters and noise improved in turn from x."""
     noise, likelihood = _noise_at(problem, x, start, family)
     for _ in range(ALTERNATIONS):
-        found = descend(problem, x, noise, rounds=POLISH_ROUNDS, tolerance=1e-6)
+        found = descend(problem, x, noise, rounds=POLISH_ROUNDS, tolerance=FINE)
         new_noise, new = _noise_at(problem, found.x, noise, family)
         if not new > likelihood:
             break

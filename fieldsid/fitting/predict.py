@@ -23,6 +23,9 @@ from fieldsid.models.record import Record
 from fieldsid.models.signal_path import fin_path
 from fieldsid.models.simulate import effects_of
 
+OWN_ROUNDS, OWN = 15, 1e-6
+"""Rounds for a run's own slots, and the share of the sum of squares a round must gain."""
+
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
@@ -84,14 +87,16 @@ def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatA
     alone = Problem((problem.records[run],), _layout_of_one(problem.layout, run))
     keep = [*range(problem.layout.shared), *own]
     free = range(problem.layout.shared, len(keep))
-    found = [descend(alone, start, noise, free=free, rounds=15) for start in scanned_starts(alone, x[keep])]
+    found = [
+        descend(alone, start, noise, free=free, rounds=OWN_ROUNDS, tolerance=OWN) for start in scanned_starts(alone, x[keep])
+    ]
     best = min(found, key=lambda d: d.cost)
     out = x.copy()
     if not np.isfinite(best.cost):
         return out
     prior = first_second(alone, 0, noise) if is_white(noise) else None
     if prior is not None:
-        best = descend(alone, best.x, _left_over(alone, best.x, noise), free=free, rounds=15, prior=prior)
+        best = descend(alone, best.x, _left_over(alone, best.x, noise), free=free, rounds=OWN_ROUNDS, tolerance=OWN, prior=prior)
     out[keep] = best.x
     return out
 
