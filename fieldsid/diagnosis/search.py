@@ -171,7 +171,7 @@ class Search:
         current = self.base()
         for size in range(LARGEST):
             children = self.grow(current)
-            paying = next((c for c in children if self.pays(current, c)), None)
+            paying = next((c for c in children if self.pays(current, c)), None) or self._two_at_once(current, children)
             if paying is None:
                 break
             current = self._swapped(paying) if size else paying
@@ -179,6 +179,13 @@ class Search:
                 break
         found = self._pruned(current)
         return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
+
+    def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
+        """Return a pair that pays where the first of the two has evidence but the error falls with the second only."""
+        first = next((c for c in children if self.likelier(current, c)), None)
+        if first is None:
+            return None
+        return next((c for c in self.grow(first) if self.pays(first, c) and self.pays(current, c)), None)
 
     def admissible(self, h: Hypothesis) -> bool:
         """Whether every effect of a hypothesis is worth having: it pays over each smaller one that was tried."""
@@ -208,10 +215,13 @@ class Search:
 
     def pays(self, without: Hypothesis, with_: Hypothesis) -> bool:
         """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
-        learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
-        better = learned and with_.score - without.score > WORTH
         matters = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
-        return better and self.misfit(with_) < matters * self.misfit(without)
+        return self.likelier(without, with_) and self.misfit(with_) < matters * self.misfit(without)
+
+    def likelier(self, without: Hypothesis, with_: Hypothesis) -> bool:
+        """Whether an addition brings evidence, whatever it does to the free run."""
+        learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
+        return learned and with_.score - without.score > WORTH
 
     def misfit(self, h: Hypothesis) -> float:
         """Return the geometric mean of both channels' errors: the heading, where every error adds up, has no more say."""
