@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
-from fieldsid.diagnosis.trial import Judged, Trial, judge, refine
-from fieldsid.fitting.descent import descend
+from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
+from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
+from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, shortened, twin_of
-from fieldsid.logs.run import BoolArray, FloatArray
+from fieldsid.fitting.starts import ground_of, promise_of, shortened, twin_of
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Effect, Stage
+from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
@@ -26,11 +26,10 @@ FREE_RUNS = 3
 PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
 """Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise. Of
 the base, of a hypothesis with effects, and of one that is only tried in another order."""
+LEADING = 3
+"""Children that every way to them is gone for, whatever the first has brought."""
 LARGEST = 4
 CLEAN = 1.02
-GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
-"""Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
-SHIFT_ROUNDS = 12
 TWINS = 1.0
 """Log likelihood within which two starts of one hypothesis are alike."""
 WORTH = 6.0
@@ -101,15 +100,42 @@ class Search:
         if key not in self.grown_from:
             self.grown_from.add(key)
             most = most or (PROMISING if key == self.root else PROMISING_LATER)
-            for promise, plain in self._promising(parent, most, forced=forced):
-                self.report("+".join((*parent.names, promise.effect.name)))
-                start = refine(promise.problem, promise.start, parent.judged.trial.weights).x if plain else promise.start
-                child = judge(promise.problem, start, parent.judged.noise, self.family)
-                self._keep(child)
-                self._try_twin(child, promise.effect)
+            left = [e for e in self.catalogue if e.name not in key]
+            found = ways(parent, left, None if forced else most, anew=key == self.root)
+            later = [w for w in found if not self._gone(parent, w)]
+            leading = {n for h in self._children(key)[:LEADING] for n in h.names if n not in key}
+            for way in later:
+                if way.promise.effect.name in leading:
+                    self._go(parent, way)
             self._free_runs(key)
+        return self._children(key)
+
+    def _children(self, key: frozenset[str]) -> list[Hypothesis]:
+        """Return the hypotheses of one effect more that were tried, best first."""
         children = [h for k, h in self.tried.items() if len(k) == len(key) + 1 and key < k]
         return sorted(children, key=lambda h: -h.score)
+
+    def _gone(self, parent: Hypothesis, way: Way) -> bool:
+        """Go a way, unless one already gone to the same hypothesis has brought what this one promises."""
+        known = self.tried.get(frozenset((*parent.names, way.promise.effect.name)))
+        if known is not None:
+            trial, cost = known.judged.trial, way.promise.cost
+            gained = known.judged.likelihood - parent.judged.likelihood
+            if way.plain and cost_of(trial.problem, trial.x, way.ground.noise) < (1.0 + GLIMPSE_PLAIN) * cost:
+                return False
+            if not way.plain and gained > 0.5 * (way.ground.cost - cost) - SETTLED:
+                return False
+        self._go(parent, way)
+        return True
+
+    def _go(self, parent: Hypothesis, way: Way) -> None:
+        """Judge what a way leads to."""
+        promise = way.promise
+        self.report("+".join((*parent.names, promise.effect.name)))
+        start = refine(promise.problem, promise.start, parent.judged.trial.weights).x if way.plain else promise.start
+        child = judge(promise.problem, start, parent.judged.noise, self.family)
+        self._keep(child)
+        self._try_twin(child, promise.effect)
 
     def _try_twin(self, judged: Judged, effect: Effect) -> None:
         """Judge the other start that has the same response at one speed; of two alike the smaller effect is kept."""
@@ -127,44 +153,9 @@ class Search:
 
     def _free_runs(self, key: frozenset[str]) -> None:
         """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
-        children = sorted((k for k in self.tried if len(k) == len(key) + 1 and key < k), key=lambda k: -self.tried[k].score)
-        for child in children[:FREE_RUNS]:
-            if self.tried[child].score > self.tried[key].score:
-                self.tried[child] = with_free_run(self.tried[child], self.floor)
-
-    def _promising(self, parent: Hypothesis, most: int, *, forced: bool) -> list[tuple[Promise, bool]]:
-        """Return the promises worth judging, each with whether plain output error leads the way there."""
-        trial, noise = parent.judged.trial, parent.judged.noise
-        have = set(trial.names)
-        left = [e for e in self.catalogue if e.name not in have]
-        free_run = parent.plain or refine(trial.problem, trial.x, trial.weights)
-        found: list[tuple[Promise, bool]] = []
-        for at, weights, plain in ((free_run, free_run.weights, True), (trial, noise, False)):
-            ground = ground_of(at.problem, at.x, weights)
-            worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
-            promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
-            kept = promises if forced else [p for p in promises[:most] if ground.cost - p.cost > worth]
-            found += [(shortened(ground, p), plain) for p in kept]
-            if plain and len(have) == len(self.known):
-                found += [(self._shifted(ground, e), True) for e in left if shifts_time(e)]
-        return found
-
-    def _shifted(self, ground: Ground, effect: Effect) -> Promise:
-        """Return the promise of an effect that shifts time, each scan point after a few rounds of descent.
-
-        A model that misses a shift has bent all its numbers to make up for it: no first-order step sees past that, so
-        the base starts anew from the measurement shifted back.
-        """
-        tried = []
-        base = ground.problem.layout
-        for values in shared_points(ground, effect):
-            moved = [earlier(r, next(iter(values.values()))) for r in self.records]
-            x = ground.x.copy()
-            x[: base.shared] = start_vector(moved, base)[: base.shared]
-            problem, start = grown(ground.problem, x, effect, values)
-            found = descend(problem, start, ground.noise, rounds=SHIFT_ROUNDS, tolerance=1e-3)
-            tried.append(Promise(effect, found.cost, start, found.x, problem))
-        return min(tried, key=lambda p: p.cost)
+        for child in self._children(key)[:FREE_RUNS]:
+            if child.score > self.tried[key].score:
+                self.tried[frozenset(child.names)] = with_free_run(child, self.floor)
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""
@@ -240,21 +231,6 @@ class Search:
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""
         return sorted(self.tried.values(), key=lambda h: -h.score)
-
-
-def earlier(record: Record, late_s: float) -> Record:
-    """Return a record whose measurement is taken late_s seconds later, as if it had not been late."""
-    then = record.time + late_s
-
-    def moved(values: FloatArray, ok: BoolArray) -> FloatArray:
-        return np.interp(then, record.time[ok], values[ok]) if ok.any() else values
-
-    return replace(record, angle=moved(record.angle, record.angle_ok), rate=moved(record.rate, record.rate_ok))
-
-
-def shifts_time(effect: Effect) -> bool:
-    """Whether an effect moves command against measurement in time: a scanned coefficient in s outside the hull."""
-    return effect.stage is not Stage.HYDRODYNAMICS and any(c.unit == "s" and c.scan for c in effect.shared)
 
 
 def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tuple[Effect, ...], dict[str, str]]:

@@ -1,0 +1,85 @@
+"""Ways from a hypothesis to those with one effect more: which are worth going, and where each starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.trial import refine
+from fieldsid.fitting.descent import cost_of, descend
+from fieldsid.fitting.start import start_vector
+from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, shortened
+from fieldsid.logs.run import BoolArray, FloatArray
+from fieldsid.models.effect import Effect, Stage
+from fieldsid.models.record import Record
+
+GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
+"""Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
+SHIFTS, SHIFT_ROUNDS = 3, 12
+"""Shifts of time that are followed, and for how many rounds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A promise, the ground it was made on, and whether output error is to follow it before it is judged."""
+
+    promise: Promise
+    ground: Ground
+    plain: bool
+
+
+def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: bool) -> list[Way]:
+    """Return the ways worth going, the `most` best of two screens: the free run's error, and that whitened by its noise.
+
+    Every way to every effect where most is None. anew: the base itself may have bent its numbers, see `_shifted`.
+    """
+    trial = parent.judged.trial
+    free_run = parent.plain or refine(trial.problem, trial.x, trial.weights)
+    found: list[Way] = []
+    for at, weights, plain in ((free_run, free_run.weights, True), (trial, parent.judged.noise, False)):
+        ground = ground_of(at.problem, at.x, weights)
+        worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
+        promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
+        kept = promises if most is None else [p for p in promises[:most] if ground.cost - p.cost > worth]
+        found += [Way(shortened(ground, p), ground, plain) for p in kept]
+        if plain and anew:
+            found += [Way(_shifted(ground, e), ground, plain) for e in left if shifts_time(e)]
+    return found
+
+
+def _shifted(ground: Ground, effect: Effect) -> Promise:
+    """Return the promise of an effect that shifts time, the best scan points after a few rounds of descent.
+
+    A model that misses a shift has bent all its numbers to make up for it: no first-order step sees past that, so
+    the base starts anew from the measurement shifted back.
+    """
+    base, starts = ground.problem.layout, []
+    for values in shared_points(ground, effect):
+        moved = [earlier(r, next(iter(values.values()))) for r in ground.problem.records]
+        x = ground.x.copy()
+        x[: base.shared] = start_vector(moved, base)[: base.shared]
+        problem, start = grown(ground.problem, x, effect, values)
+        starts.append((cost_of(problem, start, ground.noise), problem, start))
+    tried = []
+    for _, problem, start in sorted(starts, key=lambda s: s[0])[:SHIFTS]:
+        found = descend(problem, start, ground.noise, rounds=SHIFT_ROUNDS, tolerance=1e-3)
+        tried.append(Promise(effect, found.cost, start, found.x, problem))
+    return min(tried, key=lambda p: p.cost)
+
+
+def earlier(record: Record, late_s: float) -> Record:
+    """Return a record whose measurement is taken late_s seconds later, as if it had not been late."""
+    then = record.time + late_s
+
+    def moved(values: FloatArray, ok: BoolArray) -> FloatArray:
+        return np.interp(then, record.time[ok], values[ok]) if ok.any() else values
+
+    return replace(record, angle=moved(record.angle, record.angle_ok), rate=moved(record.rate, record.rate_ok))
+
+
+def shifts_time(effect: Effect) -> bool:
+    """Whether an effect moves command against measurement in time: a scanned coefficient in s outside the hull."""
+    return effect.stage is not Stage.HYDRODYNAMICS and any(c.unit == "s" and c.scan for c in effect.shared)
