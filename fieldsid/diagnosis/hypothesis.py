@@ -14,6 +14,7 @@ import numpy as np
 
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
+from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.noise import estimate_noise, floor_of, log_likelihood
 from fieldsid.fitting.predict import frozen_problem, refit_own
 from fieldsid.fitting.problem import Problem
@@ -39,15 +40,20 @@ class Hypothesis:
     plain: Trial | None = None
 
     @property
+    def shown(self) -> Trial:
+        """The trial whose free run is shown."""
+        return self.plain or self.judged.trial
+
+    @property
     def model(self) -> Model:
-        """The model whose free run is shown."""
-        trial = self.plain or self.judged.trial
+        """Its model."""
+        trial = self.shown
         return bare_model(trial.problem, trial.x, self.judged.noise)
 
     @cached_property
     def errors(self) -> Pair:
         """Errors of the model on the runs it was fitted to and on the runs it was not, each run's own start at its best."""
-        return errors_under(self.plain or self.judged.trial, self.model, self.validation)
+        return errors_under(self.shown, self.model, self.validation)
 
     @property
     def own_model(self) -> Model:
@@ -97,7 +103,7 @@ def unseen_likelihood(judged: Judged, validation: Sequence[Record], shown: Seque
         return np.zeros(0)
     residuals = [left_over(p, x) for p, x in shown]
     dynamics = [(b.damping, b.stiffness) for b in (p.base_of(x, 0) for p, x in shown)]
-    noise, _ = estimate_noise(validation, dynamics, residuals, judged.family, judged.noise)
+    noise, _ = estimate_noise(validation, dynamics, residuals, judged.family, judged.noise, floor=judged.floor)
     vector = noise_vector(noise)
     return np.array(
         [log_likelihood(p.records, [d], [e], vector) for (p, _), d, e in zip(shown, dynamics, residuals, strict=True)]
@@ -117,15 +123,25 @@ def left_over(problem: Problem, x: FloatArray) -> FloatArray:
     return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in channels])
 
 
-def with_free_run(h: Hypothesis, floor: Noise) -> Hypothesis:
+def with_free_run(h: Hypothesis, floor: Noise, parent: Hypothesis | None = None, known: Sequence[Trial] = ()) -> Hypothesis:
     """Return the hypothesis with the free run of plain output error where that predicts unseen runs better.
 
-    Generalised least squares is efficient when the hypothesis is right and may lose the free run when it is not.
+    Generalised least squares is efficient when the hypothesis is right and may lose the free run when it is not. Its
+    numbers must not contradict what the parent's noise weighs most, as a gyro's scale that bends the rate of a free run
+    contradicts the heading. known are free runs found before.
     """
     trial = h.judged.trial
-    other = replace(h, plain=refine(trial.problem, trial.x, trial.weights))
+    free = [refine(trial.problem, trial.x, trial.weights), *known]
+    other = replace(h, plain=min(free, key=lambda t: t.weights.angle * t.weights.rate))
     old, new = (e.validation if h.validation else e.train for e in (h.errors, other.errors))
-    return other if new.over(floor) < old.over(floor) else h
+    if new.over(floor) >= old.over(floor) or (parent is not None and _contradicts(other, parent)):
+        return h
+    return other
+
+
+def _contradicts(h: Hypothesis, parent: Hypothesis) -> bool:
+    costs = (cost_of(t.problem, t.x, parent.judged.noise) for t in (h.shown, parent.shown))
+    return bool(next(costs) > next(costs))
 
 
 def errors_under(trial: Trial, model: Model, validation: Sequence[Record]) -> Pair:

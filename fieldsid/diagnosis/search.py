@@ -26,6 +26,9 @@ FREE_RUNS = 3
 PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
 """Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise. Of
 the base, of a hypothesis with effects, and of one that is only tried in another order."""
+TOLD = 0.01
+"""Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
+and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST = 4
@@ -38,6 +41,8 @@ LEARNED = 4.0
 """Log likelihood an addition must gain on the runs it is fitted to, or its numbers come from nowhere."""
 MATTERS = 0.97
 """Share the free-run error must fall to: significant is not important."""
+NO_WORSE = 1.03
+"""Error on unseen runs up to which two hypotheses predict alike."""
 MATTERS_MORE = 0.02
 """What a third and each further effect must bring beyond that: long explanations are the easier to find."""
 
@@ -55,7 +60,13 @@ class Search:
     tried: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     family: str = ""
     turned: bool = False
+    told: Noise = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
+        self.told = self.floor
     grown_from: set[frozenset[str]] = field(default_factory=set)
+    free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _text: None
 
     @property
@@ -69,7 +80,8 @@ class Search:
             self.report("base model")
             trial = min((self._base_trial(snapped=s) for s in self._laws()), key=lambda t: t.weights.angle * t.weights.rate)
             families = (self.family,) if self.family else NOISES
-            judged = max((judge(trial.problem, trial.x, self.floor, f) for f in families), key=lambda j: j.likelihood)
+            self.told = _at_least(self.floor, TOLD, trial.weights)
+            judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
@@ -132,10 +144,13 @@ class Search:
 
     def _go(self, parent: Hypothesis, way: Way) -> None:
         """Judge what a way leads to."""
-        promise = way.promise
+        promise, start = way.promise, way.promise.start
         self.report("+".join((*parent.names, promise.effect.name)))
-        start = refine(promise.problem, promise.start, parent.judged.trial.weights).x if way.plain else promise.start
-        child = judge(promise.problem, start, parent.judged.noise, self.family)
+        if way.plain:
+            free = refine(promise.problem, start, parent.judged.trial.weights)
+            self.free.setdefault(frozenset(free.names), []).append(free)
+            start = free.x
+        child = judge(promise.problem, start, parent.judged.noise, self.told, self.family)
         self._keep(child)
         self._try_twin(child, promise.effect)
 
@@ -145,7 +160,7 @@ class Search:
         start = twin_of(problem, x, effect)
         if start is None:
             return
-        twin = judge(problem, start, judged.noise, self.family)
+        twin = judge(problem, start, judged.noise, self.told, self.family)
         place = problem.layout.names.index(effect.coefficients[0].name)
         key = frozenset(judged.trial.names)
         if twin.likelihood > self.tried[key].judged.likelihood - TWINS and twin.trial.x[place] < x[place]:
@@ -157,7 +172,8 @@ class Search:
         """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
         for child in self._children(key)[:FREE_RUNS]:
             if child.score > self.tried[key].score:
-                self.tried[frozenset(child.names)] = with_free_run(child, self.floor)
+                name = frozenset(child.names)
+                self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""
@@ -182,12 +198,13 @@ class Search:
         wander for free.
         """
         other = next(f for f in NOISES if f != self.family)
-        trial = found.judged.trial
-        if self.turned or judge(trial.problem, trial.x, self.floor, other).likelihood < found.judged.likelihood + WORTH:
+        trial, known = found.judged.trial, found.judged.likelihood
+        if self.turned or judge(trial.problem, trial.x, self.floor, self.told, other).likelihood < known + WORTH:
             return False
         self.turned, self.family = True, other
         self.tried.clear()
         self.grown_from.clear()
+        self.free.clear()
         return True
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
@@ -203,7 +220,7 @@ class Search:
         return all(self.pays(self.tried[k], h) for k in self.tried if k < key)
 
     def _swapped(self, found: Hypothesis) -> Hypothesis:
-        """Drop each effect in turn and add the best other one; keep what scores higher."""
+        """Drop each effect in turn and add the best other one; keep what scores higher and predicts as well."""
         best = found
         for gone in found.effects[:-1]:
             if gone.name in self.known:
@@ -211,9 +228,10 @@ class Search:
             rest = frozenset(n for n in found.names if n != gone.name)
             if rest not in self.tried:
                 continue
-            for child in self.grow(self.tried[rest], most=PROMISING_INSTEAD)[:1]:
-                if len(child.effects) == len(found.effects) and child.score > best.score:
-                    best = child
+            children = self.grow(self.tried[rest], most=PROMISING_INSTEAD)
+            child = next((c for c in children if self.pays(self.tried[rest], c)), best)
+            if child.score > best.score and self.misfit(child) < NO_WORSE * self.misfit(best):
+                best = child
         return best
 
     def _pruned(self, found: Hypothesis) -> Hypothesis:
@@ -250,6 +268,11 @@ class Search:
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""
         return sorted(self.tried.values(), key=lambda h: -h.score)
+
+
+def _at_least(noise: Noise, share: float, errors: Noise) -> Noise:
+    """Return a white noise, raised to a share of the errors (both angle and rate)."""
+    return Noise(max(noise.angle, share * errors.angle), max(noise.rate, share * errors.rate))
 
 
 def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tuple[Effect, ...], dict[str, str]]:

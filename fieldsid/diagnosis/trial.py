@@ -59,6 +59,7 @@ class Judged:
     noise: Noise
     likelihood: float
     family: str
+    floor: Noise
 
 
 def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = REFINE_ROUNDS) -> Trial:
@@ -71,22 +72,25 @@ def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = RE
     return Trial(problem, found.x, new)
 
 
-def judge(problem: Problem, x: FloatArray, start: Noise, family: str = FAMILY) -> Judged:
-    """Return a hypothesis under the noise of highest likelihood, parameters and noise improved in turn from x."""
-    noise, likelihood = _noise_at(problem, x, start, family)
+def judge(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str = FAMILY) -> Judged:
+    """Return a hypothesis under the noise of highest likelihood, parameters and noise improved in turn from x.
+
+    floor is what the white part of the noise stays near.
+    """
+    noise, likelihood = _noise_at(problem, x, start, floor, family)
     for _ in range(ALTERNATIONS):
         found = descend(problem, x, noise, rounds=POLISH_ROUNDS, tolerance=FINE)
-        new_noise, new = _noise_at(problem, found.x, noise, family)
+        new_noise, new = _noise_at(problem, found.x, noise, floor, family)
         if not new > likelihood:
             break
         gained, x, noise, likelihood = new - likelihood, found.x, new_noise, new
         if gained < SETTLED:
             break
-    return Judged(Trial(problem, x, white_weights(problem, x)), noise, likelihood, family)
+    return Judged(Trial(problem, x, white_weights(problem, x)), noise, likelihood, family, floor)
 
 
-def _noise_at(problem: Problem, x: FloatArray, start: Noise, family: str) -> tuple[Noise, float]:
-    return estimate_noise(problem.records, dynamics_of(problem, x), residuals_of(problem, x), family, start)
+def _noise_at(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str) -> tuple[Noise, float]:
+    return estimate_noise(problem.records, dynamics_of(problem, x), residuals_of(problem, x), family, start, floor=floor)
 
 
 def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArray:

@@ -121,7 +121,7 @@ def base_from(work: Search, parent: Model) -> Hypothesis:
     for i, name in enumerate(layout.names):
         x[i] = given.get(name, x[i])
     start = refine(problem, x, base.judged.trial.weights)
-    again = judge(problem, start.x, base.judged.noise, work.family)
+    again = judge(problem, start.x, base.judged.noise, work.told, work.family)
     if again.likelihood > base.judged.likelihood + SAME:
         work.tried[work.root] = with_free_run(hypothesis_of(again, work.validation), work.floor)
     return work.base()

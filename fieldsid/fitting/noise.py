@@ -103,15 +103,17 @@ def estimate_noise(
     family: str,
     start: Noise,
     likelihood: Callable[[FloatArray], float] | None = None,
+    floor: Noise | None = None,
 ) -> tuple[Noise, float]:
     """Return the noise of a family with the highest likelihood, and that log likelihood.
 
     dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
-    noise vector (7,), is by default that of the residuals as they are. Fisher scoring on the logarithms of the noise's
+    noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
+    default what the signals show of it. Fisher scoring on the logarithms of the noise's
     numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the residuals' the information.
     """
     names = FAMILIES[family]
-    floor = floor_of(records)
+    floor = floor or floor_of(records)
     rough = _rough_start(records, dynamics, residuals, floor, start)
     off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
     low, high = _bounds(names, floor, _resolution(records))
