@@ -1,5 +1,6 @@
 """The trial of the tour: runs at three speeds to learn from and zig-zags to judge by, as the vehicle's own logger writes them.
 
+At the speed it was made for the plan is flown; at the other two the maneuver that excites what is hidden.
 The files are semicolon-separated text in degrees, with the logger's own column names: nothing the program knows beforehand.
 """
 
@@ -15,10 +16,12 @@ import numpy as np
 from fieldsid.artifacts import write_text
 from fieldsid.demo.vehicle import flown, training_maneuver
 from fieldsid.logs.run import FloatArray, Run
-from fieldsid.maneuvers import pick_maneuver
+from fieldsid.maneuvers import Schedule, pick_maneuver
 from fieldsid.models.model import Model
+from fieldsid.planning.leg import Leg
 
 TRAIN_SPEEDS = (1.0, 1.4, 1.8)
+PLANNED_SPEED = 1.4
 CHECK_SPEEDS = (1.2, 1.6)
 SEED = 1848
 
@@ -50,13 +53,20 @@ class Trial:
     check: tuple[Path, ...]
 
 
-def make_trial(model: Model, folder: Path, *, force: bool = False) -> Trial:
-    """Fly the trial with a vehicle and write its logs; raises ArtifactError where a file exists."""
-    lesson = training_maneuver(model)
-    train = [(f"learn_{u:.1f}", flown(model, lesson, u, SEED + i)) for i, u in enumerate(TRAIN_SPEEDS)]
+def make_trial(model: Model, folder: Path, leg: Leg, *, force: bool = False) -> Trial:
+    """Fly the trial with a vehicle, one run as the plan's leg says, and write its logs; raises ArtifactError where one exists."""
     zigzag = pick_maneuver("zigzag")
+    train = [(f"learn_{u:.1f}", _lesson(model, u, SEED + i, leg)) for i, u in enumerate(TRAIN_SPEEDS)]
     check = [(f"zigzag_{u:.1f}", flown(model, zigzag, u, SEED + 10 + i)) for i, u in enumerate(CHECK_SPEEDS)]
     return Trial(tuple(_save(train, folder, force=force)), tuple(_save(check, folder, force=force)))
+
+
+def _lesson(model: Model, speed: float, seed: int, leg: Leg) -> Run:
+    if speed != leg.speed:
+        return flown(model, training_maneuver(model), speed, seed)
+    window, candidate = leg.window, leg.candidate
+    schedule = Schedule(window.rate_hz, window.lead, window.recover)
+    return flown(model, candidate.record, speed, seed, schedule=schedule, **candidate.parameters)
 
 
 def _save(runs: list[tuple[str, Run]], folder: Path, *, force: bool) -> Iterator[Path]:

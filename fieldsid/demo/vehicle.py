@@ -16,7 +16,7 @@ from fieldsid.effects import all_effects, pick_effect
 from fieldsid.errors import UsageError
 from fieldsid.fitting.fit import fit
 from fieldsid.logs.run import FloatArray, Run
-from fieldsid.maneuvers import Limits, Maneuver, all_maneuvers
+from fieldsid.maneuvers import Limits, Maneuver, Schedule, all_maneuvers
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -113,11 +113,16 @@ def training_maneuver(model: Model) -> Maneuver:
     return known[PULSES if PULSES in wanted else next((n for n in wanted if n in known), PULSES)]
 
 
-def flown(model: Model, maneuver: Maneuver, speed: float, seed: int, **parameters: float) -> Run:
+def flown(
+    model: Model, maneuver: Maneuver, speed: float, seed: int, *, schedule: Schedule | None = None, **parameters: float
+) -> Run:
     """Return a maneuver flown by the vehicle at a speed in m/s, measured with its sensors' noise."""
     effects = tuple(pick_effect(n) for n in model.effects)
     values = maneuver.checked(parameters)
-    run = rehearse(model, maneuver, values, speed=speed, limits=LIMITS, helpers=lambda time: helpers(effects, time, speed))
+    run = rehearse(
+        model, maneuver, values,
+        speed=speed, limits=LIMITS, schedule=schedule, helpers=lambda time: helpers(effects, time, speed),
+    )  # fmt: skip
     surge = run["surge_m_s"] + np.random.default_rng(1000 + seed).normal(0.0, SPEED_NOISE, len(run))
     return with_noise(replace(run, signals={**run.signals, "surge_m_s": surge}), model, seed)
 
