@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.demo.steps import Step
-    from fieldsid.models.model import Model
+    from fieldsid.demo.trial import Trial
     from fieldsid.planning.leg import Leg
 
 HIDDEN = "servo_lag"
@@ -56,8 +56,8 @@ def command(
     _told(OPENING, quiet=as_json)
     done = [_taken(1, PLAN, known, force=force, quiet=as_json)]
     (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
-    make_trial(vehicle, folder / "trial", leg, force=force)
-    _told(_flown(vehicle, folder, leg), quiet=as_json)
+    trial = make_trial(vehicle, folder / "trial", leg, force=force)
+    _told(_flown(trial, folder, leg), quiet=as_json)
     for step in (s for s in STEPS if vehicle.axis in s.axes):
         if step.possible(known):
             done.append(_taken(len(done) + 1, step, known, force=force, quiet=as_json))
@@ -123,15 +123,14 @@ def _told(text: str, *, quiet: bool) -> None:
         sys.stdout.flush()
 
 
-def _flown(vehicle: Model, folder: Path, leg: Leg) -> str:
+def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
     from fieldsid.demo.trial import CHECK_SPEEDS, TRAIN_SPEEDS
-    from fieldsid.demo.vehicle import training_maneuver
 
     others = " and ".join(f"{u:.1f}" for u in TRAIN_SPEEDS if u != leg.speed)
     judging = " and ".join(f"{u:.1f}" for u in CHECK_SPEEDS)
     return (
-        f"The vehicle flies it at {leg.speed:.1f} m/s and {training_maneuver(vehicle).name} at {others} m/s, to learn from, then "
-        f"a zigzag at {judging} m/s, to judge by. Its logs are in {folder}/trial."
+        f"The vehicle flies it at {leg.speed:.1f} m/s and {trial.learning} at {others} m/s, to learn from, then "
+        f"{trial.judging} at {judging} m/s, to judge by. Its logs are in {folder}/trial."
     )
 
 

@@ -21,7 +21,7 @@ from fieldsid.rounding import number, with_error
 
 Result = Mapping[str, Any]
 NEAR_NOISE = 1.15
-CHECKED = " ".join(f"--validate {{runs}}/zigzag_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
+CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
 """The runs that judge; the option stands before each, as a shell gives only the first of a pattern's files to an option."""
 
 
@@ -176,8 +176,8 @@ def _refitted(result: Result) -> str:
     said = {f["run"]: f"{100 * _relative(f['parameters'][name]):.1f} %" for f in result["fits"] if f["run"].startswith("learn")}
     planned = said.pop(f"learn_{PLANNED_SPEED:.1f}")
     return (
-        f"With the effect in the model every run may be fitted, zig-zags too, which gives two more speeds. The planned run tells "
-        f"{name} to {planned}, the other two to {' and '.join(said.values())}. " + _verdict(left)
+        "With the effect in the model every run may be fitted, those that judged too, which gives two more speeds. The planned "
+        f"run tells {name} to {planned}, the other two to {' and '.join(said.values())}. " + _verdict(left)
     )
 
 
@@ -202,7 +202,7 @@ def _turned(result: Result) -> str:
     return (
         f"The tightest turn is {number(tightest['radius_m'], 3)} m at {number(tightest['speed_m_s'], 2)} m/s "
         f"to {tightest['side']}, 95 % between {number(low, 3)} and {number(high, 3)} m, and it is {tightest['trust']}: "
-        "pulses and zig-zags never show a settled turn, and a wide band says so."
+        "what was flown may never show a settled turn, and a wide band says so."
     )
 
 
@@ -257,7 +257,7 @@ STEPS: tuple[Step, ...] = (
     Step("One model for all speeds", "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
     Step(
         "Does it hold on runs it has not seen?",
-        "compare {models}/joint_{axis}.yaml {runs}/zigzag_*.parquet -o {models}",
+        "compare {models}/joint_{axis}.yaml {runs}/check_*.parquet -o {models}",
         _compared,
     ),
     Step(
@@ -273,7 +273,7 @@ STEPS: tuple[Step, ...] = (
         learns=_grown,
     ),
     Step("How did this model come about?", "history {extended} --figure {models}/history.png", _remembered),
-    Step("Does it hold now?", "compare {extended} {runs}/zigzag_*.parquet -o {final}", _held),
+    Step("Does it hold now?", "compare {extended} {runs}/check_*.parquet -o {final}", _held),
     Step(
         "A better model for each speed",
         "identify {runs}/*.parquet --axis {axis} --effects {effects} -o {final}/speeds --no-figures",

@@ -17,6 +17,7 @@ from fieldsid.demo.steps import PLAN, STEPS, Step
 from fieldsid.demo.trial import PLANNED_SPEED
 from fieldsid.demo.vehicle import SPEED_NOISE
 from fieldsid.logs import load_run
+from fieldsid.maneuvers import pick_maneuver
 from fieldsid.planning.leg import commands_of
 from fieldsid.planning.plan_file import load_plan
 
@@ -99,6 +100,15 @@ def test_an_undecided_search_that_names_nothing_adds_nothing():
 
 def test_the_textbook_model_leaves_more_than_the_noise_on_the_tour(run_cli, tmp_path):
     assert vehicle.misfit(vehicle.hidden_vehicle(demo.HIDDEN)) > vehicle.VISIBLE
+
+
+def test_runs_that_judge_show_what_is_hidden():
+    seen = vehicle.hidden_vehicle(demo.HIDDEN)
+    assert vehicle.judging_maneuver(seen).name == "zigzag"
+    # A zigzag of ten degrees hardly turns through the compass: what goes by heading does not show on it.
+    by_heading = vehicle.hidden_vehicle("compass_deviation")
+    assert vehicle.misfit(by_heading, pick_maneuver("zigzag")) < vehicle.SEEN
+    assert vehicle.judging_maneuver(by_heading).name == "turning_circle"
 
 
 def test_a_folder_with_files_is_not_touched(run_cli, tmp_path):
