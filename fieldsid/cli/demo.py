@@ -22,9 +22,16 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.demo.steps import Step
+    from fieldsid.demo.trial import Trial
+    from fieldsid.planning.leg import Leg
 
 HIDDEN = "servo_lag"
 FOLDER = "sysid-demo"
+
+OPENING = (
+    "A small vehicle waits on deck. Its dynamics hold one effect more than the textbook's model; the commands below do not know "
+    "which. The first one asks what to fly."
+)
 
 EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The effect to hide: see `sysid effects list`.")]
 
@@ -34,21 +41,23 @@ def command(
 ) -> Mapping[str, Any]:
     """Take a tour: every command as you would type it, with its result and what it means.
 
-    The program flies a trial with a vehicle whose dynamics hold one effect more than the textbook's, writes the logs, and works
-    on them like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
+    The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
+    textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
     """
-    from fieldsid.demo.steps import STEPS, places
+    from fieldsid.demo.steps import PLAN, STEPS, places
     from fieldsid.demo.trial import make_trial
-    from fieldsid.demo.vehicle import hidden_vehicle, training_maneuver
+    from fieldsid.demo.vehicle import hidden_vehicle
+    from fieldsid.planning.plan_file import load_plan
 
     began = perf_counter()
     folder = _folder(output, force=force)
     vehicle = hidden_vehicle(effect)
-    make_trial(vehicle, folder / "trial", force=force)
     known = dict(places(folder, vehicle.axis))
-    if not as_json:
-        sys.stdout.write(_opening(folder, training_maneuver(vehicle).name))
-    done: list[dict[str, Any]] = []
+    _told(OPENING, quiet=as_json)
+    done = [_taken(1, PLAN, known, force=force, quiet=as_json)]
+    (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
+    trial = make_trial(vehicle, folder / "trial", leg, force=force)
+    _told(_flown(trial, folder, leg), quiet=as_json)
     for step in (s for s in STEPS if vehicle.axis in s.axes):
         if step.possible(known):
             done.append(_taken(len(done) + 1, step, known, force=force, quiet=as_json))
@@ -108,13 +117,21 @@ def _aloud() -> Iterator[None]:
     sys.stderr.flush()
 
 
-def _opening(folder: Path, maneuver: str) -> str:
-    text = (
-        f"A small vehicle has flown the maneuver {maneuver} at three speeds, to learn from, and zigzag at two others, to judge "
-        f"by. Its logs are in {folder}/trial. Its dynamics hold one effect more than the textbook's model; the commands below "
-        "do not know which."
+def _told(text: str, *, quiet: bool) -> None:
+    if not quiet:
+        sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n")
+        sys.stdout.flush()
+
+
+def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
+    from fieldsid.demo.trial import CHECK_SPEEDS, TRAIN_SPEEDS
+
+    others = " and ".join(f"{u:.1f}" for u in TRAIN_SPEEDS if u != leg.speed)
+    judging = " and ".join(f"{u:.1f}" for u in CHECK_SPEEDS)
+    return (
+        f"The vehicle flies it at {leg.speed:.1f} m/s and {trial.learning} at {others} m/s, to learn from, then "
+        f"{trial.judging} at {judging} m/s, to judge by. Its logs are in {folder}/trial."
     )
-    return fill(text, WIDTH, break_on_hyphens=False) + "\n"
 
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:

@@ -1,5 +1,6 @@
 """The steps of the tour: each a command as a user would type it, and what its result means, in words with its numbers.
 
+PLAN comes before the vehicle swims, STEPS are what is done with its logs.
 A line is a template over the names of `places` and over what earlier steps have learned; a word with `*` stands for the
 files it matches. A step whose line needs what nobody has learned is left out. A later step is one more entry in STEPS.
 """
@@ -12,13 +13,15 @@ from pathlib import Path
 from string import Formatter
 from typing import Any
 
-from fieldsid.demo.trial import CHECK_SPEEDS
+from fieldsid.demo.trial import CHECK_SPEEDS, PLANNED_SPEED
+from fieldsid.demo.vehicle import LIMITS
+from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.rounding import number, with_error
 
 Result = Mapping[str, Any]
 NEAR_NOISE = 1.15
-CHECKED = " ".join(f"--validate {{runs}}/zigzag_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
+CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
 """The runs that judge; the option stands before each, as a shell gives only the first of a pattern's files to an option."""
 
 
@@ -43,6 +46,7 @@ class Step:
 def places(folder: Path, axis: str) -> dict[str, str]:
     """Return what the lines' templates stand for."""
     return {
+        "plan": str(folder / "plan"),
         "trial": str(folder / "trial"),
         "mapping": str(folder / "mapping.yaml"),
         "runs": str(folder / "runs"),
@@ -66,6 +70,22 @@ def expanded(words: Sequence[str]) -> list[str]:
         matches = sorted(str(p) for p in Path(word).parent.glob(Path(word).name)) if "*" in word else []
         out += matches or [word]
     return out
+
+
+def _planned(result: Result) -> str:
+    leg = result["legs"][0]
+    window = leg["window"]
+    seconds = window["length_s"] - window["lead_s"] - window["recover_s"]
+    bought = [e | {"name": name} for name, e in leg["expected"].items() if e["relative"] and e["baseline"]]
+    errors = ", ".join(f"{e['name']} to {100 * e['relative']:.1f} %" for e in bought)
+    hardest = max(bought, key=lambda e: (e["baseline"] / e["std_error"]) ** 2)
+    figure = next(f for f in result["files"] if f.endswith(".png"))
+    return (
+        f"{seconds:.0f} s of the maneuver {leg['maneuver']}, in which {pick_maneuver(leg['maneuver']).says}, are expected to buy "
+        f"{errors}. For the same error of {hardest['name']} the usual pulses would take "
+        f"{(hardest['baseline'] / hardest['std_error']) ** 2:.1f} times as long. {figure} shows the fin, the angle expected "
+        "inside its limits, and the track; the CSV beside it is what the vehicle is sent."
+    )
 
 
 def _inspected(result: Result) -> str:
@@ -152,7 +172,17 @@ def _held(result: Result) -> str:
 
 def _refitted(result: Result) -> str:
     left = max(_over_noise(f, f["noise_floor"]) for f in result["fits"])
-    return "With the effect in the model every run may be fitted, zig-zags too, which gives two more speeds. " + _verdict(left)
+    name = next(iter(result["fits"][0]["parameters"]))
+    said = {f["run"]: f"{100 * _relative(f['parameters'][name]):.1f} %" for f in result["fits"] if f["run"].startswith("learn")}
+    planned = said.pop(f"learn_{PLANNED_SPEED:.1f}")
+    return (
+        "With the effect in the model every run may be fitted, those that judged too, which gives two more speeds. The planned "
+        f"run tells {name} to {planned}, the other two to {' and '.join(said.values())}. " + _verdict(left)
+    )
+
+
+def _relative(parameter: Result) -> float:
+    return abs(float(parameter["std_error"]) / float(parameter["value"]))
 
 
 def _replaced(result: Result) -> Mapping[str, str]:
@@ -172,7 +202,7 @@ def _turned(result: Result) -> str:
     return (
         f"The tightest turn is {number(tightest['radius_m'], 3)} m at {number(tightest['speed_m_s'], 2)} m/s "
         f"to {tightest['side']}, 95 % between {number(low, 3)} and {number(high, 3)} m, and it is {tightest['trust']}: "
-        "pulses and zig-zags never show a settled turn, and a wide band says so."
+        "what was flown may never show a settled turn, and a wide band says so."
     )
 
 
@@ -215,6 +245,11 @@ def _verdict(ratio: float) -> str:
     return f"What is left is {ratio:.1f} x the sensors' noise: the model's form, not its numbers, lacks something."
 
 
+PLAN = Step(
+    "What to fly?",
+    f"plan --axis {{axis}} --speeds {PLANNED_SPEED} --fin-rate {LIMITS.fin_rate:g} --write csv -o {{plan}}",
+    _planned,
+)
 STEPS: tuple[Step, ...] = (
     Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", _inspected),
     Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _imported),
@@ -222,7 +257,7 @@ STEPS: tuple[Step, ...] = (
     Step("One model for all speeds", "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
     Step(
         "Does it hold on runs it has not seen?",
-        "compare {models}/joint_{axis}.yaml {runs}/zigzag_*.parquet -o {models}",
+        "compare {models}/joint_{axis}.yaml {runs}/check_*.parquet -o {models}",
         _compared,
     ),
     Step(
@@ -238,7 +273,7 @@ STEPS: tuple[Step, ...] = (
         learns=_grown,
     ),
     Step("How did this model come about?", "history {extended} --figure {models}/history.png", _remembered),
-    Step("Does it hold now?", "compare {extended} {runs}/zigzag_*.parquet -o {final}", _held),
+    Step("Does it hold now?", "compare {extended} {runs}/check_*.parquet -o {final}", _held),
     Step(
         "A better model for each speed",
         "identify {runs}/*.parquet --axis {axis} --effects {effects} -o {final}/speeds --no-figures",

@@ -1,5 +1,6 @@
-"""The trial of the tour: runs at three speeds to learn from and zig-zags to judge by, as the vehicle's own logger writes them.
+"""The trial of the tour: runs at three speeds to learn from and two to judge by, as the vehicle's own logger writes them.
 
+At the speed it was made for the plan is flown; at the other two the maneuver that excites what is hidden.
 The files are semicolon-separated text in degrees, with the logger's own column names: nothing the program knows beforehand.
 """
 
@@ -13,12 +14,14 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.artifacts import write_text
-from fieldsid.demo.vehicle import flown, training_maneuver
+from fieldsid.demo.vehicle import flown, judging_maneuver, training_maneuver
 from fieldsid.logs.run import FloatArray, Run
-from fieldsid.maneuvers import pick_maneuver
+from fieldsid.maneuvers import Maneuver, Schedule
 from fieldsid.models.model import Model
+from fieldsid.planning.leg import Leg
 
 TRAIN_SPEEDS = (1.0, 1.4, 1.8)
+PLANNED_SPEED = 1.4
 CHECK_SPEEDS = (1.2, 1.6)
 SEED = 1848
 
@@ -44,19 +47,30 @@ WRAPPED = "yaw_rad"
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """The files of a trial: to learn from, and to judge by."""
+    """The files of a trial, to learn from and to judge by, and the maneuvers flown besides the planned one."""
 
     train: tuple[Path, ...]
     check: tuple[Path, ...]
+    learning: str
+    judging: str
 
 
-def make_trial(model: Model, folder: Path, *, force: bool = False) -> Trial:
-    """Fly the trial with a vehicle and write its logs; raises ArtifactError where a file exists."""
-    lesson = training_maneuver(model)
-    train = [(f"learn_{u:.1f}", flown(model, lesson, u, SEED + i)) for i, u in enumerate(TRAIN_SPEEDS)]
-    zigzag = pick_maneuver("zigzag")
-    check = [(f"zigzag_{u:.1f}", flown(model, zigzag, u, SEED + 10 + i)) for i, u in enumerate(CHECK_SPEEDS)]
-    return Trial(tuple(_save(train, folder, force=force)), tuple(_save(check, folder, force=force)))
+def make_trial(model: Model, folder: Path, leg: Leg, *, force: bool = False) -> Trial:
+    """Fly the trial with a vehicle, one run as the plan's leg says, and write its logs; raises ArtifactError where one exists."""
+    judging = judging_maneuver(model)
+    learning = training_maneuver(model)
+    train = [(f"learn_{u:.1f}", _lesson(model, learning, u, SEED + i, leg)) for i, u in enumerate(TRAIN_SPEEDS)]
+    check = [(f"check_{u:.1f}", flown(model, judging, u, SEED + 10 + i)) for i, u in enumerate(CHECK_SPEEDS)]
+    learned, judged = (tuple(_save(runs, folder, force=force)) for runs in (train, check))
+    return Trial(learned, judged, learning.name, judging.name)
+
+
+def _lesson(model: Model, maneuver: Maneuver, speed: float, seed: int, leg: Leg) -> Run:
+    if speed != leg.speed:
+        return flown(model, maneuver, speed, seed)
+    window, candidate = leg.window, leg.candidate
+    schedule = Schedule(window.rate_hz, window.lead, window.recover)
+    return flown(model, candidate.record, speed, seed, schedule=schedule, **candidate.parameters)
 
 
 def _save(runs: list[tuple[str, Run]], folder: Path, *, force: bool) -> Iterator[Path]:

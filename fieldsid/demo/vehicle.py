@@ -16,7 +16,7 @@ from fieldsid.effects import all_effects, pick_effect
 from fieldsid.errors import UsageError
 from fieldsid.fitting.fit import fit
 from fieldsid.logs.run import FloatArray, Run
-from fieldsid.maneuvers import Limits, Maneuver, all_maneuvers
+from fieldsid.maneuvers import Limits, Maneuver, Schedule, all_maneuvers
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -26,7 +26,7 @@ from fieldsid.planning.rehearse import rehearse, with_noise
 
 SPEED = 1.4
 SPEED_NOISE = 0.02
-PULSES = "square_pulses"
+PULSES, ZIGZAG = "square_pulses", "zigzag"
 LIMITS = Limits(0.35, 1.5)
 NOISE = Noise(angle=np.radians(0.3), rate=np.radians(0.2))
 BASE = {
@@ -42,8 +42,9 @@ STRENGTHS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     }
 )
 """Strengths chosen by hand; every other effect's follows from its declaration."""
-VISIBLE = 2.0
-"""Rms residual of the fitted textbook model, over the sensor's noise, from which on the effect counts as visible."""
+VISIBLE, SEEN = 2.0, 1.3
+"""Rms residual of the fitted textbook model, over the sensor's noise, from which on the effect counts as visible on the
+maneuver to learn from, and as seen at all on the one to judge by."""
 SEED = 5
 
 
@@ -113,17 +114,31 @@ def training_maneuver(model: Model) -> Maneuver:
     return known[PULSES if PULSES in wanted else next((n for n in wanted if n in known), PULSES)]
 
 
-def flown(model: Model, maneuver: Maneuver, speed: float, seed: int, **parameters: float) -> Run:
+def flown(
+    model: Model, maneuver: Maneuver, speed: float, seed: int, *, schedule: Schedule | None = None, **parameters: float
+) -> Run:
     """Return a maneuver flown by the vehicle at a speed in m/s, measured with its sensors' noise."""
     effects = tuple(pick_effect(n) for n in model.effects)
     values = maneuver.checked(parameters)
-    run = rehearse(model, maneuver, values, speed=speed, limits=LIMITS, helpers=lambda time: helpers(effects, time, speed))
+    run = rehearse(
+        model, maneuver, values,
+        speed=speed, limits=LIMITS, schedule=schedule, helpers=lambda time: helpers(effects, time, speed),
+    )  # fmt: skip
     surge = run["surge_m_s"] + np.random.default_rng(1000 + seed).normal(0.0, SPEED_NOISE, len(run))
     return with_noise(replace(run, signals={**run.signals, "surge_m_s": surge}), model, seed)
 
 
-def misfit(model: Model) -> float:
-    """Return the residual over the noise, of angle or rate, that the textbook's model leaves of a model's motion."""
-    record = record_of(flown(model, training_maneuver(model), SPEED, SEED), model.axis)
+def judging_maneuver(model: Model) -> Maneuver:
+    """Return a zigzag where the hidden effect shows on it, else the maneuver that excites the effect."""
+    zigzag = all_maneuvers()[ZIGZAG]
+    return zigzag if misfit(model, zigzag) >= SEEN else training_maneuver(model)
+
+
+def misfit(model: Model, maneuver: Maneuver | None = None) -> float:
+    """Return the residual over the noise, of angle or rate, that the textbook's model leaves of a model's motion.
+
+    The motion is that of the training maneuver if none is given.
+    """
+    record = record_of(flown(model, maneuver or training_maneuver(model), SPEED, SEED), model.axis)
     left = fit([record], model.axis, method="output_error").predictions[0].residual
     return float(np.max(np.sqrt(np.mean(left**2, axis=1)) / (NOISE.angle, NOISE.rate)))

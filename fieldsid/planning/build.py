@@ -20,7 +20,7 @@ from fieldsid.planning.leg import Expected, Leg, turn_back_s
 from fieldsid.planning.prior import draws_of, scales_of
 from fieldsid.planning.rule_flight import fly_scenes
 from fieldsid.planning.scene import scene_of
-from fieldsid.planning.tune import Effort, Scored, as_switched, catalogue, switching
+from fieldsid.planning.tune import Effort, Scored, as_switched, catalogue, largest_paying, switching
 
 SURE, SURE_SHARE = 0.7, 0.75
 """A plan aims at these parts of the accepted probability, so that other draws of the prior keep to it as well."""
@@ -147,8 +147,8 @@ def values_at(judge: Judge) -> dict[str, float]:
 
 
 def _known_again(judge: Judge, known: Sequence[Candidate]) -> list[Scored]:
-    """Return maneuvers that were best elsewhere, times stretched to this speed's damping, scored here."""
-    return sorted((Scored(c, judge.cost(c)) for c in known if fits(c, judge.window)), key=lambda s: s.cost)
+    """Return maneuvers that were best elsewhere, each at the angle that pays here, best first."""
+    return sorted((largest_paying(judge, c) for c in known if fits(c, judge.window)), key=lambda s: s.cost)
 
 
 def kept_inside(judge: Judge, setting: Setting, crowd: Crowd, candidate: Candidate) -> Candidate | None:

@@ -75,6 +75,16 @@ class Candidate:
         """Return the candidate with some parameters changed; raises UsageError when they are out of bounds."""
         return replace(self, parameters=self.record.checked({**self.parameters, **changes}))
 
+    def stretched(self, factor: float) -> Candidate:
+        """Return the candidate with every time it may choose multiplied by a factor, frequencies divided, inside their bounds."""
+        powers = {"s": factor, "Hz": 1.0 / factor}
+        moved = {
+            p.name: float(np.clip(self.parameters[p.name] * powers[p.unit], p.low, p.high))
+            for p in self.record.parameters
+            if p.tuned and p.unit in powers
+        }
+        return self.with_(**moved)
+
 
 def asked_of(candidate: Candidate, window: Window) -> FloatArray:
     """Return the command an open-loop candidate asks for over a window, (n,) rad about trim, NaN for the autopilot."""

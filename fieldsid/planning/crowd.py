@@ -99,8 +99,8 @@ def closed_loop_all(
     out = np.empty((asked.shape[0], 3))
     for i in range(drive.shape[0]):
         closed_loop(steps, drive[i].copy(), c[i], pieces, asked, off[i], push[i], gains, limits[i], command[i], out)
-        angle[i] = out[:, 0]
-        rate[i] = out[:, 1]
+        for j in range(asked.shape[0]):
+            angle[i, j], rate[i, j] = out[j, 0], out[j, 1]
 
 
 def _open_loop(crowd: Crowd, asked: FloatArray, envelope: Envelope, autopilot: Autopilot) -> tuple[FloatArray, FloatArray]:

@@ -43,7 +43,7 @@ def closed_loop(
     state = np.zeros(3)
     pair = np.zeros((2, 3))
     last = 0.0
-    out[0] = state
+    out[0, 0], out[0, 1], out[0, 2] = 0.0, 0.0, 0.0
     for i in range(n):
         fin = asked[i]
         if np.isnan(fin):
@@ -62,8 +62,10 @@ def closed_loop(
         drive[i, 3] += push[i, 1] * end
         drive[i, 5] += push[i, 2] * 0.5 * (start + end)
         kernels.simulate(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
-        state[:] = pair[1]
-        out[i + 1] = state
+        # Number by number: an array put into another compiles its own error message, two seconds of it.
+        for l in range(3):
+            state[l] = pair[1, l]
+            out[i + 1, l] = pair[1, l]
 
 
 def respond(

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import parse_spec
-from fieldsid.models.axis import Axis
+from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.build import Setting, best_leg
 from fieldsid.planning.candidate import Candidate, Window
@@ -91,16 +91,21 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
 
 
 def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]:
-    """Return one leg per speed: the middle speed is searched from nothing, its neighbours from what was best there."""
+    """Return one leg per speed: the middle speed is searched from nothing, the others from what was best there.
+
+    What takes t s at one speed takes t times the ratio of the dampings at another: it is tried both ways.
+    """
     order = sorted(range(len(request.speeds)), key=lambda i: abs(request.speeds[i] - float(np.median(request.speeds))))
+    damping = {u: model.at_speed(u)[NAMES[model.axis].damping] for u in request.speeds}
     made: dict[int, Leg] = {}
-    known: tuple[Candidate, ...] = ()
+    best: list[Candidate] = []
     for i in order:
         speed = request.speeds[i]
-        leg = best_leg(_setting(model, request, speed), speed, known)
-        made[i] = leg
+        factor = damping[request.speeds[order[0]]] / damping[speed]
+        known = [*best, *(c.stretched(factor) for c in best if factor > 0)]
+        made[i] = best_leg(_setting(model, request, speed), speed, known)
         step()
-        known = known or tuple(_finalists(leg))
+        best = best or _finalists(made[i])
     return [made[i] for i in range(len(request.speeds))]
 
 

@@ -23,12 +23,14 @@ def advance_all(
     """Move states (m, 3) on by one interval: drive (m, 8) before the fin, push (m, 3), fin angles at both ends (m,)."""
     steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[1]))
     for i in range(state.shape[0]):
-        now[0] = drive[i]
+        for j in range(drive.shape[1]):
+            now[0, j] = drive[i, j]
         now[0, 2] += push[i, 0] * start[i]
         now[0, 3] += push[i, 1] * end[i]
         now[0, 5] += push[i, 2] * 0.5 * (start[i] + end[i])
         kernels.simulate(steps, now, c[i], state[i], pieces, pair)
-        state[i] = pair[1]
+        for j in range(3):
+            state[i, j] = pair[1, j]
 
 
 @dataclass(slots=True)

@@ -23,6 +23,9 @@ STRETCH = 1.35
 SHORTEST_HOLD_S = 0.25
 MIX, CROSS = 0.7, 0.8
 """Step of the coordinate search, as a factor; shortest hold; differential weight and crossover share."""
+SEARCH_MARGIN = 0.9
+"""Share of the envelope the search may use: some draws of the prior go further than its corners, and a signal that has to be
+made smaller for them afterwards is no longer the best."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +69,7 @@ def switching(judge: Judge, seeds: list[Candidate], effort: Effort, seed: int) -
         return Candidate("switched", {**base.defaults, **values, "amplitude": float(x[COUNT]) * limit})
 
     def cost(x: FloatArray) -> float:
-        return judge.cost(candidate(x), margin=0.97)
+        return judge.cost(candidate(x), margin=SEARCH_MARGIN)
 
     room = judge.window.excitation
     members = _population(judge, seeds, room, effort.members, rng)
@@ -81,7 +84,9 @@ def switching(judge: Judge, seeds: list[Candidate], effort: Effort, seed: int) -
 
 def tidied(holds: FloatArray, step: float) -> FloatArray:
     """Return holds in whole samples of `step` s; one too short for a servo to follow joins its two neighbours."""
-    left = [float(h) for h in np.round(holds / step) * step]
+    # Whole samples by the instants of the jumps, downwards: the sum never outgrows the room there is.
+    edges = np.floor(np.cumsum(holds) / step + 1e-6) * step
+    left = [float(h) for h in np.diff(edges, prepend=0.0)]
     while len(left) > 1 and min(left) < SHORTEST_HOLD_S:
         i = int(np.argmin(left))
         if i in (0, len(left) - 1):
@@ -89,7 +94,7 @@ def tidied(holds: FloatArray, step: float) -> FloatArray:
             del left[i]
         else:
             left[i - 1 : i + 2] = [sum(left[i - 1 : i + 2])]
-    return np.round(np.pad(left, (0, holds.size - len(left))), 6)
+    return np.round(np.pad(left, (0, holds.size - len(left))), 9)
 
 
 def _population(judge: Judge, seeds: list[Candidate], room: float, count: int, rng: np.random.Generator) -> FloatArray:
@@ -189,7 +194,7 @@ def _started(maneuver: Maneuver, judge: Judge) -> Candidate | None:
 
 
 def _coordinate_search(judge: Judge, start: Candidate, rounds: int) -> Scored:
-    best = _inside(judge, start)
+    best = largest_paying(judge, start)
     for _ in range(rounds):
         for parameter in start.record.parameters:
             if not parameter.tuned:
@@ -202,7 +207,7 @@ def _coordinate_search(judge: Judge, start: Candidate, rounds: int) -> Scored:
     return best
 
 
-def _inside(judge: Judge, candidate: Candidate) -> Scored:
+def largest_paying(judge: Judge, candidate: Candidate) -> Scored:
     """Return the candidate at the largest of a few amplitudes that pays."""
     amplitude = candidate.parameters["amplitude"]
     tried = [candidate.with_(amplitude=amplitude * share) for share in (1.0, 0.6, 0.35)]

@@ -7,12 +7,19 @@ from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fieldsid.cli import demo
 from fieldsid.cli.app import main
 from fieldsid.demo import steps, vehicle
-from fieldsid.demo.steps import STEPS, Step
+from fieldsid.demo.steps import PLAN, STEPS, Step
+from fieldsid.demo.trial import PLANNED_SPEED
+from fieldsid.demo.vehicle import SPEED_NOISE
+from fieldsid.logs import load_run
+from fieldsid.maneuvers import pick_maneuver
+from fieldsid.planning.leg import commands_of
+from fieldsid.planning.plan_file import load_plan
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +38,34 @@ def results_of(tour, command):
 
 def test_every_step_runs_and_leaves_files_and_figures(tour):
     assert tour["schema"] == "fieldsid/demo/1"
-    assert [s["command"].split()[1] for s in tour["steps"]] == [s.line.split()[0] for s in STEPS]
+    assert [s["command"].split()[1] for s in tour["steps"]] == [s.line.split()[0] for s in (PLAN, *STEPS)]
     assert all(s["means"] for s in tour["steps"])
     names = {Path(f).name for f in tour["files"]}
-    assert {"diagnosis.png", "history.png", "turn_radius.png", "gains.png", "heading_ros2.yaml"} <= names
+    assert {"plan.yaml", "plan.png", "diagnosis.png", "history.png", "turn_radius.png", "gains.png", "heading_ros2.yaml"} <= names
+
+
+def test_the_tour_begins_with_a_plan_that_says_what_it_buys_and_the_vehicle_flies_it(tour):
+    first = tour["steps"][0]
+    (leg,) = first["result"]["legs"]
+    assert leg["expected"]["a22"]["relative"] < 0.05
+    assert f"a22 to {100 * leg['expected']['a22']['relative']:.1f} %" in first["means"]
+    folder = Path(tour["folder"])
+    plan = load_plan(folder / "plan" / "plan.yaml")
+    run = load_run(folder / "runs" / f"learn_{PLANNED_SPEED:.1f}.parquet")
+    _, fin, autopilot = commands_of(plan.legs[0], plan.envelope)
+    about_trim = run["rudder_rad"] - run["rudder_rad"][0]
+    assert len(run) == fin.size
+    # the logger writes the fin to a thousandth of a degree
+    assert np.abs(about_trim - fin)[autopilot == 0].max() < 1e-4
+    assert run["surge_m_s"].mean() == pytest.approx(PLANNED_SPEED, abs=SPEED_NOISE)
+
+
+def test_the_planned_run_buys_what_the_plan_says_once_the_effect_is_in_the_model(tour):
+    promised = tour["steps"][0]["result"]["legs"][0]["expected"]["a22"]["relative"]
+    (fitted,) = (s["result"] for s in tour["steps"] if "/speeds" in s["command"] and s["command"].split()[1] == "identify")
+    (planned,) = (f for f in fitted["fits"] if f["run"] == f"learn_{PLANNED_SPEED:.1f}")
+    a22 = planned["parameters"]["a22"]
+    assert a22["std_error"] / a22["value"] <= promised
 
 
 def test_the_hidden_effect_is_named_and_its_strength_comes_back(tour):
@@ -69,6 +100,15 @@ def test_an_undecided_search_that_names_nothing_adds_nothing():
 
 def test_the_textbook_model_leaves_more_than_the_noise_on_the_tour(run_cli, tmp_path):
     assert vehicle.misfit(vehicle.hidden_vehicle(demo.HIDDEN)) > vehicle.VISIBLE
+
+
+def test_runs_that_judge_show_what_is_hidden():
+    seen = vehicle.hidden_vehicle(demo.HIDDEN)
+    assert vehicle.judging_maneuver(seen).name == "zigzag"
+    # A zigzag of ten degrees hardly turns through the compass: what goes by heading does not show on it.
+    by_heading = vehicle.hidden_vehicle("compass_deviation")
+    assert vehicle.misfit(by_heading, pick_maneuver("zigzag")) < vehicle.SEEN
+    assert vehicle.judging_maneuver(by_heading).name == "turning_circle"
 
 
 def test_a_folder_with_files_is_not_touched(run_cli, tmp_path):

@@ -125,6 +125,28 @@ def test_five_speeds_are_planned_in_twenty_seconds(axis):
     assert time.process_time() - began <= 20.0
 
 
+@pytest.mark.slow
+def test_a_speed_planned_among_others_is_planned_nearly_as_well_as_alone():
+    model, envelope = named_prior("torpedo", Axis.YAW), Envelope(FIN, heading=float(np.radians(60)))
+    speeds = (1.0, 1.4, 1.8)
+    together = make_plan(model, Request(Axis.YAW, speeds, envelope, {})).legs
+    for speed, leg in zip(speeds, together, strict=True):
+        alone = make_plan(model, Request(Axis.YAW, (speed,), envelope, {})).legs[0]
+        worst, reached = (max(e.relative for e in one.expected.values()) for one in (leg, alone))
+        # two runs of a random search differ by a tenth
+        assert worst <= 1.2 * reached, speed
+
+
+def test_a_maneuver_is_stretched_in_time_inside_the_bounds_of_its_parameters():
+    pulses = Candidate("square_pulses", parse_spec("square_pulses:amplitude=0.2,width=2,recovery=50")[1]).stretched(1.5)
+    assert pulses.parameters["width"] == pytest.approx(3.0)
+    assert pulses.parameters["recovery"] == 60.0
+    assert pulses.parameters["amplitude"] == 0.2
+    chirp = Candidate("chirp", parse_spec("chirp:amplitude=0.2,low_hz=0.1,high_hz=1.2,duration=20")[1]).stretched(2.0)
+    assert (chirp.parameters["low_hz"], chirp.parameters["high_hz"]) == pytest.approx((0.05, 0.6))
+    assert chirp.parameters["duration"] == 20.0
+
+
 def test_a_wish_is_bought_with_as_many_passes_as_it_needs():
     model = named_prior("torpedo", Axis.YAW)
     once = make_plan(model, Request(Axis.YAW, (1.4,), Envelope(FIN, heading=1.0), {})).legs[0]

@@ -14,6 +14,7 @@ from fieldsid.planning.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.prior import checked_prior, corner, draws_of, named_prior
 from fieldsid.planning.prior_file import load_believed
 from fieldsid.planning.quantities import parse_angle, parse_area, parse_band, parse_speeds
+from fieldsid.planning.tune import SHORTEST_HOLD_S, tidied
 from fieldsid.planning.wish import parse_wish, wish_text
 from fieldsid.templates import template_path
 
@@ -30,6 +31,15 @@ def test_areas_bands_and_speeds_are_read():
     assert parse_band("1:5.5") == (1.0, 5.5)
     assert parse_speeds("1.0,1.4,1.4,1.8") == (1.0, 1.4, 1.8)
     assert parse_speeds("1.0:1.8:0.4") == (1.0, 1.4, 1.8)
+
+
+@given(st.lists(st.floats(0.0, 6.0), min_size=16, max_size=16), st.sampled_from([5.0, 20.0, 30.0]))
+def test_holds_in_whole_samples_take_no_longer_than_those_they_come_from(holds, rate_hz):
+    tidy = tidied(np.array(holds), 1.0 / rate_hz)
+    assert tidy.size == len(holds)
+    assert tidy.sum() <= sum(holds) + 1e-6
+    assert np.allclose(tidy * rate_hz, np.round(tidy * rate_hz), atol=1e-6)
+    assert (tidy[tidy > 0][:-1] >= SHORTEST_HOLD_S - 1e-6).all() or np.count_nonzero(tidy) == 1
 
 
 @given(st.text(max_size=12))
