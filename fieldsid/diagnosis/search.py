@@ -65,6 +65,7 @@ class Search:
     def __post_init__(self) -> None:
         """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
         self.told = self.floor
+
     grown_from: set[frozenset[str]] = field(default_factory=set)
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _text: None

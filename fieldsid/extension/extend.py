@@ -19,8 +19,10 @@ from fieldsid.diagnosis.search import MATTERS, WORTH, Search, search, usable
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.effects import pick_effect
-from fieldsid.errors import DataError, UsageError
+from fieldsid.errors import DataError, ModelError, UsageError
+from fieldsid.fitting.between import said
 from fieldsid.fitting.fit import check
+from fieldsid.fitting.predict import predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -103,7 +105,20 @@ def extend(
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),
     )
-    return Extension(refitted_model(after), gain, after.score - before.score, notes)
+    model = refitted_model(after)
+    return Extension(model, gain, after.score - before.score, (*notes, *_times_between(model, judged)))
+
+
+def _times_between(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
+    """Return what the commands of runs were taken to have done between the samples."""
+    notes = []
+    for record in records:
+        try:
+            note = said(predict(model, record).record)
+        except ModelError:
+            continue
+        notes += [note] if note else []
+    return tuple(notes)
 
 
 def base_from(work: Search, parent: Model) -> Hypothesis:

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from fieldsid.errors import ModelError
+from fieldsid.fitting.between import jumps_of, timed
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.first_second import first_second
 from fieldsid.fitting.layout import Groups, Layout, Slot, layout_of
@@ -25,11 +26,17 @@ from fieldsid.models.simulate import effects_of
 
 OWN_ROUNDS, OWN = 15, 1e-6
 """Rounds for a run's own slots, and the share of the sum of squares a round must gain."""
+START_ROUNDS = 4
+"""Rounds for an initial state alone: the motion is nearly linear in it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances."""
+    """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances.
+
+    `as_logged` is the rms residual (rad, rad/s) with the command's jumps where the log shows them, None where the record
+    has them there.
+    """
 
     record: Record
     angle: FloatArray
@@ -37,6 +44,7 @@ class Prediction:
     fin: FloatArray
     state: tuple[float, float, float]
     nuisance: Mapping[str, float]
+    as_logged: tuple[float, float] | None = None
 
     @property
     def residual(self) -> FloatArray:
@@ -48,6 +56,7 @@ class Prediction:
 def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
     """Return a model's free run on a record; raises ModelError when it grows without bound."""
     problem, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
+    as_logged = None if problem.records[0] is record else _rms_as_logged(Problem((record,), problem.layout), x)
     x = refit_own(problem, x, 0, floor_of([record]))
     motion, _ = problem.simulate(x, 0)
     if not np.isfinite(motion.rate).all():
@@ -58,14 +67,18 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
             hint="the model is unstable there: identify again, or add quadratic damping: `--effects quadratic_damping`",
         )
     values = problem.values_of(x, 0)
-    fin = fin_path(record, problem.layout.effects, values)
+    fin = fin_path(problem.records[0], problem.layout.effects, values)
     nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
     state = (values["angle0"], values["rate0"], values.get("cross0", 0.0))
-    return Prediction(record, motion.angle, motion.rate, np.append(fin.start, fin.end[-1]), state, nuisance)
+    path = np.append(fin.start, fin.end[-1])
+    return Prediction(problem.records[0], motion.angle, motion.rate, path, state, nuisance, as_logged)
 
 
 def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
-    """Return a problem of one record whose shared slots hold the model's values at the record's speed."""
+    """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start.
+
+    Its command's jumps are timed between the samples where the log's own times do not do.
+    """
     names = NAMES[model.axis]
     layout = layout_of([record], model.axis, effects)
     groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),))
@@ -74,7 +87,30 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     scale = model.law.scale(record.speed)
     values = dict(model.values) | {names.authority: model.at_speed(record.speed)[names.authority] / scale**2}
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
-    return Problem((record,), layout), x
+    return with_times(Problem((record,), layout), x)
+
+
+def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
+    """Return the rms residual of a one-run problem, angle (rad) and rate (rad/s), NaN for a channel not measured."""
+    record = problem.records[0]
+    residual, _ = problem.residual(refit_own(problem, x, 0, floor_of([record])), 0)
+    masks = (record.angle_ok, record.rate_ok)
+    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else float("nan") for e, ok in zip(residual, masks, strict=True)]
+    return rms[0], rms[1]
+
+
+def with_times(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a one-run problem with its command's jumps timed, and a start for the run's own slots."""
+    record, layout = problem.records[0], problem.layout
+    if jumps_of(record).size < 2:
+        return problem, x
+    floor = floor_of([record])
+    if any(e.nuisance for e in layout.effects):
+        x = refit_own(problem, x, 0, floor)
+    else:
+        x = descend(problem, x, floor, free=layout.of_run(0), rounds=START_ROUNDS).x
+    better = timed(problem, x, floor)
+    return (problem if better is None else Problem((better,), problem.layout)), x
 
 
 def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatArray:

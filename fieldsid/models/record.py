@@ -40,6 +40,8 @@ class Record:
     rate_ok: npt.NDArray[np.bool_]
     signals: Mapping[str, FloatArray]
     speed: float
+    early: FloatArray | None = None
+    """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
 
@@ -52,9 +54,13 @@ class Record:
     @property
     def commanded(self) -> FinPath:
         """The fin as logged, as a path over the intervals."""
-        if self.fin_is_held:
+        if not self.fin_is_held:
+            return FinPath(self.fin[:-1], self.fin[1:])
+        if self.early is None:
             return FinPath(self.fin[:-1], self.fin[:-1])
-        return FinPath(self.fin[:-1], self.fin[1:])
+        return _jumping(
+            self.fin, np.clip(self.early[1:] / self.steps, 0.0, 1.0), np.clip(-self.early[:-1] / self.steps, 0.0, 1.0)
+        )
 
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""
@@ -63,11 +69,25 @@ class Record:
         return self.signals[role]
 
 
+def _jumping(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:
+    """Return the path of a held fin (n,) over intervals: exact mean, and straight within what it passes through.
+
+    In the last share `early` (n-1,) of an interval the next command holds already, in its first share `late` the one
+    before holds still.
+    """
+    change = np.diff(fin)
+    past = np.concatenate([[0.0], change[:-1]])
+    mean = fin[:-1] + change * early - past * late
+    half = change * np.minimum(early, 1.0 - early) + past * np.minimum(late, 1.0 - late)
+    return FinPath(mean - half, mean + half)
+
+
 def first_part(record: Record, samples: int) -> Record:
     """Return the first samples of a record, with the speed of the whole."""
     part = slice(0, samples)
+    early = None if record.early is None else record.early[part]
     arrays = {name: getattr(record, name)[part] for name in ("time", "fin", "angle", "rate", "angle_ok", "rate_ok")}
-    return replace(record, **arrays, signals=MappingProxyType({k: v[part] for k, v in record.signals.items()}))
+    return replace(record, **arrays, early=early, signals=MappingProxyType({k: v[part] for k, v in record.signals.items()}))
 
 
 def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:

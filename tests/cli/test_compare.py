@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import pytest
 from cli import trial
+from truth.logbook import flown, write_csv
+from truth.maneuvers import zigzag
+from truth.noise import Clock
+from truth.physics import Physics
 
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import save_model
 
 
 def test_the_model_that_made_a_run_is_down_to_its_noise(run_cli, tmp_path):
@@ -17,6 +22,21 @@ def test_the_model_that_made_a_run_is_down_to_its_noise(run_cli, tmp_path):
     assert 0.0 <= run["theil"] <= 1.0
     assert run["r2"] <= 1.0
     assert {"condition", "share_of_error", "rms_ratio", "t_start_s", "t_end_s"} <= set(run["where"][0])
+
+
+def test_what_a_log_rounds_between_its_samples_is_said_with_the_error_as_logged(run_cli, tmp_path):
+    fast = Clock(0.005, 8000)
+    log = flown(Physics(damping=1.1, authority=-1.2), fast, zigzag(fast.time, 0.26, 0.4), angle_noise=0.0004, rate_noise=0.0004)
+    rounded = write_csv({name: values[::20] for name, values in log.items() if name != "surge_m_s"}, tmp_path / "rounded.csv")
+    model = save_model(trial.vehicle(Axis.YAW, C0=0.0), tmp_path / "hull.yaml")
+    (run,) = run_cli("compare", model, rounded, "--json").json["runs"]
+    times = run["command_times"]
+    assert times["jumps"] >= 4
+    assert 0.0 < times["largest_s"] <= 0.1
+    assert run["rate_rms_rad_s"] < 0.5 * times["as_logged"]["rate_rms_rad_s"]
+    assert f"{times['jumps']} jumps of the command" in " ".join(run_cli("compare", model, rounded).out.split())
+    exact = run_cli("compare", trial.model_file(tmp_path), trial.flown(tmp_path, spec="zigzag"), "--json").json["runs"][0]
+    assert exact["command_times"] is None
 
 
 def test_one_figure_per_run_is_drawn_beside_each_other(run_cli, tmp_path):

@@ -38,3 +38,16 @@ def test_the_error_on_zigzags_falls_with_each_of_the_effects_that_are_there(run_
     errors = [line[1]["over_floor"]["before"], *(g["over_floor"]["after"] for g in line[1:])]
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 0.75 * errors[0]
+
+
+def test_zigzags_of_every_speed_are_predicted_down_to_the_noise_by_what_pulses_taught(run_cli, lauv, tmp_path):
+    speeds = ("1.00", "1.25", "1.50", "1.70", "1.90")
+    pulses, zigzags = ([lauv / f"{kind}_v{v}.csv.gz" for v in speeds] for kind in ("rudder", "zigzag"))
+    asked = ("--effects", "servo_lag,quadratic_damping,speed_varying", "--joint", "--no-figures", "-o", tmp_path)
+    (fit,) = run_cli("identify", *pulses, "--axis", "yaw", *asked, "--json").json["fits"]
+    runs = run_cli("compare", fit["model"], *zigzags, "--json").json["runs"]
+    assert [r["run"] for r in runs if r["rate_rms_rad_s"] > 1.3 * SENSOR_RATE] == []
+    timed = [r["command_times"] for r in runs if r["command_times"]]
+    assert len(timed) >= 3
+    assert all(t["as_logged"]["rate_rms_rad_s"] > 1.5 * SENSOR_RATE for t in timed)
+    assert all(t["command_times"] is None for t in run_cli("compare", fit["model"], *pulses, "--json").json["runs"])
