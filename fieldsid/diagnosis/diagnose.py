@@ -10,13 +10,14 @@ import numpy as np
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.advise import next_maneuver
+from fieldsid.diagnosis.freely import freely
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.records import Candidate, Diagnosis
 from fieldsid.diagnosis.refitted import refitted_model
 from fieldsid.diagnosis.remainder import remainder_of
 from fieldsid.diagnosis.search import Search, search, usable
 from fieldsid.diagnosis.split import held_back
-from fieldsid.diagnosis.verdict import Verdict, added, explained, probabilities, verdict_of
+from fieldsid.diagnosis.verdict import MOSTLY, Verdict, added, explained, probabilities, verdict_of
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects
 from fieldsid.errors import DataError, ModelError
@@ -57,6 +58,9 @@ def diagnose(
     found = work.best()
     left = remainder_of(found)
     verdict = verdict_of(work, found, left)
+    if verdict.word == "unexplained" and (other := freely(work)) is not None and explained(work, other) > MOSTLY:
+        found, left = other, remainder_of(other)
+        verdict = Verdict("effect", added(work, found))
     floor = shown_floor(work.floor, found.judged.noise)
     return _said(work, found, verdict, headline(work, verdict, found, left, floor), floor, skipped, notes)
 

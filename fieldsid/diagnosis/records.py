@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
+from math import isfinite, prod
 from typing import Any
 
 from fieldsid.logs.run import Note
@@ -27,6 +27,12 @@ class Errors:
             if isfinite(rms) and sigma > 0.0
         ]
         return float((sum(parts) / len(parts)) ** 0.5) if parts else float("nan")
+
+    @property
+    def mean(self) -> float:
+        """The geometric mean of both channels: the heading, where every error adds up, has no more say."""
+        known = [e for e in (self.angle_rms_rad, self.rate_rms_rad_s) if isfinite(e)]
+        return float(prod(known) ** (1.0 / len(known))) if known else float("inf")
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
@@ -253,10 +251,8 @@ class Search:
         return learned and with_.score - without.score > WORTH
 
     def misfit(self, h: Hypothesis) -> float:
-        """Return the geometric mean of both channels' errors: the heading, where every error adds up, has no more say."""
-        errors = h.errors.validation if self.validation else h.errors.train
-        known = [e for e in (errors.angle_rms_rad, errors.rate_rms_rad_s) if np.isfinite(e)]
-        return float(np.prod(known) ** (1.0 / len(known))) if known else float("inf")
+        """Return the mean error on unseen runs, on training runs where there are none."""
+        return (h.errors.validation if self.validation else h.errors.train).mean
 
     def error(self, h: Hypothesis) -> float:
         """Return the free-run error over the noise floor on unseen runs, on training runs where there are none."""

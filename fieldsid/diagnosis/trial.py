@@ -62,12 +62,12 @@ class Judged:
     floor: Noise
 
 
-def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = REFINE_ROUNDS) -> Trial:
+def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = REFINE_ROUNDS, tolerance: float = COARSE) -> Trial:
     """Return the output-error trial a start leads to, reweighted once by its own residuals."""
-    found = descend(problem, start, weights, rounds=rounds, tolerance=COARSE)
+    found = descend(problem, start, weights, rounds=rounds, tolerance=tolerance)
     new = white_weights(problem, found.x)
     if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) > 0.1:
-        found = descend(problem, found.x, new, rounds=rounds, tolerance=COARSE)
+        found = descend(problem, found.x, new, rounds=rounds, tolerance=tolerance)
         new = white_weights(problem, found.x)
     return Trial(problem, found.x, new)
 
