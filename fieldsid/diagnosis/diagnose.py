@@ -58,9 +58,9 @@ def diagnose(
     found = work.best()
     left = remainder_of(found)
     verdict = verdict_of(work, found, left)
-    if verdict.word == "unexplained" and (other := freely(work)) is not None and explained(work, other) > MOSTLY:
-        found, left = other, remainder_of(other)
-        verdict = Verdict("effect", added(work, found))
+    other = freely(work) if verdict.word == "unexplained" and work.is_noiseless else None
+    if other is not None and explained(work, other) > MOSTLY:
+        found, left, verdict = other, remainder_of(other), Verdict("effect", added(work, other))
     floor = shown_floor(work.floor, found.judged.noise)
     return _said(work, found, verdict, headline(work, verdict, found, left, floor), floor, skipped, notes)
 

@@ -73,6 +73,11 @@ class Search:
         """The effects of the base."""
         return frozenset(self.known)
 
+    @property
+    def is_noiseless(self) -> bool:
+        """Whether the logs show so little noise that the base errs by a hundred times it."""
+        return self.told != self.floor
+
     def base(self) -> Hypothesis:
         """Return the hypothesis of the known effects alone."""
         if self.root not in self.tried:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
@@ -39,17 +41,26 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "unexplained":
         return (
-            f"something is there that is not in the catalogue: error {base:.2f} x the noise floor, most of it in "
+            f"something is there that is not in the catalogue: error {_sized(search, search.base(), base)}, most of it in "
             f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
             f"it moves with {left.moves_with}"
         )
     names = " and ".join(verdict.effects)
     says = "; ".join(effect_named(n).says for n in verdict.effects)
-    fall = f"the error on {runs} falls from {base:.2f} to {error:.2f} x the noise floor"
+    fall = f"the error on {runs} falls from {_sized(search, search.base(), base)} to {_sized(search, found, error)}"
     if verdict.word == "undecided":
         others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
         return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
     return f"{names} ({says}): {fall}"
+
+
+def _sized(search: Search, h: Hypothesis, error: float) -> str:
+    """Return an error in words: over the noise floor, in its own units where the logs show next to no noise."""
+    if not search.is_noiseless:
+        return f"{error:.2f} x the noise floor"
+    errors = h.errors.validation if search.validation else h.errors.train
+    parts = [(errors.angle_rms_rad, "rad"), (errors.rate_rms_rad_s, "rad/s")]
+    return " and ".join(f"{value:.2g} {unit}" for value, unit in parts if isfinite(value))
 
 
 def _disturbed(h: Hypothesis) -> bool:
