@@ -255,7 +255,7 @@ class _Pushes:
         assembled = []
         for value in (high, low):
             shifted = self.values | {name: value}
-            arrays = assemble(self.record, layout.effects, self.base, shifted, self.scale)
+            arrays = assemble(self.record, layout.effects, self.base, shifted, self.scale, self.arrays.pieces)
             assembled.append(self._with_own_moment(arrays, shifted))
         d_drive = (assembled[0].drive - assembled[1].drive) / (high - low)
         d_c = (assembled[0].constants - assembled[1].constants) / (high - low)

@@ -71,8 +71,13 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
     return Terms(damping_factor, authority_factor, moment, damping, cross_factor)
 
 
-def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
-    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
+def assemble(
+    record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float, pieces: int | None = None
+) -> Assembled:
+    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed.
+
+    pieces per interval follow from the arrays where they are not given.
+    """
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
     core = Core()
@@ -98,7 +103,7 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
         cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
         drive[:, 6], drive[:, 7] = cross[:-1], cross[1:]
     constants = constants_of(core)
-    return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms)
+    return Assembled(drive, constants, pieces or _pieces(record, drive, constants), fin, terms)
 
 
 def constants_of(core: Core) -> FloatArray:
