@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldsid.diagnosis.hypothesis import Hypothesis, bare_model, errors_under, hypothesis_of
+from fieldsid.diagnosis.hypothesis import Hypothesis, bare_model, errors_under, flown_by, hypothesis_of
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.trial import Trial, judge, refine
@@ -56,7 +56,8 @@ def _tried(search: Search, current: Trial) -> list[tuple[Trial, Pair]]:
         ways = [_refined(shortened(ground, promise), current), _declared(search, promise, current)]
         trial = min(ways, key=lambda t: t.weights.angle * t.weights.rate)
         noise = search.base().judged.noise
-        found.append((trial, errors_under(trial, bare_model(trial.problem, trial.x, noise), search.validation)))
+        flown = flown_by(bare_model(trial.problem, trial.x, noise), trial, search.validation)
+        found.append((trial, errors_under(trial, flown, search.validation)))
     return found
 
 

@@ -24,6 +24,8 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 
+Flown = tuple[tuple[Problem, FloatArray], ...]
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -37,6 +39,7 @@ class Hypothesis:
     unseen: FloatArray
     cost: float
     validation: tuple[Record, ...]
+    flown: Flown
     plain: Trial | None = None
 
     @property
@@ -53,7 +56,8 @@ class Hypothesis:
     @cached_property
     def errors(self) -> Pair:
         """Errors of the model on the runs it was fitted to and on the runs it was not, each run's own start at its best."""
-        return errors_under(self.shown, self.model, self.validation)
+        flown = self.flown if self.plain is None else flown_by(self.model, self.plain, self.validation)
+        return errors_under(self.shown, flown, self.validation)
 
     @property
     def own_model(self) -> Model:
@@ -79,18 +83,21 @@ class Hypothesis:
 def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
     """Return a judged trial with its likelihood on the runs it was fitted to and on the runs it was not."""
     problem, x = judged.trial.problem, judged.trial.x
-    model = bare_model(problem, x, judged.noise)
-    shown = []
-    for record in validation:
-        alone, start = frozen_problem(model, record, judged.trial.effects)
-        shown.append((alone, refit_own(alone, start, 0, judged.noise)))
+    flown = flown_by(bare_model(problem, x, judged.noise), judged.trial, validation)
+    shown = [(alone, refit_own(alone, start, 0, judged.noise)) for alone, start in flown]
     return Hypothesis(
         judged,
         likelihood_by_run(problem, x, judged.noise),
         unseen_likelihood(judged, validation, shown),
         _price(judged, validation),
         tuple(validation),
+        flown,
     )
+
+
+def flown_by(model: Model, trial: Trial, validation: Sequence[Record]) -> Flown:
+    """Return the one-run problems of unseen runs with the model's values held, each with the start of its own slots."""
+    return tuple(frozen_problem(model, record, trial.effects) for record in validation)
 
 
 def unseen_likelihood(judged: Judged, validation: Sequence[Record], shown: Sequence[tuple[Problem, FloatArray]]) -> FloatArray:
@@ -144,12 +151,9 @@ def _contradicts(h: Hypothesis, parent: Hypothesis) -> bool:
     return bool(next(costs) > next(costs))
 
 
-def errors_under(trial: Trial, model: Model, validation: Sequence[Record]) -> Pair:
-    """Return the errors of a trial and its model on training and on unseen runs."""
-    left = []
-    for record in validation:
-        alone, start = frozen_problem(model, record, trial.effects)
-        left.append(left_over(alone, refit_own(alone, start, 0, floor_of([record]))))
+def errors_under(trial: Trial, flown: Flown, validation: Sequence[Record]) -> Pair:
+    """Return the errors of a trial on the runs it was fitted to and on unseen ones, flown by its model."""
+    left = [left_over(p, refit_own(p, x, 0, floor_of([r]))) for (p, x), r in zip(flown, validation, strict=True)]
     return Pair(training_errors(trial), errors_of(validation, left))
 
 

@@ -29,8 +29,8 @@ LARGE = 0.25
 DENSE = 20
 """Samples a jump at least: a command that always moves is a curve, not a row of jumps."""
 MOST = 60
-FAULTLESS = 1.05
-"""Error over the noise below which there is nothing to explain."""
+FAULTLESS, HOPELESS = 1.05, 6.0
+"""Error over the noise below which there is nothing to explain, and above which a model is too wrong to time anything."""
 WORTH = 6.0
 """Log evidence beyond the price of the times."""
 ROUNDS = 4
@@ -44,11 +44,11 @@ SPREAD = 12.0
 def timed(problem: Problem, x: FloatArray, floor: Noise) -> Record | None:
     """Return the record of a one-run problem with its command's jumps timed, at the shared values and start in x.
 
-    None where the log's own times do: without jumps, with the error down to the noise, or where it does not pay.
+    None where the log's own times do: without jumps, with the error down to the noise or far above, or where it does not pay.
     """
     record = problem.records[0]
     jumps = jumps_of(record)
-    if jumps.size < 2 or _faultless(record, problem.residual(x, 0)[0], floor):
+    if jumps.size < 2 or not _in_question(record, problem.residual(x, 0)[0], floor):
         return None
     slots = [i for i in problem.layout.of_run(0) if problem.layout.slots[i].name in STATE_NAMES]
     run = _TimedRun(problem, x, jumps, floor, -problem.linearise(x, 0, slots).sensitivity * np.stack(_masks(record)))
@@ -186,9 +186,9 @@ def _rms(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
     )
 
 
-def _faultless(record: Record, residual: FloatArray, floor: Noise) -> bool:
-    rms = _rms(record, residual, floor)
-    return not np.isfinite(rms).all() or bool((rms <= FAULTLESS * np.array([floor.angle, floor.rate])).all())
+def _in_question(record: Record, residual: FloatArray, floor: Noise) -> bool:
+    over = _rms(record, residual, floor) / np.array([floor.angle, floor.rate])
+    return bool(np.isfinite(over).all() and over.max() > FAULTLESS and over.min() < HOPELESS)
 
 
 def _rough_gain(record: Record, shift: FloatArray, own: FloatArray) -> float:
