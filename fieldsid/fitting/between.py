@@ -55,10 +55,12 @@ def timed(problem: Problem, x: FloatArray, floor: Noise) -> Record | None:
     slopes = run.slopes()
     if not np.isfinite(slopes).all():
         return None
+    price = 0.5 * (slopes.shape[0] - 1) * np.log(len(record)) + WORTH
+    if not run.most_gain(slopes) > price:
+        return None
     most, each = run.most, np.eye(slopes.shape[0])
     together, shift = run.best(slopes, each.sum(axis=1, keepdims=True), -0.5 * most, most)
     times, own = run.best(slopes, each, together - 0.5 * most, np.minimum(together + 0.5 * most, most))
-    price = 0.5 * (slopes.shape[0] - 1) * np.log(len(record)) + WORTH
     if not _rough_gain(record, shift, own) > price:
         return None
     return run.record_with(times) if run.likelihood(own) - run.likelihood(shift) > price else None
@@ -123,6 +125,17 @@ class _TimedRun:
         half = 0.5 * self.most
         logged = self.residual(0.0 * half)
         return np.stack([(self.residual(one * half) - logged) / (one @ half) for one in np.eye(half.size)])
+
+    def most_gain(self, slopes: FloatArray) -> float:
+        """Return the log likelihood, roughly, that times free of bounds gain over one shift, to first order: no less."""
+        logged = self.residual(0.0 * self.most)
+        weight = 1.0 / _rms(self.problem.records[0], logged, self.floor)
+        flat = (logged * weight[:, None]).ravel()
+        left = []
+        for columns in (slopes.sum(axis=0, keepdims=True), slopes):
+            known = (np.concatenate([columns, self.starts]) * weight[:, None]).reshape(-1, flat.size)
+            left.append((flat - np.linalg.lstsq(known.T, flat, rcond=1e-9)[0] @ known).reshape(logged.shape))
+        return _rough_gain(self.problem.records[0], *left)
 
     def best(self, slopes: FloatArray, shape: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the times of least weighted squares among shape (K + 1, m) times m numbers, and the residual they leave.
