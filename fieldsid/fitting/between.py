@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.fitting.layout import START_NAMES
 from fieldsid.fitting.noise import estimate_noise
-from fieldsid.fitting.problem import STATE_NAMES, Problem
+from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
@@ -50,7 +51,7 @@ def timed(problem: Problem, x: FloatArray, floor: Noise) -> Record | None:
     jumps = jumps_of(record)
     if jumps.size < 2 or _faultless(record, problem.residual(x, 0)[0], floor):
         return None
-    slots = [i for i in problem.layout.of_run(0) if problem.layout.slots[i].name in STATE_NAMES]
+    slots = [i for i in problem.layout.of_run(0) if problem.layout.slots[i].name in START_NAMES]
     run = _TimedRun(problem, x, jumps, floor, -problem.linearise(x, 0, slots).sensitivity * np.stack(_masks(record)))
     slopes = run.slopes()
     if not np.isfinite(slopes).all():

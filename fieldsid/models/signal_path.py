@@ -71,14 +71,20 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
     return Terms(damping_factor, authority_factor, moment, damping, cross_factor)
 
 
-def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
-    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
-    fin = fin_path(record, effects, values)
-    terms = combined_terms(record, effects, values)
+def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
+    """Return the sum of the effects' coefficients in the core; scale is the run's speed over the model's reference speed."""
     core = Core()
     for effect in effects:
         if effect.core is not None:
             core = core.plus(effect.core(values, scale))
+    return core
+
+
+def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
+    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
+    fin = fin_path(record, effects, values)
+    terms = combined_terms(record, effects, values)
+    core = combined_core(effects, values, scale)
     drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
     drive[:, 0] = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
     if terms.damping is not None:
