@@ -1,4 +1,8 @@
-"""The hidden cross state that sway and heave share: x' = -cross_damping f x - cross_rate f^2 p, f = (speed/reference)^p."""
+"""The hidden cross state that sway and heave share: x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p.
+
+A run starts from x = -(cross_rate / cross_damping) f r0, where a steady rate r0 before it had led to: each run's own
+number (`rate_before` in fitting/layout.py). No motion within that rate leaves x further from zero.
+"""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def solve(problem: Problem, options: Options) -> Solution:
     slots = list(base_slots(problem).values())
     keep = [0, 1, 2, 3, 4, 5] if len(slots) == 4 else [0, 2, 3, 4, 5]
     use = measured_signals(record, options.bandwidth).use & record.angle_ok
-    state = np.array([problem.start_of(problem.values_of(x, 0))[0], 0.0])
+    state = np.array([problem.state_of(x, 0)[0], 0.0])
     moved, rounds = np.inf, 0
     while moved > SETTLED and rounds < ROUNDS:
         theta, rounds = theta_of(problem, x, 0), rounds + 1

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.fitting.layout import START_NAMES
 from fieldsid.fitting.noise import estimate_noise
-from fieldsid.fitting.problem import STATE_NAMES, Problem
+from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
@@ -29,8 +30,8 @@ LARGE = 0.25
 DENSE = 20
 """Samples a jump at least: a command that always moves is a curve, not a row of jumps."""
 MOST = 60
-FAULTLESS, HOPELESS = 1.05, 6.0
-"""Error over the noise below which there is nothing to explain, and above which a model is too wrong to time anything."""
+FAULTLESS = 1.05
+"""Error over the noise below which there is nothing to explain."""
 WORTH = 6.0
 """Log evidence beyond the price of the times."""
 ROUNDS = 4
@@ -44,13 +45,13 @@ SPREAD = 12.0
 def timed(problem: Problem, x: FloatArray, floor: Noise) -> Record | None:
     """Return the record of a one-run problem with its command's jumps timed, at the shared values and start in x.
 
-    None where the log's own times do: without jumps, with the error down to the noise or far above, or where it does not pay.
+    None where the log's own times do: without jumps, with the error down to the noise, or where it does not pay.
     """
     record = problem.records[0]
     jumps = jumps_of(record)
     if jumps.size < 2 or not _in_question(record, problem.residual(x, 0)[0], floor):
         return None
-    slots = [i for i in problem.layout.of_run(0) if problem.layout.slots[i].name in STATE_NAMES]
+    slots = [i for i in problem.layout.of_run(0) if problem.layout.slots[i].name in START_NAMES]
     run = _TimedRun(problem, x, jumps, floor, -problem.linearise(x, 0, slots).sensitivity * np.stack(_masks(record)))
     slopes = run.slopes()
     if not np.isfinite(slopes).all():
@@ -201,7 +202,7 @@ def _rms(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
 
 def _in_question(record: Record, residual: FloatArray, floor: Noise) -> bool:
     over = _rms(record, residual, floor) / np.array([floor.angle, floor.rate])
-    return bool(np.isfinite(over).all() and over.max() > FAULTLESS and over.min() < HOPELESS)
+    return bool(np.isfinite(over).all() and over.max() > FAULTLESS)
 
 
 def _rough_gain(record: Record, shift: FloatArray, own: FloatArray) -> float:

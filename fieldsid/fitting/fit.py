@@ -157,8 +157,8 @@ def prediction_of(problem: Problem, x: FloatArray, run: int) -> Prediction:
     values = problem.values_of(x, run)
     fin = fin_path(problem.records[run], problem.layout.effects, values)
     nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
-    state = (values["angle0"], values["rate0"], values.get("cross0", 0.0))
-    return Prediction(problem.records[run], motion.angle, motion.rate, np.append(fin.start, fin.end[-1]), state, nuisance)
+    path = np.append(fin.start, fin.end[-1])
+    return Prediction(problem.records[run], motion.angle, motion.rate, path, problem.state_of(x, run), nuisance)
 
 
 def model_of(problem: Problem, solution: Solution) -> Model:

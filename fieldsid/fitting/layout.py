@@ -14,6 +14,11 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import SpeedLaw
 
+START_NAMES = ("angle0", "rate0", "rate_before")
+"""What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
+BEFORE, FASTEST = 1.5, 2.0
+"""Largest rate before a run over the largest of the records, and in rad/s where no rate was measured."""
+
 GROUP_WIDTH = 0.08
 """Runs whose speeds differ by less than this share form one speed group."""
 SENSOR_WIDTH = 0.01
@@ -133,18 +138,25 @@ def layout_of(records: Sequence[Record], axis: Axis, effects: Sequence[Effect], 
         slots.append(Slot("damping_exponent", "1", -1.0, 3.0, 1.0))
     slots += [Slot(c.name, c.unit, c.low, c.high, c.start) for e in effects for c in e.shared]
     shared = len(slots)
+    before = _fastest_before(records)
     for i, record in enumerate(records):
-        slots += _own_slots(i, record, effects)
+        slots += _own_slots(i, record, effects, before)
     return Layout(axis, tuple(effects), groups, tuple(slots), shared)
 
 
-def _own_slots(run: int, record: Record, effects: Sequence[Effect]) -> list[Slot]:
+def _own_slots(run: int, record: Record, effects: Sequence[Effect], before: float) -> list[Slot]:
     angle = _first(record.angle, record.angle_ok)
     rate = _first(record.rate, record.rate_ok)
     slots = [Slot("angle0", "rad", -1e4, 1e4, angle, run), Slot("rate0", "rad/s", -10.0, 10.0, rate, run)]
     if any(e.extra_states for e in effects):
-        slots.append(Slot("cross0", "rad/s^2", -10.0, 10.0, 0.0, run))
+        slots.append(Slot("rate_before", "rad/s", -before, before, 0.0, run))
     return slots + [Slot(c.name, c.unit, c.low, c.high, c.start, run) for e in effects for c in e.nuisance]
+
+
+def _fastest_before(records: Sequence[Record]) -> float:
+    """Return the largest steady rate that may have gone before a run."""
+    fastest = max((float(np.max(np.abs(r.rate[r.rate_ok]))) for r in records if r.rate_ok.any()), default=0.0)
+    return BEFORE * fastest if fastest > 0.0 else FASTEST
 
 
 def _first(values: FloatArray, ok: BoolArray) -> float:

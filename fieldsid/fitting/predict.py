@@ -69,9 +69,8 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     values = problem.values_of(x, 0)
     fin = fin_path(problem.records[0], problem.layout.effects, values)
     nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
-    state = (values["angle0"], values["rate0"], values.get("cross0", 0.0))
     path = np.append(fin.start, fin.end[-1])
-    return Prediction(problem.records[0], motion.angle, motion.rate, path, state, nuisance, as_logged)
+    return Prediction(problem.records[0], motion.angle, motion.rate, path, problem.state_of(x, 0), nuisance, as_logged)
 
 
 def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:

@@ -7,13 +7,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.layout import Layout, group_name
+from fieldsid.fitting.layout import START_NAMES, Layout, group_name
 from fieldsid.logs.run import FloatArray
 from fieldsid.models import kernels
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Coefficient, Motion
+from fieldsid.models.effect import Coefficient, Core, Motion, Values
 from fieldsid.models.record import Record, first_part
-from fieldsid.models.signal_path import Assembled, Base, assemble, constants_of, lift, measured, run_core, with_moments
+from fieldsid.models.signal_path import (
+    Assembled,
+    Base,
+    assemble,
+    combined_core,
+    constants_of,
+    lift,
+    measured,
+    run_core,
+    with_moments,
+)
+
+CROSS = START_NAMES.index("rate_before")
+DAMPING, RATE = (kernels.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate"))
+EXPONENT = 1e-4
+"""Half width of the central difference by the exponent of the speed law."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +84,17 @@ class Problem:
         law = {"damping_exponent": layout.exponent}
         return law | dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
 
-    def start_of(self, values: dict[str, float]) -> FloatArray:
-        """Return the initial state among a run's values."""
-        return np.array([values["angle0"], values["rate0"], values.get("cross0", 0.0)])
+    def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:
+        """Return a run's initial state: angle, rate, and the cross state that the rate before the run has led to."""
+        values = self.values_of(x, run)
+        core = combined_core(self.layout.effects, values, self.scales(run)[0])
+        return values["angle0"], values["rate0"], core.settled(values.get("rate_before", 0.0))
 
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
         record, effects = self.records[run], self.layout.effects
         base, values = self.base_of(x, run), self.values_of(x, run)
-        start = self.start_of(values)
+        start = np.array(self.state_of(x, run))
         arrays = assemble(record, effects, base, values, self.scales(run)[0])
         arrays = with_moments(record, arrays, effects, values, start)
         out = run_core(record, arrays, start)
@@ -109,7 +126,7 @@ class Problem:
     def _pushes(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], _Pushes]:
         record, layout = self.records[run], self.layout
         values, base = self.values_of(x, run), self.base_of(x, run)
-        start, scale = self.start_of(values), self.scales(run)[0]
+        start, scale = np.array(self.state_of(x, run)), self.scales(run)[0]
         wanted = set(range(len(x)) if free is None else free)
         slots = tuple(i for i in (*range(layout.shared), *layout.of_run(run)) if i in wanted and self._touches(i, run))
         raw = assemble(record, layout.effects, base, values, scale)
@@ -186,14 +203,25 @@ class _Pushes:
         which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
         for j, slot in enumerate(slots):
             name = self.problem.layout.slots[slot].name
-            if name in STATE_NAMES:
-                d_start[j, STATE_NAMES.index(name)] = 1.0
+            if name in START_NAMES:
+                part = START_NAMES.index(name)
+                d_start[j, part] = 1.0 if part < CROSS else self._core(self.values).settled(1.0)
                 continue
             push, d_c[j] = self._push(name)
+            d_start[j, CROSS] = self._moves_start(d_c[j])
             if push is not None:
                 which[j] = len(rows)
                 rows.append(push)
         return rows, which, d_c, d_start
+
+    def _core(self, values: Values) -> Core:
+        return combined_core(self.problem.layout.effects, values, self.scale)
+
+    def _moves_start(self, d_c: FloatArray) -> float:
+        """Return how the start of the cross state moves with the core's constants (9,), the rate before the run held."""
+        damping, d_damping, d_rate = self.arrays.constants[DAMPING], d_c[DAMPING], d_c[RATE]
+        before = self.values.get("rate_before", 0.0)
+        return -float(d_rate * before + d_damping * self.start[CROSS]) / damping if damping > 0.0 else 0.0
 
     def _march(
         self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
@@ -215,7 +243,7 @@ class _Pushes:
         if name == names.damping:
             return self._damping(share**exponent), none
         if name == "damping_exponent":
-            return self._damping(self.base.damping * float(np.log(share))), none
+            return self._damping(self.base.damping * float(np.log(share))), self._by_exponent(exponent)
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return self._authority(ratio**2), none
         if name == names.stiffness:
@@ -223,6 +251,11 @@ class _Pushes:
         if name == names.trim:
             return _constant(slice(2, 4)), none
         return self._of_effect(name)
+
+    def _by_exponent(self, exponent: float) -> FloatArray:
+        """Return how the core's constants move with the exponent of the damping's speed law, (9,)."""
+        ends = [constants_of(self._core(self.values | {"damping_exponent": exponent + s})) for s in (EXPONENT, -EXPONENT)]
+        return (ends[0] - ends[1]) / (2 * EXPONENT)
 
     def _damping(self, factor: float) -> Push:
         shape = self.arrays.terms.damping_factor
@@ -314,9 +347,6 @@ def _known(d_drive: FloatArray) -> Push:
         row[:] = d_drive[part]
 
     return push
-
-
-STATE_NAMES = ("angle0", "rate0", "cross0")
 
 
 def _moved(motion: Motion, direction: FloatArray, step: float) -> Motion:

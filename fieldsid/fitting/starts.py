@@ -139,7 +139,7 @@ def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
 
 
 def _new_slots(problem: Problem, effect: Effect) -> list[int]:
-    names = {c.name for c in effect.coefficients} | ({"cross0"} if effect.extra_states else set())
+    names = {c.name for c in effect.coefficients} | ({"rate_before"} if effect.extra_states else set())
     return [i for i, s in enumerate(problem.layout.slots) if s.name in names]
 
 

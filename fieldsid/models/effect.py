@@ -6,7 +6,8 @@ Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENS
          + heading_sin sin(angle) + heading_cos cos(angle) + righting_sin (angle - sin angle)
          + righting_cos (cos angle - 1) + x
     x' = -cross_damping g x - cross_rate g^2 p + cross_fin delta
-with p the rate and x the cross state (sway or heave, scaled so that its moment is +x).
+with p the rate and x the cross state (sway or heave, scaled so that its moment is +x). A run starts with x where some
+steady rate before it had left it; no motion within that rate leaves it further from zero.
 """
 
 from __future__ import annotations
@@ -104,6 +105,10 @@ class Core:
         """Return the sum of two sets of coefficients; `length` is taken from whichever sets it."""
         total = {f: getattr(self, f) + getattr(other, f) for f in CORE_FIELDS if f != "length"}
         return replace(self, **total, length=other.length if other.length != 1.0 else self.length)
+
+    def settled(self, rate: float) -> float:
+        """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none."""
+        return -self.cross_rate / self.cross_damping * rate if self.cross_damping > 0.0 else 0.0
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)

@@ -71,6 +71,15 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
     return Terms(damping_factor, authority_factor, moment, damping, cross_factor)
 
 
+def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
+    """Return the sum of the effects' coefficients in the core; scale is the run's speed over the model's reference speed."""
+    core = Core()
+    for effect in effects:
+        if effect.core is not None:
+            core = core.plus(effect.core(values, scale))
+    return core
+
+
 def assemble(
     record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float, pieces: int | None = None
 ) -> Assembled:
@@ -80,10 +89,7 @@ def assemble(
     """
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
-    core = Core()
-    for effect in effects:
-        if effect.core is not None:
-            core = core.plus(effect.core(values, scale))
+    core = combined_core(effects, values, scale)
     drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
     drive[:, 0] = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
     if terms.damping is not None:

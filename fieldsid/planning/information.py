@@ -77,7 +77,7 @@ def _layout(scene: Scene) -> tuple[Layout, FloatArray]:
     layout = replace(made, groups=replace(made.groups, speeds=(reference,), reference=0))
     names, ratio = NAMES[scene.axis], scene.speed / reference
     at_reference = {names.damping: scene.base.damping / ratio, names.authority: scene.base.authority / ratio**2}
-    known = {**scene.values, names.trim: scene.base.trim, "angle0": 0.0, "rate0": 0.0, "cross0": 0.0, **at_reference}
+    known = {**scene.values, names.trim: scene.base.trim, "angle0": 0.0, "rate0": 0.0, **at_reference}
     return layout, np.array([float(known.get(s.name, s.start)) for s in layout.slots])
 
 

@@ -19,6 +19,7 @@ from fieldsid.fitting.fit import fit
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
+from fieldsid.models.simulate import simulate
 
 CLOCK = Clock(0.05, 1000)
 BASE = {
@@ -87,6 +88,10 @@ def record(case: Hidden):
     return record_of(Run(case.name, log.pop("time_s"), log), case.axis)
 
 
+def cut(log: dict[str, np.ndarray], first: int) -> dict[str, np.ndarray]:
+    return {name: values[first:] for name, values in log.items()}
+
+
 @pytest.mark.parametrize("case", CASES, ids=lambda c: f"{c.name}_{c.axis.value}")
 def test_the_coefficients_that_were_put_in_come_back(case):
     log = record(case)
@@ -96,6 +101,19 @@ def test_the_coefficients_that_were_put_in_come_back(case):
         assert found.model.values[name] == pytest.approx(value, rel=case.near, abs=case.near * 0.02), name
     with_it, without = (np.sqrt(np.mean(f.predictions[0].residual[1] ** 2)) for f in (found, plain))
     assert with_it < 0.2 * without
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c.name.endswith("_coupling")], ids=lambda c: c.name)
+def test_a_run_that_starts_in_a_turn_shows_the_hidden_state_it_starts_with(case):
+    log = flight(case)
+    turning = 200 + int(np.argmax(np.abs(log[f"{case.axis.value}_rate_rad_s"][200:600])))
+    whole, late = (record_of(Run(case.name, c.pop("time_s"), c), case.axis) for c in (dict(log), cut(log, turning)))
+    first, found = (fit([r], case.axis, method="output_error", effects=[case.name]) for r in (whole, late))
+    for name, value in case.expected.items():
+        assert found.model.values[name] == pytest.approx(value, rel=case.near), name
+    hidden = simulate(first.model, whole, state=first.predictions[0].state).cross
+    assert abs(hidden[turning]) > 0.3 * np.abs(hidden).max()
+    assert found.predictions[0].state[2] == pytest.approx(hidden[turning], rel=0.05)
 
 
 def test_every_effect_that_needs_no_helper_signal_is_in_the_list():

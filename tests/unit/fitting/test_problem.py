@@ -43,6 +43,17 @@ def moved_start(problem):
     return x
 
 
+def compare_with_slopes(problem, x, run, near):
+    """Compare a run's sensitivities with central differences of its free run."""
+    result = problem.linearise(x, run)
+    for slot, mine in zip(result.slots, result.sensitivity, strict=True):
+        step = 1e-4 * max(abs(x[slot]), 0.1)
+        ends = [problem.residual(np.where(np.arange(x.size) == slot, x + s, x), run)[0] for s in (step, -step)]
+        slope = -(ends[0] - ends[1]) / (2 * step)
+        scale = np.abs(slope).max() + 1e-9
+        assert np.abs(mine - slope).max() < near * scale, problem.layout.slots[slot].name
+
+
 @pytest.mark.parametrize(
     ("row", "effects"),
     [
@@ -53,14 +64,36 @@ def moved_start(problem):
 )  # fmt: skip
 def test_sensitivities_are_the_slopes_of_the_free_run(row, effects):
     problem = problem_of([record(row)], effects)
+    compare_with_slopes(problem, moved_start(problem), 0, 2e-3)
+
+
+@pytest.mark.parametrize(("row", "effect"), [(YAW[1], "sway_coupling"), (PITCH[3], "heave_coupling")], ids=str)
+def test_the_start_of_a_hidden_state_moves_with_its_coefficients_and_the_speed_law(row, effect):
+    records = [record(row, speed=1.0), record(row, 2, speed=1.6)]
+    problem = problem_of(records, [effect])
     x = moved_start(problem)
-    result = problem.linearise(x, 0)
-    for slot, mine in zip(result.slots, result.sensitivity, strict=True):
-        step = 1e-4 * max(abs(x[slot]), 0.1)
-        ends = [problem.residual(np.where(np.arange(x.size) == slot, x + s, x), 0)[0] for s in (step, -step)]
-        slope = -(ends[0] - ends[1]) / (2 * step)
-        scale = np.abs(slope).max() + 1e-9
-        assert np.abs(mine - slope).max() < 2e-3 * scale, problem.layout.slots[slot].name
+    for name, value in {"cross_rate": -0.4, "damping_exponent": 0.8, "rate_before": 0.15}.items():
+        x[[s.name == name for s in problem.layout.slots]] = value
+    for run in range(2):
+        assert problem.state_of(x, run)[2] == pytest.approx(0.15 * 0.4 / 0.8 * problem.scales(run)[0] ** 0.8)
+        compare_with_slopes(problem, x, run, 2e-5)
+
+
+def test_a_hidden_state_that_is_not_driven_starts_at_zero():
+    problem = problem_of([record(YAW[1])], ["sway_coupling"])
+    x = moved_start(problem)
+    names = [s.name for s in problem.layout.slots]
+    x[names.index("rate_before")], x[names.index("cross_rate")] = problem.layout.high[names.index("rate_before")], 0.0
+    base = problem_of([record(YAW[1])])
+    keep = [i for i, n in enumerate(names) if n in {s.name for s in base.layout.slots}]
+    np.testing.assert_allclose(problem.residual(x, 0)[0], base.residual(x[keep], 0)[0], atol=1e-12)
+
+
+def test_the_rate_before_a_run_is_not_far_beyond_those_of_the_records():
+    log = record(YAW[1])
+    for fastest, rates in ((1.5 * np.abs(log.rate).max(), log), (2.0, replace(log, rate_ok=np.zeros(len(log), bool)))):
+        slot = next(s for s in problem_of([rates], ["sway_coupling"]).layout.slots if s.name == "rate_before")
+        assert (slot.low, slot.high) == (-fastest, fastest)
 
 
 def test_the_short_way_has_the_normal_equations_of_the_general_core():
