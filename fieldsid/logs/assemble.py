@@ -11,10 +11,11 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, Source
 from fieldsid.logs.clock import Track, one_clock
 from fieldsid.logs.conditioning import MAX_GAP_S, in_order, refuse_long_gaps
-from fieldsid.logs.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd, unwrapped
+from fieldsid.logs.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.reader import RawLog, Series
 from fieldsid.logs.run import SIGNALS, FloatArray, Note, Run
 from fieldsid.logs.units import depth_of_pressure, factor_to, pick_unit, scaled
+from fieldsid.logs.wrapping import unwrapped_over
 
 
 def assemble(raw: RawLog, mapping: ChannelMap, path: Path | None, *, salvage: bool = False, max_gap_s: float = MAX_GAP_S) -> Run:
@@ -33,6 +34,9 @@ def assemble(raw: RawLog, mapping: ChannelMap, path: Path | None, *, salvage: bo
             tracks[name] = track
     if not tracks:
         raise MappingError(f"{mapping.place} maps no signal", found="an empty `signals`", hint="see `sysid inspect LOG`")
+    if "yaw_rad" in tracks:
+        tracks["yaw_rad"], found = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
+        notes += found
     time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
     if time.size < 2:
         raise LogError(f"`{path}` has too few samples", found=f"{time.size} samples", hint="copy the log from the vehicle again")
@@ -58,7 +62,7 @@ def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note],
     notes += found
     picked = Series(series.time[rows], series.values[rows], series.label, series.unit, series.is_height)
     values = _quaternion(signal, picked, source, mapping) if picked.values.ndim == 2 else _scalar(signal, picked, source, mapping)
-    return {name: Track(picked.time, unwrapped(v) if name == "yaw_rad" else v, series.label) for name, v in values.items()}
+    return {name: Track(picked.time, v, series.label) for name, v in values.items()}
 
 
 def _scalar(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:

@@ -48,11 +48,7 @@ def segment(run: Run, axis: str) -> Segment:
     """
     signal = next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
     if signal is None:
-        raise DataError(
-            f"run {run.name!r} has no fin signal for {axis}: `{_FINS[axis][1]}` is missing or empty",
-            found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
-            hint=f"map it on import, or identify the other axis: `--axis {'pitch' if axis == 'yaw' else 'yaw'}`",
-        )
+        raise no_fin(run, axis, _FINS[axis][1])
     fin = run[signal]
     seen = np.isfinite(fin)
     time, fin = run.time[seen], fin[seen]
@@ -64,6 +60,19 @@ def segment(run: Run, axis: str) -> Segment:
             hint="choose a run with excitation, or the part to use with `--from` and `--to`",
         )
     return _around(run, time, away, signal, limit)
+
+
+def no_fin(run: Run, axis: str, missing: str) -> DataError:
+    """Return the error of a run without a fin for an axis; its hint names the other axis where that one has a fin."""
+    other = next(a for a in _FINS if a != axis)
+    hint = f"map `{missing}` on import: `sysid inspect LOG`"
+    if any(run.has(fin) for fin in _FINS[other]):
+        hint = f"map it on import, or identify the other axis: `--axis {other}`"
+    return DataError(
+        f"run {run.name!r} has no fin signal for {axis}: `{missing}` is missing or empty",
+        found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
+        hint=hint,
+    )
 
 
 def _excursions(time: FloatArray, fin: FloatArray) -> tuple[np.ndarray[tuple[int], np.dtype[np.bool_]], float]:

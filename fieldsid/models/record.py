@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import DataError, EffectError
 from fieldsid.logs.run import FloatArray, Run
+from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import FinPath
 
@@ -100,11 +101,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     measured = fin == "measured" or (fin == "auto" and run.has(names.fin_measured))
     column = names.fin_measured if measured else names.fin
     if not run.has(column):
-        raise DataError(
-            f"run {run.name!r} has no fin signal for {axis.value}: `{column}` is missing or empty",
-            found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
-            hint=f"map it on import, or identify the other axis: `--axis {'pitch' if axis is Axis.YAW else 'yaw'}`",
-        )
+        raise no_fin(run, axis.value, column)
     if not run.has(names.angle) and not run.has(names.rate):
         raise DataError(
             f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`",

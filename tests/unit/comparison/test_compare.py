@@ -68,5 +68,9 @@ def test_a_run_without_a_rate_has_no_missing_moment():
 
 def test_a_run_without_a_fin_is_refused():
     run = run_of(model())
-    with pytest.raises(DataError, match="no fin signal"):
+    with pytest.raises(DataError, match="no fin signal") as error:
         compare(model(), [Run("bare", run.time, {"yaw_rad": run["yaw_rad"]})])
+    assert "--axis" not in error.value.hint
+    with pytest.raises(DataError, match="no fin signal") as error:
+        compare(model(), [Run("bare", run.time, {"yaw_rad": run["yaw_rad"], "elevator_measured_rad": run["yaw_rad"]})])
+    assert "`--axis pitch`" in error.value.hint
