@@ -18,6 +18,8 @@ from fieldsid.models.record import Record
 
 GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
+MORE, FOLLOWED = 3, 4
+"""Effects beyond the `most` that the free run's screen follows for some rounds: far from an effect first order says little."""
 SHIFTS, SHIFT_ROUNDS = 3, 12
 """Shifts of time that are followed, and for how many rounds."""
 
@@ -43,11 +45,20 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: 
         ground = ground_of(at.problem, at.x, weights)
         worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
         promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
-        kept = promises if most is None else [p for p in promises[:most] if ground.cost - p.cost > worth]
-        found += [Way(shortened(ground, p), ground, plain) for p in kept]
+        kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p.cost > worth]
+        kept = [shortened(ground, p) for p in kept]
+        if plain and most is not None:
+            kept = sorted((_followed(ground, p) for p in kept), key=lambda p: p.cost)[:most]
+        found += [Way(p, ground, plain) for p in kept]
         if plain and anew:
             found += [Way(_shifted(ground, e), ground, plain) for e in left if shifts_time(e)]
     return found
+
+
+def _followed(ground: Ground, promise: Promise) -> Promise:
+    """Return a promise after a few rounds of descent, when it is worth what it has kept."""
+    found = descend(promise.problem, promise.start, ground.noise, rounds=FOLLOWED, tolerance=1e-3)
+    return replace(promise, cost=found.cost, start=found.x)
 
 
 def _shifted(ground: Ground, effect: Effect) -> Promise:
