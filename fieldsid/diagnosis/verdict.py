@@ -22,6 +22,8 @@ BEYOND_CHANCE, BESIDE_AN_EFFECT = 2e-2, 1e-6
 is never exact."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
+WORSE = 2.0
+"""Error on unseen runs over that on fitted ones above which a disturbance, alike on both, is not all that is left."""
 MOSTLY = 0.7
 """Share of the excess error an effect must explain to be named where something else is left as well."""
 
@@ -39,13 +41,21 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     """Return the verdict on the hypothesis a search ended at."""
     visible = search.error(found) > VISIBLE
     if frozenset(found.names) == search.root:
-        return Verdict("unexplained" if visible and left.p < BEYOND_CHANCE else "sufficient", ())
+        odd = left.p < BEYOND_CHANCE or worse_unseen(search, found) > WORSE
+        return Verdict("unexplained" if visible and odd else "sufficient", ())
     if visible and left.p < BESIDE_AN_EFFECT and explained(search, found) < MOSTLY:
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
         return Verdict("undecided", added(search, found), rivals)
     return Verdict("effect", added(search, found))
+
+
+def worse_unseen(search: Search, h: Hypothesis) -> float:
+    """Return the error on unseen runs over that on the runs fitted to; 1 where there are no unseen ones."""
+    if not search.validation:
+        return 1.0
+    return h.errors.validation.over(search.floor) / max(h.errors.train.over(search.floor), 1.0)
 
 
 def added(search: Search, h: Hypothesis) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from math import isfinite
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.verdict import Verdict, explained
+from fieldsid.diagnosis.verdict import WORSE, Verdict, explained, worse_unseen
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
 
@@ -40,10 +40,12 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
         tail = f"; a disturbance of {found.judged.noise.disturbance:.2g} rad/s^2 is there" if _disturbed(found) else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "unexplained":
+        worse = worse_unseen(search, search.base())
         return (
             f"something is there that is not in the catalogue: error {_sized(search, search.base(), base)}, most of it in "
             f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
             f"it moves with {left.moves_with}"
+            + (f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > WORSE else "")
         )
     names = " and ".join(verdict.effects)
     says = "; ".join(effect_named(n).says for n in verdict.effects)
