@@ -3,7 +3,7 @@
 A likelihood compares hypotheses by how much disturbance each still needs. Where what is left moves with the fin or the
 motion it is no disturbance, and without noise to drown it the smallest inconsistency of the sensors weighs more than all
 that the hull does: the most likely hypothesis is not the one that predicts. Then effects are added as long as each lets
-output error predict unseen runs by a tenth better.
+output error predict unseen runs by a twentieth better.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ TRIED = 5
 LARGEST = 3
 ROUNDS, FINE = 200, 1e-7
 """Rounds of each free run, and the share of its sum of squares a round must gain: the valleys are long."""
-BETTER = 0.9
+BETTER = 0.95
 """Share that the error must fall to with every effect."""
 
 
