@@ -13,7 +13,7 @@ from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import ground_of, promise_of, shortened, twin_of
+from fieldsid.fitting.starts import carried, ground_of, promise_of, shortened, twin_of
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
@@ -125,6 +125,7 @@ class Search:
             for way in later:
                 if way.promise.effect.name in leading:
                     self._go(parent, way)
+            self._back_from_child(key)
             self._free_runs(key)
         return self._children(key)
 
@@ -172,6 +173,17 @@ class Search:
         else:
             self._keep(twin)
 
+    def _back_from_child(self, key: frozenset[str]) -> None:
+        """Judge a hypothesis again from where its best child has led its numbers: a cost that is not smooth has many ends."""
+        child, parent = next(iter(self._children(key)), None), self.tried[key]
+        if child is None:
+            return
+        trial, problem = child.judged.trial, parent.judged.trial.problem
+        x = carried(trial.problem.layout, trial.x, problem.layout)
+        again = judge(problem, x, child.judged.noise, self.told, self.family)
+        if again.likelihood > parent.judged.likelihood + SETTLED:
+            self.tried[key] = with_free_run(hypothesis_of(again, self.validation), self.floor)
+
     def _free_runs(self, key: frozenset[str]) -> None:
         """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
         for child in self._children(key)[:FREE_RUNS]:
@@ -184,6 +196,7 @@ class Search:
         current = self.base()
         for size in range(LARGEST):
             children = self.grow(current)
+            current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if self.pays(current, c)), None) or self._two_at_once(current, children)
             if paying is None:
                 break
