@@ -54,7 +54,9 @@ EFFECT = Effect(
     axes=(Axis.YAW, Axis.PITCH),
     equation="d(delta)/dt = clip(toward command, -max_rate, max_rate)",
     coefficients=(
-        Coefficient("max_rate", "rad/s", 0.02, 20.0, 0.5, scan=(0.1, 0.2, 0.4, 0.8, 1.6, 5.0), step=1e-3, says="fastest fin rate"),
+        Coefficient(
+            "max_rate", "rad/s", 0.02, 20.0, 0.5, scan=(0.1, 0.2, 0.4, 0.8, 1.6, 5.0), step=1e-3, says="fastest fin rate"
+        ),
     ),
     telltale="the response starts late after large commands and in time after small ones: the lag grows with the step",
     excited_by=("square_pulses", "doublet", "three_two_one_one", "zigzag"),
