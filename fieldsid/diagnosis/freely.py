@@ -50,19 +50,14 @@ def _tried(search: Search, current: Trial) -> list[tuple[Trial, Pair]]:
     ground = ground_of(current.problem, current.x, current.weights)
     left = [e for e in search.catalogue if e.name not in current.names]
     promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
-    found = []
+    noise, found = search.base().judged.noise, []
     for promise in promises[:TRIED]:
         search.report("+".join((*current.names, promise.effect.name)))
-        ways = [_refined(shortened(ground, promise), current), _declared(search, promise, current)]
-        trial = min(ways, key=lambda t: t.weights.angle * t.weights.rate)
-        noise = search.base().judged.noise
+        screened = refine(promise.problem, shortened(ground, promise).start, current.weights, ROUNDS, FINE)
+        trial = min((screened, _declared(search, promise, current)), key=lambda t: t.weights.angle * t.weights.rate)
         flown = flown_by(bare_model(trial.problem, trial.x, noise), trial, search.validation)
         found.append((trial, errors_under(trial, flown, search.validation)))
     return found
-
-
-def _refined(promise: Promise, current: Trial) -> Trial:
-    return refine(promise.problem, promise.start, current.weights, ROUNDS, FINE)
 
 
 def _declared(search: Search, promise: Promise, current: Trial) -> Trial:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
 from fieldsid.fitting.descent import cost_of
@@ -39,8 +40,8 @@ LEARNED = 4.0
 """Log likelihood an addition must gain on the runs it is fitted to, or its numbers come from nowhere."""
 MATTERS = 0.97
 """Share the free-run error must fall to: significant is not important."""
-NO_WORSE = 1.03
-"""Error on unseen runs up to which two hypotheses predict alike."""
+ALIKE = 1.03
+"""Hypotheses predict alike within this factor of each other's error."""
 MATTERS_MORE = 0.02
 """What a third and each further effect must bring beyond that: long explanations are the easier to find."""
 
@@ -247,7 +248,7 @@ class Search:
                 continue
             children = self.grow(self.tried[rest], most=PROMISING_INSTEAD)
             child = next((c for c in children if self.pays(self.tried[rest], c)), best)
-            if child.score > best.score and self.misfit(child) < NO_WORSE * self.misfit(best):
+            if child.score > best.score and self.misfit(child) < ALIKE * self.misfit(best):
                 best = child
         return best
 
@@ -268,13 +269,17 @@ class Search:
         learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
         return learned and with_.score - without.score > WORTH
 
+    def errors(self, h: Hypothesis) -> Errors:
+        """Return the errors a hypothesis is judged by: on unseen runs, on training runs where there are none."""
+        return h.errors.validation if self.validation else h.errors.train
+
     def misfit(self, h: Hypothesis) -> float:
-        """Return the mean error on unseen runs, on training runs where there are none."""
-        return (h.errors.validation if self.validation else h.errors.train).mean
+        """Return the mean of both channels' errors."""
+        return self.errors(h).mean
 
     def error(self, h: Hypothesis) -> float:
-        """Return the free-run error over the noise floor on unseen runs, on training runs where there are none."""
-        return (h.errors.validation if self.validation else h.errors.train).over(self.floor)
+        """Return the free-run error over the noise floor."""
+        return self.errors(h).over(self.floor)
 
     def asks_for_more(self, h: Hypothesis) -> bool:
         """Whether something is left above the noise, be it a disturbance or not."""

@@ -23,7 +23,6 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
-FAMILY = "disturbance"
 ALTERNATIONS = 3
 POLISH_ROUNDS = 8
 SETTLED = 0.5
@@ -72,7 +71,7 @@ def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = RE
     return Trial(problem, found.x, new)
 
 
-def judge(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str = FAMILY) -> Judged:
+def judge(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str) -> Judged:
     """Return a hypothesis under the noise of highest likelihood, parameters and noise improved in turn from x.
 
     floor is what the white part of the noise stays near.

@@ -9,14 +9,12 @@ import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
-from fieldsid.diagnosis.search import Search
+from fieldsid.diagnosis.search import ALIKE, Search
 
 TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
 RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
-ALIKE = 1.03
-"""Rivals predict unseen runs within this factor of each other."""
 BEYOND_CHANCE, BESIDE_AN_EFFECT = 2e-2, 1e-6
 """p-values below which what is left is not a disturbance: where nothing was found, and beside an effect whose form
 is never exact."""
