@@ -125,9 +125,14 @@ def expected_errors(judge: Judge, setting: Setting, candidate: Candidate) -> dic
     before = {} if base is None else judge.expected(base).std_errors()
     scales = scales_of(setting.model, judge.scene.base, judge.envelope.fin)
     values = values_at(judge)
-    high = {n: float(np.quantile([e[n] for e in spread], 5 / 6)) for n in mean.names}
+    high = {n: _high([e[n] for e in spread]) for n in mean.names}
     errors = mean.std_errors()
     return {n: Expected(values[n], e, high[n], e / scales[n], before.get(n, float("nan"))) for n, e in errors.items()}
+
+
+def _high(errors: list[float]) -> float:
+    """Return the 5/6 quantile of errors, one of them where some are infinite: nothing lies between those."""
+    return float(np.quantile(errors, 5 / 6, method="linear" if np.isfinite(errors).all() else "higher"))
 
 
 def pulses(judge: Judge) -> Candidate | None:

@@ -43,17 +43,16 @@ class Information:
 
     def std_errors(self) -> dict[str, float]:
         """Return the standard error of every parameter, infinite where the flight cannot tell it from others."""
-        scale = np.sqrt(np.diag(self.matrix))
-        if not np.isfinite(self.matrix).all() or (scale <= 0).any():
-            return {n: (float("inf") if not s > 0 else float("nan")) for n, s in zip(self.names, scale, strict=True)} | {
-                n: float("inf") for n in self.names
-            }
-        unit = self.matrix / np.outer(scale, scale)
-        values, vectors = np.linalg.eigh(unit)
-        lost = values < SMALLEST_PIVOT
-        variance = (vectors[:, ~lost] ** 2 / values[~lost]).sum(axis=1)
-        hidden = (vectors[:, lost] ** 2).sum(axis=1) > 1e-6
-        errors = np.where(hidden, np.inf, np.sqrt(variance)) / scale
+        errors = np.full(len(self.names), np.inf)
+        shown = np.flatnonzero(np.diag(self.matrix) > 0.0)
+        if np.isfinite(self.matrix).all() and shown.size:
+            part = self.matrix[np.ix_(shown, shown)]
+            scale = np.sqrt(np.diag(part))
+            values, vectors = np.linalg.eigh(part / np.outer(scale, scale))
+            lost = values < SMALLEST_PIVOT
+            variance = (vectors[:, ~lost] ** 2 / values[~lost]).sum(axis=1)
+            hidden = (vectors[:, lost] ** 2).sum(axis=1) > 1e-6
+            errors[shown] = np.where(hidden, np.inf, np.sqrt(variance)) / scale
         return dict(zip(self.names, errors.tolist(), strict=True))
 
     def log_det(self) -> float:

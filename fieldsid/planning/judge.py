@@ -72,7 +72,9 @@ def judge_of(model: Model, speed: float, envelope: Envelope, window: Window, wan
     corners = [{damping: -CORNER, authority: _outward(scene)}, {damping: CORNER, authority: -_outward(scene)}]
     scenes = (scene, *(scene_of(corner(model, c), speed) for c in corners))
     scales = scales_of(model, scene.base, envelope.fin)
-    wanted = dict(want) or dict.fromkeys(scales, 1.0)
+    # at steady speed, thrust and depth no maneuver shows what follows them
+    steady = {c.name for e in scene.effects if e.needs for c in e.coefficients}
+    wanted = dict(want) or {n: 1.0 for n in scales if n not in steady}
     weights = {n: 1.0 / (scales[n] * w) for n, w in wanted.items()}
     return Judge(scenes, envelope, window, autopilot_of(scene.base, envelope.limits), weights, run_up_s * speed)
 

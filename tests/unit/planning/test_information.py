@@ -85,3 +85,12 @@ def test_correlated_parameters_are_worked_by_hand():
     # inverse of [[4, 2], [2, 4]] has 1/3 on its diagonal
     pair = Information(("a", "b"), np.array([[4.0, 2.0], [2.0, 4.0]]))
     assert pair.std_errors() == {"a": pytest.approx(np.sqrt(1 / 3)), "b": pytest.approx(np.sqrt(1 / 3))}
+
+
+def test_a_parameter_that_nothing_shows_leaves_the_errors_of_the_others_as_they_are():
+    known = Information(("a", "b"), np.array([[4.0, 1.0], [1.0, 9.0]]))
+    padded = np.zeros((3, 3))
+    padded[:2, :2] = known.matrix
+    errors = Information(("a", "b", "c"), padded).std_errors()
+    assert errors.pop("c") == np.inf
+    assert errors == pytest.approx(known.std_errors())
