@@ -25,7 +25,7 @@ RESOLUTION = 1e-3
 ROUNDS, DAMPING = 30, 1e-3
 LEAP = 1.5
 """Longest step of a logarithm: the information says little of what is far away."""
-WORTH = 1e-3
+WORTH = 0.02
 """Log likelihood that is not worth another round."""
 GRADIENT_STEP = 1e-4
 
@@ -218,9 +218,10 @@ def _rough_start(
     extra = max(float(np.sqrt(max(rms_rate**2 - floor.rate**2, 0.0))), 0.1 * floor.rate)
     a = max(float(np.mean([max(d[0], 0.1) for d in dynamics])), 0.1)
     spare = max(float(np.sqrt(max(rms_angle**2 - floor.angle**2, 0.0))), 0.1 * floor.angle)
+    known = start.disturbance > 0.0 or start.coloured_angle > 0.0 or start.coloured_rate > 0.0
     return {
-        "angle": floor.angle,
-        "rate": floor.rate,
+        "angle": start.angle if known else floor.angle,
+        "rate": start.rate if known else floor.rate,
         "disturbance": max(start.disturbance, WOKEN * (a * extra + 1e-6)),
         "disturbance_time": start.disturbance_time,
         "coloured_angle": max(start.coloured_angle, WOKEN * spare),
