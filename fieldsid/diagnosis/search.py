@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
@@ -15,6 +17,7 @@ from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import carried, ground_of, promise_of, shortened, twin_of
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
@@ -66,6 +69,7 @@ class Search:
         self.told = self.floor
 
     grown_from: set[frozenset[str]] = field(default_factory=set)
+    flown_from: set[frozenset[str]] = field(default_factory=set)
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _text: None
 
@@ -120,7 +124,9 @@ class Search:
             self.grown_from.add(key)
             most = most or (PROMISING if key == self.root else PROMISING_LATER)
             left = [e for e in self.catalogue if e.name not in key]
-            found = ways(parent, left, None if forced else most, anew=key == self.root)
+            found = ways(parent, left, None if forced else most, anew=key == self.root, flown=key in self.flown_from)
+            self._flown_before(parent)
+            self.flown_from.add(key)
             later = [w for w in found if not self._gone(parent, w)]
             leading = {n for h in self._children(key)[:LEADING] for n in h.names if n not in key}
             for way in later:
@@ -134,6 +140,13 @@ class Search:
         """Return the hypotheses of one effect more that were tried, best first."""
         children = [h for k, h in self.tried.items() if len(k) == len(key) + 1 and key < k]
         return sorted(children, key=lambda h: -h.score)
+
+    def _flown_before(self, parent: Hypothesis) -> None:
+        """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""
+        key = frozenset(parent.names)
+        for name in [n for n in self.free if len(n) == len(key) + 1 and key < n and n not in self.tried]:
+            for free in self.free[name]:
+                self._judge_child(parent, free.problem, free.x, next(e for e in free.effects if e.name not in key))
 
     def _gone(self, parent: Hypothesis, way: Way) -> bool:
         """Go a way, unless one already gone to the same hypothesis has brought what this one promises."""
@@ -156,17 +169,18 @@ class Search:
             free = refine(promise.problem, start, parent.judged.trial.weights)
             self.free.setdefault(frozenset(free.names), []).append(free)
             start = free.x
-        child = judge(promise.problem, start, parent.judged.noise, self.told, self.family)
-        self._keep(child)
-        self._try_twin(child, promise.effect)
+        self._judge_child(parent, promise.problem, start, promise.effect)
 
-    def _try_twin(self, judged: Judged, effect: Effect) -> None:
-        """Judge the other start that has the same response at one speed; of two alike the smaller effect is kept."""
-        problem, x = judged.trial.problem, judged.trial.x
-        start = twin_of(problem, x, effect)
-        if start is None:
+    def _judge_child(self, parent: Hypothesis, problem: Problem, start: FloatArray, effect: Effect) -> None:
+        """Judge a start, and the other start that has the same response at one speed; of two alike the smaller effect is kept."""
+        rival = max((h.judged.likelihood for h in self._children(frozenset(parent.names))), default=-np.inf)
+        judged = judge(problem, start, parent.judged.noise, self.told, self.family, rival=rival)
+        self._keep(judged)
+        x = judged.trial.x
+        other = twin_of(problem, x, effect)
+        if other is None:
             return
-        twin = judge(problem, start, judged.noise, self.told, self.family)
+        twin = judge(problem, other, judged.noise, self.told, self.family)
         place = problem.layout.names.index(effect.coefficients[0].name)
         key = frozenset(judged.trial.names)
         if twin.likelihood > self.tried[key].judged.likelihood - TWINS and twin.trial.x[place] < x[place]:
@@ -222,7 +236,6 @@ class Search:
         self.turned, self.family = True, other
         self.tried.clear()
         self.grown_from.clear()
-        self.free.clear()
         return True
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:

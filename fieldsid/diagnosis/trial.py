@@ -26,6 +26,8 @@ from fieldsid.models.record import Record
 ALTERNATIONS = 3
 POLISH_ROUNDS = 8
 SETTLED = 0.5
+HOPE = 10.0
+"""What the rounds to come gain at most, in gains of the last one."""
 REFINE_ROUNDS = 25
 COARSE, FINE = 1e-4, 1e-5
 """Share of the sum of squares a round must gain: of free runs that are compared to the percent, of likelihoods to a half."""
@@ -71,10 +73,12 @@ def refine(problem: Problem, start: FloatArray, weights: Noise, rounds: int = RE
     return Trial(problem, found.x, new)
 
 
-def judge(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str) -> Judged:
+def judge(
+    problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str, *, rival: float = -np.inf
+) -> Judged:  # fmt: skip
     """Return a hypothesis under the noise of highest likelihood, parameters and noise improved in turn from x.
 
-    floor is what the white part of the noise stays near.
+    floor is what the white part of the noise stays near. One that has no hope of a rival's likelihood is left as it is.
     """
     noise, likelihood = _noise_at(problem, x, start, floor, family)
     for _ in range(ALTERNATIONS):
@@ -83,7 +87,7 @@ def judge(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: s
         if not new > likelihood:
             break
         gained, x, noise, likelihood = new - likelihood, found.x, new_noise, new
-        if gained < SETTLED:
+        if gained < SETTLED or likelihood + HOPE * gained < rival:
             break
     return Judged(Trial(problem, x, white_weights(problem, x)), noise, likelihood, family, floor)
 

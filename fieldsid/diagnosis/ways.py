@@ -33,16 +33,15 @@ class Way:
     plain: bool
 
 
-def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: bool) -> list[Way]:
+def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: bool, flown: bool) -> list[Way]:
     """Return the ways worth going, the `most` best of two screens: the free run's error, and that whitened by its noise.
 
-    Every way to every effect where most is None. anew: the base itself may have bent its numbers, see `_shifted`.
+    Every way to every effect where most is None. anew: the base itself may have bent its numbers, see `_shifted`. The
+    first screen is left out where its ways have been flown.
     """
-    trial = parent.judged.trial
-    free_run = parent.plain or refine(trial.problem, trial.x, trial.weights)
     found: list[Way] = []
-    for at, weights, plain in ((free_run, free_run.weights, True), (trial, parent.judged.noise, False)):
-        ground = ground_of(at.problem, at.x, weights)
+    for plain in (False,) if flown else (True, False):
+        ground = _free_ground(parent) if plain else _whitened_ground(parent)
         worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
         promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
         kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p.cost > worth]
@@ -53,6 +52,17 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: 
         if plain and anew:
             found += [Way(_shifted(ground, e), ground, plain) for e in left if shifts_time(e)]
     return found
+
+
+def _free_ground(parent: Hypothesis) -> Ground:
+    trial = parent.judged.trial
+    free_run = parent.plain or refine(trial.problem, trial.x, trial.weights)
+    return ground_of(free_run.problem, free_run.x, free_run.weights)
+
+
+def _whitened_ground(parent: Hypothesis) -> Ground:
+    trial = parent.judged.trial
+    return ground_of(trial.problem, trial.x, parent.judged.noise)
 
 
 def _followed(ground: Ground, promise: Promise) -> Promise:

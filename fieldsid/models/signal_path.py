@@ -80,36 +80,46 @@ def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Co
     return core
 
 
-def assemble(
-    record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float, pieces: int | None = None
-) -> Assembled:
-    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed.
-
-    pieces per interval follow from the arrays where they are not given.
-    """
+def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
+    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
     core = combined_core(effects, values, scale)
-    drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
-    drive[:, 0] = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
-    if terms.damping is not None:
-        drive[:, 0] += held(terms.damping)
-    drive[:, 1] = base.stiffness
-    start, end = lift(fin, terms)
-    drive[:, 2] = base.authority * start + base.trim
-    drive[:, 3] = base.authority * end + base.trim
-    if terms.moment is not None:
-        drive[:, 2] += terms.moment[:-1]
-        drive[:, 3] += terms.moment[1:]
-    drive[:, 4] = 1.0 if terms.cross_factor is None else held(terms.cross_factor)
-    if core.cross_fin != 0.0:
-        drive[:, 5] = core.cross_fin * fin.mean
-    if core.crossflow != 0.0:
-        # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
-        cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
-        drive[:, 6], drive[:, 7] = cross[:-1], cross[1:]
+    drive = np.empty((len(record) - 1, len(kernels.DRIVES)))
+    for place in range(len(kernels.DRIVES)):
+        drive[:, place] = drive_of(place, record, base, fin, terms, core)
     constants = constants_of(core)
-    return Assembled(drive, constants, pieces or _pieces(record, drive, constants), fin, terms)
+    return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms)
+
+
+def drive_of(place: int, record: Record, base: Base, fin: FinPath, terms: Terms, core: Core) -> FloatArray | float:
+    """Return one of the core's drives, (n-1,) or the same over every interval."""
+    match kernels.DRIVES[place]:
+        case "damping":
+            damping = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
+            return damping if terms.damping is None else damping + held(terms.damping)
+        case "stiffness":
+            return base.stiffness
+        case "moment_start" | "moment_end" as end:
+            return _moment(end, base, fin, terms)
+        case "cross_factor":
+            return 1.0 if terms.cross_factor is None else held(terms.cross_factor)
+        case "cross_push":
+            return core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
+        case flow:
+            return _flow(flow, record) if core.crossflow != 0.0 else 0.0
+
+
+def _moment(end: str, base: Base, fin: FinPath, terms: Terms) -> FloatArray:
+    side, of_time = (0, slice(None, -1)) if end == "moment_start" else (1, slice(1, None))
+    moment = base.authority * lift(fin, terms)[side] + base.trim
+    return moment if terms.moment is None else moment + terms.moment[of_time]
+
+
+def _flow(end: str, record: Record) -> FloatArray:
+    # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
+    cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
+    return cross[:-1] if end == "flow_start" else cross[1:]
 
 
 def constants_of(core: Core) -> FloatArray:

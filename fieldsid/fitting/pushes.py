@@ -1,0 +1,228 @@
+"""What each parameter does to the arrays of the compiled core, and its tangents carried through the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.layout import START_NAMES, Layout
+from fieldsid.logs.run import FloatArray
+from fieldsid.models import kernels
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Coefficient, Core, Effect, Motion, Values
+from fieldsid.models.record import Record
+from fieldsid.models.signal_path import (
+    Assembled,
+    Base,
+    combined_core,
+    combined_terms,
+    constants_of,
+    drive_of,
+    fin_path,
+    lift,
+    measured,
+    run_core,
+)
+
+CROSS = START_NAMES.index("rate_before")
+DAMPING, RATE = (kernels.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate"))
+MOMENT = tuple(kernels.DRIVES.index(name) for name in ("moment_start", "moment_end"))
+ENTERED = {
+    "fin": (*MOMENT, kernels.DRIVES.index("cross_push")),
+    "terms": (*MOMENT, kernels.DRIVES.index("damping"), kernels.DRIVES.index("cross_factor")),
+    "core": (kernels.DRIVES.index("cross_push"),),
+    "moment": MOMENT,
+}
+"""The drives that an effect's hooks enter, by their place; what else a core pushes are constants."""
+EXPONENT = 1e-4
+"""Half width of the central difference by the exponent of the speed law."""
+
+Push = Callable[[slice, FloatArray], None]
+"""Fills a part (m, 8), zero before, with the derivatives of the drives by one number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pushes:
+    """What each slot of a layout does to the core's arrays of one record: the input of its tangents.
+
+    scales are the record's speed over the reference speed and over the speed of its own group; authority is its slot's name.
+    """
+
+    record: Record
+    layout: Layout
+    scales: tuple[float, float]
+    authority: str
+    base: Base
+    values: dict[str, float]
+    start: FloatArray
+    arrays: Assembled
+
+    def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+        """Return motion (n, 3) and sensitivities (P, 2, n) before the sensor."""
+        rows, which, d_c, d_start = self._directions(slots)
+        return self._march(slice(0, len(self.record) - 1), rows, which, d_c, self.start, d_start)
+
+    def integrate_pieces(self, slots: tuple[int, ...], length: int) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
+        """Yield the same in pieces of `length` intervals, without the cross state's sensitivity from piece to piece."""
+        rows, which, d_c, d_start = self._directions(slots)
+        start, last = self.start, len(self.record) - 1
+        for first in range(0, last, length):
+            part = slice(first, min(first + length, last))
+            out, sens = self._march(part, rows, which, d_c, start, d_start)
+            start, d_start = out[-1].copy(), np.column_stack([sens[:, :, -1], np.zeros(len(slots))])
+            end = part.stop + 1 if part.stop == last else part.stop
+            yield slice(first, end), out[: end - first], sens[:, :, : end - first]
+
+    def _directions(self, slots: tuple[int, ...]) -> tuple[list[Push], FloatArray, FloatArray, FloatArray]:
+        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 9), initial states (P, 3)."""
+        count = len(slots)
+        rows: list[Push] = []
+        which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
+        for j, slot in enumerate(slots):
+            name = self.layout.slots[slot].name
+            if name in START_NAMES:
+                part = START_NAMES.index(name)
+                d_start[j, part] = 1.0 if part < CROSS else self._core(self.values).settled(1.0)
+                continue
+            push, d_c[j] = self._push(name)
+            d_start[j, CROSS] = self._moves_start(d_c[j])
+            if push is not None:
+                which[j] = len(rows)
+                rows.append(push)
+        return rows, which, d_c, d_start
+
+    def _core(self, values: Values) -> Core:
+        return combined_core(self.layout.effects, values, self.scales[0])
+
+    def _moves_start(self, d_c: FloatArray) -> float:
+        """Return how the start of the cross state moves with the core's constants (9,), the rate before the run held."""
+        damping, d_damping, d_rate = self.arrays.constants[DAMPING], d_c[DAMPING], d_c[RATE]
+        before = self.values.get("rate_before", 0.0)
+        return -float(d_rate * before + d_damping * self.start[CROSS]) / damping if damping > 0.0 else 0.0
+
+    def _march(
+        self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return motion (m + 1, 3) and sensitivities (P, 2, m + 1) over the m intervals of a part."""
+        a, steps = self.arrays, self.record.steps[part]
+        drives = np.zeros((len(rows), steps.size, len(kernels.DRIVES)))
+        for row, push in zip(drives, rows, strict=True):
+            push(part, row)
+        out, sens = np.empty((steps.size + 1, 3)), np.empty((which.size, 2, steps.size + 1))
+        kernels.tangents(steps, a.drive[part], a.constants, start, a.pieces, drives, which, d_c, d_start, out, sens)
+        return out, sens
+
+    def _push(self, name: str) -> tuple[Push | None, FloatArray]:
+        names = NAMES[self.layout.axis]
+        none = np.zeros(len(kernels.CONSTANTS))
+        share, ratio = self.scales
+        exponent = self.values.get("damping_exponent", 1.0)
+        if name == names.damping:
+            return self._damping(share**exponent), none
+        if name == "damping_exponent":
+            return self._damping(self.base.damping * float(np.log(share))), self._by_exponent(exponent)
+        if name == names.authority or name.startswith(f"{names.authority}@"):
+            return self._authority(ratio**2), none
+        if name == names.stiffness:
+            return _constant(slice(1, 2)), none
+        if name == names.trim:
+            return _constant(slice(2, 4)), none
+        return self._of_effect(name)
+
+    def _by_exponent(self, exponent: float) -> FloatArray:
+        """Return how the core's constants move with the exponent of the damping's speed law, (9,)."""
+        ends = [constants_of(self._core(self.values | {"damping_exponent": exponent + s})) for s in (EXPONENT, -EXPONENT)]
+        return (ends[0] - ends[1]) / (2 * EXPONENT)
+
+    def _damping(self, factor: float) -> Push:
+        shape = self.arrays.terms.damping_factor
+
+        def push(part: slice, row: FloatArray) -> None:
+            row[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1][part] + shape[1:][part])
+
+        return push
+
+    def _authority(self, factor: float) -> Push:
+        start, end = lift(self.arrays.fin, self.arrays.terms)
+
+        def push(part: slice, row: FloatArray) -> None:
+            row[:, 2], row[:, 3] = factor * start[part], factor * end[part]
+
+        return push
+
+    def _of_effect(self, name: str) -> tuple[Push | None, FloatArray]:
+        """Central difference of the arrays by an effect's coefficient; they are cheap, and no motion enters."""
+        coefficient = self._coefficient(name)
+        owner = next(e for e in self.layout.effects if any(c.name == name for c in e.coefficients))
+        if owner.measure is not None:
+            return None, np.zeros(len(kernels.CONSTANTS))
+        step = coefficient.step
+        high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
+        (above, up), (below, down) = (self._entered(owner, self.values | {name: value}) for value in (high, low))
+        slopes = {place: np.asarray(above[place] - below[place]) / (high - low) for place in above}
+        slopes = {place: slope for place, slope in slopes.items() if slope.any()}
+        return (_columns(slopes) if slopes else None), (up - down) / (high - low)
+
+    def _entered(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
+        """Return the drives that an effect enters, by their place, and the core's constants (9,), at these values."""
+        effects, record = self.layout.effects, self.record
+        fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
+        terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)
+        core = self._core(values)
+        places = {place for hook, entered in ENTERED.items() if getattr(owner, hook) is not None for place in entered}
+        drives = {place: drive_of(place, record, self.base, fin, terms, core) for place in places}
+        if owner.moment is not None:
+            path = run_core(record, self.arrays, self.start)
+            moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)
+            drives[MOMENT[0]] = drives[MOMENT[0]] + moment[:-1]
+            drives[MOMENT[1]] = drives[MOMENT[1]] + moment[1:]
+        return drives, constants_of(core)
+
+    def _coefficient(self, name: str) -> Coefficient:
+        return next(c for e in self.layout.effects for c in e.coefficients if c.name == name)
+
+    def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> tuple[Motion, FloatArray]:
+        """Return what the sensors show, with the sensitivities carried through them by directional differences.
+
+        A step of 1e-6 rad is so small against the scale of any sensor's law that a one-sided difference is exact to 1e-6.
+        """
+        effects = self.layout.effects
+        if all(e.measure is None for e in effects):
+            return motion, sens
+        shown = measured(motion, self.record, effects, self.values)
+        out = np.empty_like(sens)
+        sensor_names = {c.name: c for e in effects if e.measure is not None for c in e.coefficients}
+        for j, slot in enumerate(slots):
+            name = self.layout.slots[slot].name
+            if name in sensor_names:
+                step = 2.0 * sensor_names[name].step
+                ends = (self.values | {name: self.values[name] + 0.5 * s} for s in (step, -step))
+                plus, minus = (measured(motion, self.record, effects, values) for values in ends)
+            else:
+                size = float(np.max(np.abs(sens[j])))
+                step = 1e-6 / size if size > 0 else 1.0
+                plus, minus = measured(_moved(motion, sens[j], step), self.record, effects, self.values), shown
+            out[j, 0] = (plus.angle - minus.angle) / step
+            out[j, 1] = (plus.rate - minus.rate) / step
+        return shown, out
+
+
+def _constant(columns: slice) -> Push:
+    def push(_part: slice, row: FloatArray) -> None:
+        row[:, columns] = 1.0
+
+    return push
+
+
+def _columns(slopes: Mapping[int, FloatArray]) -> Push:
+    def push(part: slice, row: FloatArray) -> None:
+        for place, slope in slopes.items():
+            row[:, place] = slope[part]
+
+    return push
+
+
+def _moved(motion: Motion, direction: FloatArray, step: float) -> Motion:
+    return Motion(motion.angle + step * direction[0], motion.rate + step * direction[1])
