@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldsid.diagnosis.hypothesis import Hypothesis, bare_model, errors_under, flown_by, hypothesis_of
+from fieldsid.diagnosis.hypothesis import Hypothesis, bare_model, flown_by, hypothesis_of, training_errors, unseen_errors
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.trial import Trial, judge, refine
@@ -56,7 +56,7 @@ def _tried(search: Search, current: Trial) -> list[tuple[Trial, Pair]]:
         screened = refine(promise.problem, shortened(ground, promise).start, current.weights, ROUNDS, FINE)
         trial = min((screened, _declared(search, promise, current)), key=lambda t: t.weights.angle * t.weights.rate)
         flown = flown_by(bare_model(trial.problem, trial.x, noise), trial, search.validation)
-        found.append((trial, errors_under(trial, flown, search.validation)))
+        found.append((trial, Pair(training_errors(trial), unseen_errors(flown, search.validation))))
     return found
 
 

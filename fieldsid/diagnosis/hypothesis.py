@@ -16,7 +16,7 @@ from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.noise import estimate_noise, floor_of, log_likelihood
-from fieldsid.fitting.predict import frozen_problem, refit_own
+from fieldsid.fitting.predict import frozen_problem, refit_own, with_times
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
@@ -53,11 +53,26 @@ class Hypothesis:
         trial = self.shown
         return bare_model(trial.problem, trial.x, self.judged.noise)
 
-    @cached_property
+    @property
     def errors(self) -> Pair:
         """Errors of the model on the runs it was fitted to and on the runs it was not, each run's own start at its best."""
+        return Pair(self.train, self.unseen_errors)
+
+    @cached_property
+    def train(self) -> Errors:
+        """Errors on the runs it was fitted to."""
+        return training_errors(self.shown)
+
+    @cached_property
+    def unseen_errors(self) -> Errors:
+        """Errors on the runs it was not fitted to."""
         flown = self.flown if self.plain is None else flown_by(self.model, self.plain, self.validation)
-        return errors_under(self.shown, flown, self.validation)
+        return unseen_errors(flown, self.validation)
+
+    @property
+    def judging(self) -> Errors:
+        """The errors a hypothesis is judged by: on unseen runs, on training runs where there are none."""
+        return self.unseen_errors if self.validation else self.train
 
     @property
     def own_model(self) -> Model:
@@ -84,11 +99,10 @@ def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
     """Return a judged trial with its likelihood on the runs it was fitted to and on the runs it was not."""
     problem, x = judged.trial.problem, judged.trial.x
     flown = flown_by(bare_model(problem, x, judged.noise), judged.trial, validation)
-    shown = [(alone, refit_own(alone, start, 0, judged.noise)) for alone, start in flown]
     return Hypothesis(
         judged,
         likelihood_by_run(problem, x, judged.noise),
-        unseen_likelihood(judged, validation, shown),
+        unseen_likelihood(judged, validation, flown),
         _price(judged, validation),
         tuple(validation),
         flown,
@@ -96,11 +110,11 @@ def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
 
 
 def flown_by(model: Model, trial: Trial, validation: Sequence[Record]) -> Flown:
-    """Return the one-run problems of unseen runs with the model's values held, each with the start of its own slots."""
-    return tuple(frozen_problem(model, record, trial.effects) for record in validation)
+    """Return the one-run problems of unseen runs with the model's values held, their own slots at their best under its noise."""
+    return tuple(with_times(*frozen_problem(model, record, trial.effects), model.noise) for record in validation)
 
 
-def unseen_likelihood(judged: Judged, validation: Sequence[Record], shown: Sequence[tuple[Problem, FloatArray]]) -> FloatArray:
+def unseen_likelihood(judged: Judged, validation: Sequence[Record], flown: Flown) -> FloatArray:
     """Return each validation run's log likelihood under the noise that all of them together ask for.
 
     The parameters are the training runs'; the noise is not, or a hypothesis that is right where it was fitted
@@ -108,12 +122,12 @@ def unseen_likelihood(judged: Judged, validation: Sequence[Record], shown: Seque
     """
     if not validation:
         return np.zeros(0)
-    residuals = [left_over(p, x) for p, x in shown]
-    dynamics = [(b.damping, b.stiffness) for b in (p.base_of(x, 0) for p, x in shown)]
+    residuals = [left_over(p, x) for p, x in flown]
+    dynamics = [(b.damping, b.stiffness) for b in (p.base_of(x, 0) for p, x in flown)]
     noise, _ = estimate_noise(validation, dynamics, residuals, judged.family, judged.noise, floor=judged.floor)
     vector = noise_vector(noise)
     return np.array(
-        [log_likelihood(p.records, [d], [e], vector) for (p, _), d, e in zip(shown, dynamics, residuals, strict=True)]
+        [log_likelihood(p.records, [d], [e], vector) for (p, _), d, e in zip(flown, dynamics, residuals, strict=True)]
     )
 
 
@@ -140,8 +154,7 @@ def with_free_run(h: Hypothesis, floor: Noise, parent: Hypothesis | None = None,
     trial = h.judged.trial
     free = [refine(trial.problem, trial.x, trial.weights), *known]
     other = replace(h, plain=min(free, key=lambda t: t.weights.angle * t.weights.rate))
-    old, new = (e.validation if h.validation else e.train for e in (h.errors, other.errors))
-    if new.over(floor) >= old.over(floor) or (parent is not None and _contradicts(other, parent)):
+    if other.judging.over(floor) >= h.judging.over(floor) or (parent is not None and _contradicts(other, parent)):
         return h
     return other
 
@@ -151,10 +164,10 @@ def _contradicts(h: Hypothesis, parent: Hypothesis) -> bool:
     return bool(next(costs) > next(costs))
 
 
-def errors_under(trial: Trial, flown: Flown, validation: Sequence[Record]) -> Pair:
-    """Return the errors of a trial on the runs it was fitted to and on unseen ones, flown by its model."""
+def unseen_errors(flown: Flown, validation: Sequence[Record]) -> Errors:
+    """Return the errors on unseen runs, each run's own start at its best for them."""
     left = [left_over(p, refit_own(p, x, 0, floor_of([r]))) for (p, x), r in zip(flown, validation, strict=True)]
-    return Pair(training_errors(trial), errors_of(validation, left))
+    return errors_of(validation, left)
 
 
 def training_errors(trial: Trial) -> Errors:

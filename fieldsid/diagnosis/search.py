@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
-from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
 from fieldsid.fitting.descent import cost_of
@@ -16,7 +15,7 @@ from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import carried, ground_of, promise_of, shortened, twin_of
+from fieldsid.fitting.starts import ground_of, promise_of, shortened, twin_of
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -189,15 +188,26 @@ class Search:
             self._keep(twin)
 
     def _back_from_child(self, key: frozenset[str]) -> None:
-        """Judge a hypothesis again from where its best child has led its numbers: a cost that is not smooth has many ends."""
+        """Judge a hypothesis again from where its best child has led its numbers: a cost that is not smooth has many ends.
+
+        Where that is a better end, its leading children are judged from there too.
+        """
         child, parent = next(iter(self._children(key)), None), self.tried[key]
         if child is None:
             return
-        trial, problem = child.judged.trial, parent.judged.trial.problem
-        x = carried(trial.problem.layout, trial.x, problem.layout)
-        again = judge(problem, x, child.judged.noise, self.told, self.family)
+        again = self._judged_from(parent, child)
         if again.likelihood > parent.judged.likelihood + SETTLED:
-            self.tried[key] = with_free_run(hypothesis_of(again, self.validation), self.floor)
+            self.tried[key] = parent = with_free_run(hypothesis_of(again, self.validation), self.floor)
+            for late in self._children(key)[:LEADING]:
+                self._keep(self._judged_from(late, parent))
+
+    def _judged_from(self, h: Hypothesis, other: Hypothesis) -> Judged:
+        """Judge a hypothesis from the numbers of another one where it has them, else from its own."""
+        here, there = h.judged.trial, other.judged.trial
+        known = {(s.name, s.run): value for s, value in zip(there.problem.layout.slots, there.x, strict=True)}
+        slots = zip(here.problem.layout.slots, here.x, strict=True)
+        x = np.array([known.get((s.name, s.run), value) for s, value in slots])
+        return judge(here.problem, x, other.judged.noise, self.told, self.family)
 
     def _free_runs(self, key: frozenset[str]) -> None:
         """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
@@ -282,21 +292,17 @@ class Search:
         learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
         return learned and with_.score - without.score > WORTH
 
-    def errors(self, h: Hypothesis) -> Errors:
-        """Return the errors a hypothesis is judged by: on unseen runs, on training runs where there are none."""
-        return h.errors.validation if self.validation else h.errors.train
-
     def misfit(self, h: Hypothesis) -> float:
         """Return the mean of both channels' errors."""
-        return self.errors(h).mean
+        return h.judging.mean
 
     def error(self, h: Hypothesis) -> float:
         """Return the free-run error over the noise floor."""
-        return self.errors(h).over(self.floor)
+        return h.judging.over(self.floor)
 
     def asks_for_more(self, h: Hypothesis) -> bool:
         """Whether something is left above the noise, be it a disturbance or not."""
-        return max(self.error(h), h.errors.train.over(self.floor)) > CLEAN
+        return max(self.error(h), h.train.over(self.floor)) > CLEAN
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

@@ -53,7 +53,7 @@ def worse_unseen(search: Search, h: Hypothesis) -> float:
     """Return the error on unseen runs over that on the runs fitted to; 1 where there are no unseen ones."""
     if not search.validation:
         return 1.0
-    return h.errors.validation.over(search.floor) / max(h.errors.train.over(search.floor), 1.0)
+    return h.unseen_errors.over(search.floor) / max(h.train.over(search.floor), 1.0)
 
 
 def added(search: Search, h: Hypothesis) -> tuple[str, ...]:

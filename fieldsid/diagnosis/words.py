@@ -14,7 +14,7 @@ from fieldsid.models.model import Noise
 
 def over(search: Search, h: Hypothesis, floor: Noise) -> float:
     """Return a hypothesis's error on the runs it is judged by over a noise floor."""
-    return search.errors(h).over(floor)
+    return h.judging.over(floor)
 
 
 def evidence(search: Search, h: Hypothesis, floor: Noise) -> str:
@@ -60,7 +60,7 @@ def _sized(search: Search, h: Hypothesis, error: float) -> str:
     """Return an error in words: over the noise floor, in its own units where the logs show next to no noise."""
     if not search.is_noiseless:
         return f"{error:.2f} x the noise floor"
-    errors = search.errors(h)
+    errors = h.judging
     parts = [(errors.angle_rms_rad, "rad"), (errors.rate_rms_rad_s, "rad/s")]
     return " and ".join(f"{value:.2g} {unit}" for value, unit in parts if isfinite(value))
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from fieldsid.errors import ModelError
-from fieldsid.fitting.between import jumps_of, timed
+from fieldsid.fitting.between import timed
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.first_second import first_second
 from fieldsid.fitting.layout import Groups, Layout, Slot, layout_of
@@ -26,8 +26,6 @@ from fieldsid.models.simulate import effects_of
 
 OWN_ROUNDS, OWN = 15, 1e-6
 """Rounds for a run's own slots, and the share of the sum of squares a round must gain."""
-START_ROUNDS = 4
-"""Rounds for an initial state alone: the motion is nearly linear in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +53,9 @@ class Prediction:
 
 def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
     """Return a model's free run on a record; raises ModelError when it grows without bound."""
-    problem, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
-    as_logged = None if problem.records[0] is record else _rms_as_logged(Problem((record,), problem.layout), x)
-    x = refit_own(problem, x, 0, floor_of([record]))
+    logged, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
+    problem, x = with_times(logged, x, floor_of([record]))
+    as_logged = None if problem is logged else _rms_as_logged(logged, x)
     motion, _ = problem.simulate(x, 0)
     if not np.isfinite(motion.rate).all():
         at = float(record.time[np.argmin(np.isfinite(motion.rate))])
@@ -74,10 +72,7 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
 
 
 def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
-    """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start.
-
-    Its command's jumps are timed between the samples where the log's own times do not do.
-    """
+    """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start."""
     names = NAMES[model.axis]
     layout = layout_of([record], model.axis, effects)
     groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),))
@@ -86,7 +81,7 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     scale = model.law.scale(record.speed)
     values = dict(model.values) | {names.authority: model.at_speed(record.speed)[names.authority] / scale**2}
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
-    return with_times(Problem((record,), layout), x)
+    return Problem((record,), layout), x
 
 
 def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
@@ -98,18 +93,18 @@ def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
     return rms[0], rms[1]
 
 
-def with_times(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
-    """Return a one-run problem with its command's jumps timed, and a start for the run's own slots."""
-    record, layout = problem.records[0], problem.layout
-    if jumps_of(record).size < 2:
+def with_times(problem: Problem, x: FloatArray, noise: Noise) -> tuple[Problem, FloatArray]:
+    """Return a one-run problem and x with the run's own slots at their best under a noise.
+
+    Its command's jumps are timed between the samples where the log's own times do not do.
+    """
+    record = problem.records[0]
+    x = refit_own(problem, x, 0, noise)
+    better = timed(problem, x, floor_of([record]))
+    if better is None:
         return problem, x
-    floor = floor_of([record])
-    if any(e.nuisance for e in layout.effects):
-        x = refit_own(problem, x, 0, floor)
-    else:
-        x = descend(problem, x, floor, free=layout.of_run(0), rounds=START_ROUNDS).x
-    better = timed(problem, x, floor)
-    return (problem if better is None else Problem((better,), problem.layout)), x
+    problem = Problem((better,), problem.layout)
+    return problem, refit_own(problem, x, 0, noise)
 
 
 def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatArray:
