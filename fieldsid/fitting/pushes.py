@@ -84,7 +84,7 @@ class Pushes:
             name = self.layout.slots[slot].name
             if name in START_NAMES:
                 part = START_NAMES.index(name)
-                d_start[j, part] = 1.0 if part < CROSS else self._core(self.values).settled(1.0)
+                d_start[j, part] = 1.0 if part < CROSS else self.arrays.core.settled(1.0)
                 continue
             push, d_c[j] = self._push(name)
             d_start[j, CROSS] = self._moves_start(d_c[j])
@@ -170,7 +170,7 @@ class Pushes:
         effects, record = self.layout.effects, self.record
         fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
         terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)
-        core = self._core(values)
+        core = self.arrays.core if owner.core is None else self._core(values)
         places = {place for hook, entered in ENTERED.items() if getattr(owner, hook) is not None for place in entered}
         drives = {place: drive_of(place, record, self.base, fin, terms, core) for place in places}
         if owner.moment is not None:
@@ -178,7 +178,7 @@ class Pushes:
             moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)
             drives[MOMENT[0]] = drives[MOMENT[0]] + moment[:-1]
             drives[MOMENT[1]] = drives[MOMENT[1]] + moment[1:]
-        return drives, constants_of(core)
+        return drives, self.arrays.constants if owner.core is None else constants_of(core)
 
     def _coefficient(self, name: str) -> Coefficient:
         return next(c for e in self.layout.effects for c in e.coefficients if c.name == name)

@@ -6,7 +6,8 @@ One code path for effects present and absent: every hook of every effect is appl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -34,13 +35,14 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """Arrays of the core: drive (n-1, 8), constants (9,), pieces per interval; and the fin path they came from."""
+    """Arrays of the core: drive (n-1, 8), constants (9,), pieces per interval; and what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
     pieces: int
     fin: FinPath
     terms: Terms
+    core: Core
 
 
 def fin_path(record: Record, effects: Sequence[Effect], values: Values) -> FinPath:
@@ -73,11 +75,8 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
 
 def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
     """Return the sum of the effects' coefficients in the core; scale is the run's speed over the model's reference speed."""
-    core = Core()
-    for effect in effects:
-        if effect.core is not None:
-            core = core.plus(effect.core(values, scale))
-    return core
+    own = [effect.core(values, scale) for effect in effects if effect.core is not None]
+    return reduce(Core.plus, own) if own else Core()
 
 
 def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
@@ -89,7 +88,7 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     for place in range(len(kernels.DRIVES)):
         drive[:, place] = drive_of(place, record, base, fin, terms, core)
     constants = constants_of(core)
-    return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms)
+    return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms, core)
 
 
 def drive_of(place: int, record: Record, base: Base, fin: FinPath, terms: Terms, core: Core) -> FloatArray | float:
@@ -158,9 +157,7 @@ def with_moments(record: Record, assembled: Assembled, effects: Sequence[Effect]
         drive = assembled.drive.copy()
         for effect in own:
             _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
-        current = Assembled(
-            drive, assembled.constants, _pieces(record, drive, assembled.constants), assembled.fin, assembled.terms
-        )
+        current = replace(assembled, drive=drive, pieces=_pieces(record, drive, assembled.constants))
         new = run_core(record, current, start)
         change = float(np.max(np.abs(new[:, :2] - path[:, :2])))
         path = new
