@@ -2,8 +2,8 @@
 
 A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted
 noise model are white, of even size throughout, and not related to the fin or the motion. Three tests look for what
-is not so: colour (Ljung-Box), relation to fin and motion (F test, and the score test of diagnosis/memory.py), and
-bursts or uneven size (windowed energy).
+is not so: colour (Ljung-Box), relation to fin and motion (F test, the score test of diagnosis/memory.py, and a size that
+grows with them), and bursts or uneven size (windowed energy).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from fieldsid.models.record import Record
 
 WINDOW_S = 2.0
 HISTORY_S = 3.0
+GROWTH_S, LEAST_BLOCKS = 1.0, 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +61,9 @@ def remainder_of(h: Hypothesis) -> Remainder:
     Not on unseen runs: there the parameters' own errors follow the motion, and would be taken for something missing.
     """
     runs = _training(h)
-    relation, name = _relation(runs)
     memory = follows(h.judged.trial, h.judged.noise)
-    if 2.0 * memory.p < relation:
-        relation, name = 2.0 * memory.p, memory.what
+    relation, name = min(_relation(runs), _growth(runs), (memory.p, memory.what))
+    relation = min(1.0, 3.0 * relation)
     bursts, run, window, ratio = _bursts(runs)
     start = runs[run].record.time[0] + window * WINDOW_S
     return Remainder(_colour(runs), relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
@@ -110,25 +110,53 @@ def _features(run: Left, width: int) -> dict[str, FloatArray]:
 
 
 def _relation(runs: Sequence[Left]) -> tuple[float, str]:
-    """Return the p-value of an F test of innovations, and of their size, against fin and motion; and the best feature."""
+    """Return the p-value of an F test of innovations against fin and motion, and the best feature."""
+    target, columns, names = [], [], list[str]()
+    for run in runs:
+        slow, width = _slow(run, WINDOW_S / 4)
+        features = _features(run, width)
+        names = list(features)
+        target.append(slow)
+        columns.append(np.column_stack(list(features.values())))
+    y, x = np.concatenate(target), np.concatenate(columns)
+    p, index = _f_test(y - y.mean(), x - x.mean(axis=0))
+    return p, names[index]
+
+
+def _slow(run: Left, seconds: float) -> tuple[FloatArray, int]:
+    """Return means of the innovations over blocks, of unit variance still, and a block's samples.
+
+    The slow part is where a disturbance stands out from sensor noise.
+    """
+    width = max(1, round(seconds / float(np.median(run.record.steps))))
+    channel = 1 if run.record.rate_ok.any() else 0
+    return _blocks(run.white[channel], width) * np.sqrt(width), width
+
+
+def _growth(runs: Sequence[Left]) -> tuple[float, str]:
+    """Return the p-value of slow innovations that grow with the motion or the fin, and with which.
+
+    A factor that comes and goes (damping, authority) pushes by what it multiplies; the sea does not. Score test of
+    variance = 1 + g (x / mean x - 1) for g > 0: sum of (x / mean x - 1) (e^2 / mean e^2 - 1), its first three moments
+    those of a weighted sum of chi squares (Breusch and Pagan 1979, Econometrica 47(5)).
+    """
+    size, parts = [], []
+    for run in runs:
+        slow, width = _slow(run, GROWTH_S)
+        fin, rate = run.record.fin - run.record.fin.mean(), run.rate
+        size.append(slow**2)
+        parts.append([_blocks(v, width) for v in (rate**2, fin**2, np.abs(fin * rate))])
+    y = np.concatenate(size)
     best, name = 1.0, ""
-    for power in (1, 2):
-        target, columns, names = [], [], []
-        for run in runs:
-            width = max(1, round(WINDOW_S / 4 / float(np.median(run.record.steps))))
-            channel = 1 if run.record.rate_ok.any() else 0
-            e = run.white[channel]
-            # the slow part of the innovations is where a disturbance stands out from sensor noise
-            e = (_blocks(e, width) * np.sqrt(width)) ** power
-            features = _features(run, width)
-            names = list(features)
-            block = np.column_stack([np.abs(f) if power == 2 else f for f in features.values()])
-            target.append(e)
-            columns.append(block)
-        y, x = np.concatenate(target), np.concatenate(columns)
-        p, index = _f_test(y - y.mean(), x - x.mean(axis=0))
-        if 2 * p < best:
-            best, name = 2 * p, names[index]
+    for what, blocks in zip(("rate squared", "fin squared", "|fin x rate|"), zip(*parts, strict=True), strict=True):
+        x = np.concatenate(blocks)
+        if not (x.size > LEAST_BLOCKS and x.mean() > 0.0 and y.mean() > 0.0):
+            continue
+        w = x / x.mean() - 1.0
+        spread = np.sqrt(2.0 * float(w @ w))
+        if spread > 0.0:
+            p = float(stats.pearson3.sf(float(w @ (y / y.mean() - 1.0)) / spread, 8.0 * float(np.sum(w**3)) / spread**3))
+            best, name = min((best, name), (3.0 * p, f"the size of {what}"))
     return min(best, 1.0), name
 
 
