@@ -115,8 +115,9 @@ def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> 
     from fieldsid.artifacts import sha256_of
     from fieldsid.effects import pick_effect
     from fieldsid.extension import gain_body, kept_by
+    from fieldsid.models.effect import as_fitted
 
-    new = [c for n in found.gain.added for c in pick_effect(n).shared]
+    new = [c for n in found.gain.added for c in as_fitted(pick_effect(n), found.model.values).shared]
     return {
         "schema": SCHEMA,
         "axis": parent.axis.value,

@@ -151,8 +151,8 @@ def with_free_run(h: Hypothesis, floor: Noise, parent: Hypothesis | None = None,
     numbers must not contradict what the parent's noise weighs most, as a gyro's scale that bends the rate of a free run
     contradicts the heading. known are free runs found before.
     """
-    trial = h.judged.trial
-    free = [refine(trial.problem, trial.x, trial.weights), *known]
+    trial, names = h.judged.trial, h.judged.trial.problem.layout.names
+    free = [refine(trial.problem, trial.x, trial.weights), *(t for t in known if t.problem.layout.names == names)]
     other = replace(h, plain=min(free, key=lambda t: t.weights.angle * t.weights.rate))
     if other.judging.over(floor) >= h.judging.over(floor) or (parent is not None and _contradicts(other, parent)):
         return h

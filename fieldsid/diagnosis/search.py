@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fieldsid.diagnosis.forms import in_other_forms
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
@@ -93,6 +94,7 @@ class Search:
             self.family = judged.family
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
+            self._reshape(self.root)
         return self.tried[self.root]
 
     def _laws(self) -> tuple[bool, ...]:
@@ -133,6 +135,9 @@ class Search:
                     self._go(parent, way)
             self._back_from_child(key)
             self._free_runs(key)
+            for child in self._children(key)[:FREE_RUNS]:
+                if self.likelier(self.tried[key], child):
+                    self._reshape(frozenset(child.names))
         return self._children(key)
 
     def _children(self, key: frozenset[str]) -> list[Hypothesis]:
@@ -215,6 +220,17 @@ class Search:
             if child.score > self.tried[key].score:
                 name = frozenset(child.names)
                 self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
+
+    def _reshape(self, key: frozenset[str]) -> None:
+        """Put a hypothesis's effects into other forms than the textbook's as long as that pays."""
+        for problem, start in in_other_forms(self.tried[key]) if self.asks_for_more(self.tried[key]) else ():
+            known = self.tried[key]
+            judged = judge(problem, start, known.judged.noise, self.told, self.family, rival=known.judged.likelihood)
+            other = with_free_run(hypothesis_of(judged, self.validation), self.floor)
+            if self.pays(known, other):
+                self.tried[key] = other
+                self._reshape(key)
+                return
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""

@@ -6,6 +6,7 @@ The area under the path moves the hull, so the mean is kept exactly; start and e
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +27,37 @@ def line_of_two_pieces(bend: float, first: float, middle: float, last: float) ->
     """
     excess = middle - (first + (last - first) * bend)
     return first + excess * (1.0 - bend), last + excess * bend
+
+
+def bend(x: FloatArray, blend: float) -> FloatArray:
+    """Return max(x, 0), its corner rounded over about `blend` to either side: (x + sqrt(x^2 + blend^2)) / 2."""
+    return np.asarray(0.5 * (x + np.hypot(x, blend)))
+
+
+def area_of_bend(x: FloatArray, blend: float) -> FloatArray:
+    """Return an antiderivative of `bend`."""
+    round_part = 0.0 if blend == 0.0 else blend**2 * np.arcsinh(x / blend)
+    return np.asarray(0.25 * (x * x + x * np.hypot(x, blend) + round_part))
+
+
+@dataclass(frozen=True, slots=True)
+class Beyond:
+    """The part of an angle d beyond +/-edge, sign(d) max(|d| - edge, 0), its corners rounded over `blend`; zero at zero."""
+
+    edge: float
+    blend: float
+
+    def value(self, d: FloatArray) -> FloatArray:
+        """Return the part beyond, (n,) rad."""
+        at_zero = bend(np.array(-self.edge), self.blend)
+        return np.asarray(np.sign(d) * (bend(np.abs(d) - self.edge, self.blend) - at_zero))
+
+    def area(self, d: FloatArray) -> FloatArray:
+        """Return its integral from zero, (n,) rad^2."""
+        zero, size = np.array(-self.edge), np.abs(d)
+        return np.asarray(
+            area_of_bend(size - self.edge, self.blend) - area_of_bend(zero, self.blend) - bend(zero, self.blend) * size
+        )
 
 
 def through_map(path: FinPath, value: Map, area: Map) -> FinPath:

@@ -1,6 +1,7 @@
 """The compass errs by heading: measured = psi + deviation_sin sin(psi) + deviation_cos cos(psi), rad.
 
-Iron in the vehicle does this (semicircular deviation). The rate gyro is right, so heading and rate disagree.
+Magnets in the vehicle do this (semicircular deviation); soft iron adds deviation_sin2 sin(2 psi) + deviation_cos2 cos(2 psi)
+(quadrantal deviation). The rate gyro is right, so heading and rate disagree.
 Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, chapter 6.
 """
 
@@ -9,14 +10,17 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
 from fieldsid.models.record import Record
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the compass shows it; angle (n,) rad, rate as it is."""
     psi = motion.angle
-    return Motion(psi + values["deviation_sin"] * np.sin(psi) + values["deviation_cos"] * np.cos(psi), motion.rate)
+    shown = psi + values["deviation_sin"] * np.sin(psi) + values["deviation_cos"] * np.cos(psi)
+    if "deviation_sin2" in values:
+        shown = shown + values["deviation_sin2"] * np.sin(2.0 * psi) + values["deviation_cos2"] * np.cos(2.0 * psi)
+    return Motion(shown, motion.rate)
 
 
 EFFECT = Effect(
@@ -34,4 +38,13 @@ EFFECT = Effect(
     mistaken_for=("current", "gyro_scale", "gyro_bias"),
     source="Groves 2013, chapter 6",
     measure=measure,
+    forms=(
+        Form(
+            "it goes twice around with the heading as well",
+            (
+                Coefficient("deviation_sin2", "rad", -0.5, 0.5, 0.0, says="quadrantal error, greatest on north-east"),
+                Coefficient("deviation_cos2", "rad", -0.5, 0.5, 0.0, says="quadrantal error, greatest on north"),
+            ),
+        ),
+    ),
 )

@@ -1,7 +1,8 @@
 """The fin follows its command as a first-order lag: lag d(delta)/dt = command - delta, lag >= 0 in s.
 
 The response to a straight-line command is exact, and so is its mean over the interval; the servo starts at rest on
-the command. Source: Van Amerongen 1982 (the steering machine, linear part).
+the command. In its form of second order the servo has inertia: inertia_share lag^2 d2(delta)/dt2 is added on the left, which
+is damped by 1 / (2 sqrt(inertia_share)). Source: Van Amerongen 1982 (the steering machine, linear part).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
 from fieldsid.models.jit import jit
 from fieldsid.models.record import Record
 
@@ -39,12 +40,48 @@ def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, ou
         fin = start[i] + slope * (h - lag) + c * (1.0 - gone)
 
 
+@jit
+def swung(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, inertia: float, out: FloatArray) -> None:
+    """Fill out (n-1, 2) as `lagged` does for inertia delta'' + lag delta' + delta = command, inertia in s^2.
+
+    e, the fin less the line it follows, has no command: its integrals follow from its own equation, its end from the
+    exponential of that.
+    """
+    fin, speed = start[0], 0.0
+    decay = -0.5 * lag / inertia
+    squared = decay * decay - 1.0 / inertia
+    for i in range(start.shape[0]):
+        h = steps[i]
+        slope = (end[i] - start[i]) / h
+        first, first_speed = fin - start[i] + slope * lag, speed - slope
+        root = np.sqrt(abs(squared))
+        if root * h < 1e-6:
+            even, odd = np.exp(decay * h), h * np.exp(decay * h)
+        elif squared < 0.0:
+            even, odd = np.exp(decay * h) * np.cos(root * h), np.exp(decay * h) * np.sin(root * h) / root
+        else:
+            slow, fast = np.exp((decay + root) * h), np.exp((decay - root) * h)
+            even, odd = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
+        e = even * first + odd * (first_speed - decay * first)
+        v = even * first_speed + odd * (decay * first_speed - first / inertia)
+        area = -inertia * (v - first_speed) - lag * (e - first)
+        moment = -inertia * (h * v - e + first) - lag * h * e + lag * area - 0.5 * h * area
+        mean = start[i] + slope * (0.5 * h - lag) + area / h
+        half = 0.5 * slope * h + 6.0 * moment / (h * h)
+        out[i, 0], out[i, 1] = mean - half, mean + half
+        fin, speed = start[i] + slope * (h - lag) + e, v + slope
+
+
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
-    """Return the path of a fin behind a first-order servo, (n-1,) rad."""
-    if values["lag"] <= FASTEST_S:
+    """Return the path of a fin behind a servo of first order, or of second order where its inertia is given, (n-1,) rad."""
+    lag = float(values["lag"])
+    if lag <= FASTEST_S:
         return path
     out = np.empty((path.start.size, 2))
-    lagged(record.steps, path.start, path.end, float(values["lag"]), out)
+    if "inertia_share" in values:
+        swung(record.steps, path.start, path.end, lag, float(values["inertia_share"]) * lag * lag, out)
+    else:
+        lagged(record.steps, path.start, path.end, lag, out)
     return FinPath(out[:, 0].copy(), out[:, 1].copy())
 
 
@@ -74,4 +111,14 @@ EFFECT = Effect(
     order=30,
     fin=fin,
     twin=twin,
+    forms=(
+        Form(
+            "a servo with inertia, of second order",
+            (
+                Coefficient(
+                    "inertia_share", "1", 0.02, 4.0, 0.5, scan=(0.25, 0.8), step=1e-3, says="inertia over the square of the lag"
+                ),
+            ),
+        ),
+    ),
 )

@@ -1,27 +1,27 @@
 """Lift falls off at large fin angles: beyond stall_angle the effective angle grows with slope_after only.
 
     delta = sign(d) (stall_angle + slope_after (|d| - stall_angle))   for |d| > stall_angle, else d
-slope_after = 1 is no stall, 0 a lift that stays, negative one that drops. Source: Whicker and Fehlner 1958, DTMB
+slope_after = 1 is no stall, 0 a lift that stays, negative one that drops. In its smooth form the corner is rounded over
+stall_blend to either side. Source: Whicker and Fehlner 1958, DTMB
 report 933 (lift of low-aspect-ratio control surfaces).
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldsid.effects._paths import through_map
+from fieldsid.effects._paths import Beyond, through_map
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
 from fieldsid.models.record import Record
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of the effective angle, (n-1,) rad."""
-    angle, lost = values["stall_angle"], 1.0 - values["slope_after"]
+    angle, lost, blend = values["stall_angle"], 1.0 - values["slope_after"], values.get("stall_blend", 0.0)
+    beyond = Beyond(angle, blend)
     return through_map(
         path,
-        lambda d: d - lost * np.sign(d) * np.maximum(np.abs(d) - angle, 0.0),
-        lambda d: 0.5 * d * d - 0.5 * lost * np.maximum(np.abs(d) - angle, 0.0) ** 2,
+        lambda d: d - lost * beyond.value(d),
+        lambda d: 0.5 * d * d - lost * beyond.area(d),
     )
 
 
@@ -42,5 +42,22 @@ EFFECT = Effect(
     mistaken_for=("quadratic_damping", "deadband", "rate_limit", "crossflow_drag", "asymmetric_fin"),
     source="Whicker and Fehlner 1958, DTMB report 933",
     order=70,
+    forms=(
+        Form(
+            "the lift bends off smoothly",
+            (
+                Coefficient(
+                    "stall_blend",
+                    "rad",
+                    0.0,
+                    0.3,
+                    0.05,
+                    scan=(0.03, 0.1),
+                    step=5e-4,
+                    says="angle over which the corner is rounded",
+                ),
+            ),
+        ),
+    ),
     fin=fin,
 )

@@ -11,23 +11,23 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
 from fieldsid.models.record import Record
 
 GRID = tuple(round(0.05 * i, 2) for i in range(1, 20))
 
 
-def happened(share: float, record: Record) -> FloatArray:
-    """Return H (n,): 0 before the event, 1 after it, a ramp of one sample around it so that it has a derivative."""
+def happened(share: float, record: Record, ramp: float = 0.0) -> FloatArray:
+    """Return H (n,): 0 before the event, 1 once `ramp` s have gone by, one sample longer so that it has a derivative."""
     length = float(record.time[-1] - record.time[0])
     event = record.time[0] + share * length
     sample = length / max(record.time.size - 1, 1)
-    return np.asarray(np.clip((record.time - event) / sample + 0.5, 0.0, 1.0))
+    return np.asarray(np.clip((record.time - event + 0.5 * sample) / (sample + ramp), 0.0, 1.0))
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the factor on the authority (n,) and the moment (n,) rad/s^2."""
-    after = happened(values["event_time"], record)
+    after = happened(values["event_time"], record, values.get("ramp", 0.0))
     return Terms(authority_factor=1.0 - values["loss"] * after, moment=values["moment_step"] * after)
 
 
@@ -50,4 +50,14 @@ EFFECT = Effect(
     source="Blanke, Kinnaert, Lunze and Staroswiecki 2016, Diagnosis and Fault-Tolerant Control",
     terms=terms,
     handicap=5.0,
+    forms=(
+        Form(
+            "it comes on gradually",
+            (
+                Coefficient(
+                    "ramp", "s", 0.0, 20.0, 3.0, scan=(1.5, 5.0), step=1e-2, says="time from the event to the full change"
+                ),
+            ),
+        ),
+    ),
 )

@@ -58,6 +58,17 @@ class Coefficient:
 
 
 @dataclass(frozen=True, slots=True)
+class Form:
+    """A shape of an effect that is not the textbook's, in a few words, and the coefficients it takes besides.
+
+    The effect's hooks take the textbook's shape where the values lack them.
+    """
+
+    says: str
+    coefficients: tuple[Coefficient, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class FinPath:
     """Fin angle over each sampling interval, straight from `start` to `end`, both (n-1,) in rad."""
 
@@ -134,6 +145,7 @@ class Effect:
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
+    `forms` are other shapes, tried where the textbook's leaves something.
     `handicap` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     """
@@ -158,6 +170,7 @@ class Effect:
     measure: Callable[[Motion, Values, Record], Motion] | None = None
     suggest: Callable[[Sequence[Record], Sequence[FloatArray]], list[dict[str, float]]] | None = None
     twin: Callable[[Values, Axis], dict[str, float] | None] | None = None
+    forms: tuple[Form, ...] = ()
     handicap: float = 0.0
     origin: str = field(default="built in")
 
@@ -174,6 +187,19 @@ class Effect:
     def starts(self) -> dict[str, float]:
         """Return the start value of every coefficient."""
         return {c.name: c.start for c in self.coefficients}
+
+
+def in_form(effect: Effect, form: Form) -> Effect:
+    """Return an effect with the coefficients of one of its forms among its own."""
+    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=())
+
+
+def as_fitted(effect: Effect, values: Values) -> Effect:
+    """Return an effect in the form that a model's values belong to."""
+    for form in effect.forms:
+        if all(c.name in values for c in form.coefficients):
+            return in_form(effect, form)
+    return effect
 
 
 def held(values: FloatArray) -> FloatArray:

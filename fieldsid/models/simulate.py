@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fieldsid.errors import ModelError
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Effect, Motion, effect_named
+from fieldsid.models.effect import Effect, Motion, as_fitted, effect_named
 from fieldsid.models.model import Model
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import Base, assemble, measured, run_core, with_moments
@@ -30,8 +30,8 @@ class Trajectory:
 
 
 def effects_of(model: Model) -> tuple[Effect, ...]:
-    """Return the model's effects from the registry; raises UsageError for one that is not known."""
-    return tuple(effect_named(name) for name in model.effects)
+    """Return the model's effects from the registry, in the forms it was fitted in; raises UsageError for an unknown one."""
+    return tuple(as_fitted(effect_named(name), model.values) for name in model.effects)
 
 
 def base_at(model: Model, speed: float) -> Base:

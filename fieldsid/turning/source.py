@@ -13,8 +13,8 @@ from fieldsid.artifacts import read_yaml
 from fieldsid.errors import UsageError
 from fieldsid.logs.run import FloatArray, Run
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Model, load_model
+from fieldsid.models.simulate import effects_of
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.turning.law import ParameterLaw
 from fieldsid.turning.laws import KIND as FIT_KIND
@@ -189,7 +189,7 @@ def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[lis
 
 def _bounds(model: Model) -> dict[str, tuple[float, float]]:
     names = NAMES[model.axis]
-    bounds = {c.name: (c.low, c.high) for e in model.effects for c in effect_named(e).shared}
+    bounds = {c.name: (c.low, c.high) for e in effects_of(model) for c in e.shared}
     for name in (names.damping, names.authority):
         value = model.values[name]
         bounds[name] = (0.05 * value, np.inf) if value > 0 else (-np.inf, 0.05 * value)
