@@ -25,6 +25,9 @@ RESOLUTION = 1e-3
 ROUNDS, DAMPING = 30, 1e-3
 LEAP = 1.5
 """Longest step of a logarithm: the information says little of what is far away."""
+LEAST = 0.1
+"""Share of what the differences show that the white noise is at least: an AR(1) noise of many samples, which has no white
+part, shows half its own increments in them."""
 WORTH = 0.02
 """Log likelihood that is not worth another round."""
 GRADIENT_STEP = 1e-4
@@ -186,8 +189,12 @@ class _Slope:
 
 
 def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return log bounds; white sensor noise stays near what the differences of the signal show of it, but above `least`."""
-    low = {**LOW, "angle": max(0.4 * floor.angle, least[0]), "rate": max(0.4 * floor.rate, least[1])}
+    """Return log bounds; white sensor noise stays near what the differences of the signal show of it.
+
+    Where they show less than `least` it stays above that.
+    """
+    shown = (LEAST * seen if seen > bound else bound for seen, bound in zip((floor.angle, floor.rate), least, strict=True))
+    low = LOW | dict(zip(("angle", "rate"), shown, strict=True))
     high = {**HIGH, "angle": max(2.0 * floor.angle, 2.5 * least[0]), "rate": max(2.0 * floor.rate, 2.5 * least[1])}
     return np.log([low[n] for n in names]), np.log([high[n] for n in names])
 
