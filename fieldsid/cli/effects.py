@@ -79,6 +79,7 @@ def _described(effect: Effect) -> dict[str, Any]:
         "axes": effect.axes,
         "equation": effect.equation,
         "coefficients": [_coefficient(c) for c in effect.coefficients],
+        "forms": [{"says": f.says, "coefficients": [_coefficient(c) for c in f.coefficients]} for f in effect.forms],
         "needs": effect.needs,
         "extra_states": effect.extra_states,
         "telltale": effect.telltale,
@@ -109,6 +110,7 @@ def _render_one(to: Console, effect: Effect) -> None:
         ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
         ("equation", effect.equation),
         ("telltale", effect.telltale),
+        *(("or in the form", f.says) for f in effect.forms),
         ("excited by", ", ".join(effect.excited_by)),
         ("mistaken for", ", ".join(effect.mistaken_for) or "-"),
         ("log must have", ", ".join(effect.needs) or "nothing more"),
@@ -119,7 +121,7 @@ def _render_one(to: Console, effect: Effect) -> None:
     to.print(table("", ("", ""), facts, left=2))
     rows = [
         (c.name, c.unit, f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
-        for c in effect.coefficients
+        for c in (*effect.coefficients, *(c for f in effect.forms for c in f.coefficients))
     ]
     to.print()
     to.print(table("", ("coefficient", "unit", "range", "is"), rows, left=4))

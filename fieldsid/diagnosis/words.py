@@ -48,12 +48,20 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
             + (f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > WORSE else "")
         )
     names = " and ".join(verdict.effects)
-    says = "; ".join(effect_named(n).says for n in verdict.effects)
+    says = "; ".join(_says(found, n) for n in verdict.effects)
     fall = f"the error on {runs} falls from {_sized(search, search.base(), base)} to {_sized(search, found, error)}"
     if verdict.word == "undecided":
         others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
         return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
     return f"{names} ({says}): {fall}"
+
+
+def _says(h: Hypothesis, name: str) -> str:
+    """Return what an effect of a hypothesis does, with the form it was fitted in where that is not the textbook's."""
+    effect = effect_named(name)
+    fitted = {c.name for e in h.effects if e.name == name for c in e.coefficients}
+    form = next((f for f in effect.forms if {c.name for c in f.coefficients} <= fitted), None)
+    return effect.says if form is None else f"{effect.says}: {form.says}"
 
 
 def _sized(search: Search, h: Hypothesis, error: float) -> str:

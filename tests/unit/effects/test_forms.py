@@ -1,0 +1,95 @@
+"""Other forms of the effects: the textbook's at their neutral numbers, and each against its equation written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldsid.effects import all_effects, pick_effect
+from fieldsid.effects._paths import Beyond
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import FinPath, Motion, as_fitted, in_form
+from fieldsid.models.simulate import command_record
+
+NEUTRAL = {
+    "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
+    "deviation_sin2": 0.0, "deviation_cos2": 0.0,
+}  # fmt: skip
+"""Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
+
+
+def record():
+    time = np.arange(0.0, 20.0, 0.05)
+    fin = np.interp(time, [0.0, 4.0, 9.0, 15.0, 20.0], [0.0, 0.3, -0.25, 0.1, 0.0])
+    return command_record(Axis.YAW, time, fin, speed=1.4)
+
+
+def shown(effect, values, log):
+    """Everything an effect gives, as one array."""
+    if effect.fin is not None:
+        path = effect.fin(log.commanded, values, log)
+        return np.concatenate([path.start, path.end])
+    if effect.measure is not None:
+        motion = effect.measure(Motion(np.linspace(-3.0, 3.0, len(log)), np.ones(len(log))), values, log)
+        return np.concatenate([motion.angle, motion.rate])
+    terms = effect.terms(values, log)
+    return np.concatenate([part for part in (terms.moment, terms.authority_factor) if part is not None])
+
+
+FORMS = [(n, i) for n, e in sorted(all_effects().items()) for i in range(len(e.forms))]
+
+
+@pytest.mark.parametrize(("name", "which"), FORMS)
+def test_a_form_is_fitted_under_the_effects_own_name(name, which):
+    effect = pick_effect(name)
+    shaped = in_form(effect, effect.forms[which])
+    assert (shaped.name, shaped.forms) == (name, ())
+    values = effect.starts() | {c.name: c.start for c in effect.forms[which].coefficients}
+    assert as_fitted(effect, values).coefficients == shaped.coefficients
+    assert as_fitted(effect, effect.starts()) is effect
+
+
+@pytest.mark.parametrize(("name", "which"), [f for f in FORMS if f[0] != "servo_lag"])
+def test_a_form_is_the_textbooks_at_its_neutral_numbers_and_not_elsewhere(name, which):
+    effect, log = pick_effect(name), record()
+    form = effect.forms[which]
+    values = effect.starts() | {c.name: NEUTRAL[c.name] for c in form.coefficients}
+    np.testing.assert_allclose(shown(effect, values, log), shown(effect, effect.starts(), log), atol=1e-12)
+    other = effect.starts() | {c.name: c.low + 0.4 * (c.high - c.low) for c in form.coefficients}
+    assert np.abs(shown(effect, other, log) - shown(effect, effect.starts(), log)).max() > 1e-4
+
+
+@pytest.mark.parametrize("blend", [0.0, 0.02, 0.1])
+def test_the_area_of_a_rounded_edge_is_the_integral_of_its_value(blend):
+    beyond, d = Beyond(0.12, blend), np.linspace(-0.5, 0.5, 2001)
+    slope = np.gradient(beyond.area(d), d)
+    np.testing.assert_allclose(slope[1:-1], beyond.value(d)[1:-1], atol=2e-4)
+    assert beyond.area(np.zeros(1))[0] == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(("lag", "share"), [(0.3, 0.5), (0.3, 0.25), (0.3, 0.1), (0.08, 0.5), (1.0, 2.0)])
+def test_a_servo_of_second_order_is_its_equation_integrated_finely(lag, share):
+    rng = np.random.default_rng(5)
+    start = 0.2 * rng.standard_normal(12)
+    path = FinPath(start, start + 0.02 * rng.standard_normal(12))
+    log, inertia, fine = record(), share * lag * lag, 4000
+    steps = log.steps[:12]
+    out = np.empty((12, 2))
+    from fieldsid.effects.servo_lag import swung
+
+    swung(steps, path.start, path.end, lag, inertia, out)
+    fin, speed = float(path.start[0]), 0.0
+    for i, h in enumerate(steps):
+        time, dt = np.linspace(0.0, h, fine + 1), h / fine
+        track = np.empty(fine + 1)
+        track[0] = fin
+        slope = (path.end[i] - path.start[i]) / h
+        for k in range(fine):
+            wanted = path.start[i] + slope * (time[k] + 0.5 * dt)
+            middle, middle_speed = fin + 0.5 * dt * speed, speed + 0.5 * dt * (wanted - fin - lag * speed) / inertia
+            fin += dt * middle_speed
+            speed += dt * (wanted - middle - lag * middle_speed) / inertia
+            track[k + 1] = fin
+        mean = np.trapezoid(track, time) / h
+        half = 6.0 * np.trapezoid(track * (time - 0.5 * h), time) / h**2
+        np.testing.assert_allclose(out[i], [mean - half, mean + half], atol=2e-6)
