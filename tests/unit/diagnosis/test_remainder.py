@@ -1,0 +1,41 @@
+"""The test of a size that grows with the motion: how often it cries wolf, and whether it sees what it is for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.diagnosis.remainder import Left, _growth
+from fieldsid.models.axis import Axis
+from fieldsid.models.simulate import command_record
+
+
+def left(rng, growth, *, lively=True):
+    """A run of white innovations whose slow part grows by `growth` over its mean with the square of the rate."""
+    time = np.arange(0.0, 60.0, 0.05)
+    fin = 0.2 * np.sign(np.sin(2.0 * np.pi * time / 9.0)) * (time % 30.0 < 18.0) if lively else np.zeros(time.size)
+    rate = 0.3 * np.sin(2.0 * np.pi * time / 9.0) * (time % 30.0 < 18.0) if lively else np.zeros(time.size)
+    size = np.sqrt(np.maximum(1.0 + growth * (rate**2 / max(np.mean(rate**2), 1e-12) - 1.0), 0.0))
+    white = rng.standard_normal((2, time.size)) * size
+    made = command_record(Axis.YAW, time, fin, speed=1.4)
+    from dataclasses import replace
+
+    ok = np.ones(time.size, dtype=bool)
+    return Left(replace(made, angle_ok=ok, rate_ok=ok), white, rate)
+
+
+def test_white_innovations_are_seldom_said_to_grow():
+    rng = np.random.default_rng(1)
+    p = np.array([_growth([left(rng, 0.0) for _ in range(3)])[0] for _ in range(300)])
+    assert np.mean(p < 0.05) <= 0.08
+    assert np.mean(p < 0.005) <= 0.02
+
+
+def test_innovations_that_grow_with_the_motion_are_seen():
+    rng = np.random.default_rng(2)
+    p = [_growth([left(rng, 0.8) for _ in range(3)])[0] for _ in range(20)]
+    assert np.median(p) < 1e-4
+
+
+def test_a_run_without_motion_says_nothing():
+    rng = np.random.default_rng(3)
+    assert _growth([left(rng, 0.0, lively=False)])[0] == 1.0
