@@ -21,7 +21,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 from fieldsid.planning.rehearse import rehearse, with_noise
 
 SPEED = 1.4
@@ -90,7 +90,7 @@ def _model(axis: Axis, effects: tuple[str, ...], values: Mapping[str, float]) ->
         units=UNITS,
         free=(),
         covariance=np.zeros((0, 0)),
-        law=SpeedLaw(SPEED),
+        law=SpeedLaw(SPEED, trim_of_fin=TRIM_OF_FIN[axis]),
         noise=NOISE,
         method="made up",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_r
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
 from fieldsid.fitting.descent import cost_of
-from fieldsid.fitting.layout import layout_of, speed_groups
+from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
@@ -22,6 +22,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
+from fieldsid.models.speed_law import TRIM_OF_FIN
 
 NOISES = ("disturbance", "coloured")
 FREE_RUNS = 3
@@ -31,6 +32,8 @@ the base, of a hypothesis with effects, and of one that is only tried in another
 TOLD = 0.01
 """Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
 and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
+UNUSUAL = 1.3
+"""What the errors must fall by for a trim that does not go with the speed as it does as a rule."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST = 4
@@ -62,6 +65,7 @@ class Search:
     tried: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     family: str = ""
     turned: bool = False
+    trim_of_fin: bool | None = None
     told: Noise = field(init=False)
 
     def __post_init__(self) -> None:
@@ -87,7 +91,7 @@ class Search:
         """Return the hypothesis of the known effects alone."""
         if self.root not in self.tried:
             self.report("base model")
-            trial = min((self._base_trial(snapped=s) for s in self._laws()), key=lambda t: t.weights.angle * t.weights.rate)
+            trial = min((self._base_trial(groups) for groups in self._laws()), key=self._by_law)
             families = (self.family,) if self.family else NOISES
             self.told = _at_least(self.floor, TOLD, trial.weights)
             judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
@@ -97,13 +101,27 @@ class Search:
             self._reshape(self.root)
         return self.tried[self.root]
 
-    def _laws(self) -> tuple[bool, ...]:
-        """Whether runs of one speed group share their parameters as they are, besides by the scaling with speed."""
-        groups = speed_groups(self.records)
-        return (False, True) if len(groups.speeds) < len(self.records) else (False,)
+    def _by_law(self, trial: Trial) -> float:
+        """Return the product of both channels' errors, more where the trim is not what it is as a rule on the axis."""
+        usual = trial.problem.layout.groups.trim_of_fin == TRIM_OF_FIN[self.axis]
+        return trial.weights.angle * trial.weights.rate * (1.0 if usual else UNUSUAL)
 
-    def _base_trial(self, *, snapped: bool) -> Trial:
-        layout = layout_of(self.records, self.axis, (), speed_groups(self.records, snapped=snapped))
+    def _laws(self) -> tuple[Groups, ...]:
+        """Return the ways speed may enter: runs of one group alike or scaled, the trim by one law or another."""
+        groups = speed_groups(self.records)
+        snapped = (False, True) if len(groups.speeds) < len(self.records) else (False,)
+        trims = self._trims(groups) if self.trim_of_fin is None else (self.trim_of_fin,)
+        return tuple(speed_groups(self.records, snapped=s, trim_of_fin=t) for t in trims for s in snapped)
+
+    def _trims(self, groups: Groups) -> tuple[bool, ...]:
+        """Return whether the trim may go with the authority: in yaw it does as a rule and need not.
+
+        In pitch a moment that goes with the speed is an effect of its own.
+        """
+        return (True, False) if groups.trim_of_fin and len(groups.speeds) > 1 else (groups.trim_of_fin,)
+
+    def _base_trial(self, groups: Groups) -> Trial:
+        layout = layout_of(self.records, self.axis, (), groups)
         trial = refine(Problem(self.records, layout), start_vector(self.records, layout), self.floor)
         for effect in (e for e in self.catalogue if e.name in self.known):
             ground = ground_of(trial.problem, trial.x, trial.weights)
@@ -250,19 +268,37 @@ class Search:
         return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
 
     def _turn(self, found: Hypothesis) -> bool:
-        """Begin anew under the other noise where that fits a hypothesis better, once: what was missing may have hidden it.
+        """Begin anew under the other noise, or the other law of the trim, where that fits a hypothesis better, each once.
 
-        Likelihoods compare under one noise only, and a disturbance that stands in for coloured sensors lets the heading
-        wander for free.
+        What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
+        coloured sensors lets the heading wander for free.
         """
-        other = next(f for f in NOISES if f != self.family)
         trial, known = found.judged.trial, found.judged.likelihood
-        if self.turned or judge(trial.problem, trial.x, self.floor, self.told, other).likelihood < known + WORTH:
+        other = next(f for f in NOISES if f != self.family)
+        if not self.turned and judge(trial.problem, trial.x, self.floor, self.told, other).likelihood > known + WORTH:
+            self.turned, self.family = True, other
+        elif (trim := self._better_trim(found)) is not None:
+            self.trim_of_fin = trim
+            self.free.clear()
+            self.flown_from.clear()
+        else:
             return False
-        self.turned, self.family = True, other
         self.tried.clear()
         self.grown_from.clear()
         return True
+
+    def _better_trim(self, found: Hypothesis) -> bool | None:
+        """Return the trim's other law where a hypothesis fits better with it, once."""
+        trial, layout = found.judged.trial, found.judged.trial.problem.layout
+        if self.trim_of_fin is not None or not self.asks_for_more(found):
+            return None
+        for trim in self._trims(speed_groups(self.records)):
+            if trim != layout.groups.trim_of_fin:
+                other = Problem(self.records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
+                fit = judge(other, trial.x, found.judged.noise, self.told, self.family)
+                if fit.likelihood > found.judged.likelihood + (0.0 if trim == TRIM_OF_FIN[self.axis] else WORTH):
+                    return trim
+        return None
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
         """Return a pair that pays where the first of the two has evidence but the error falls with the second only."""

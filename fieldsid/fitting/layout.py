@@ -12,7 +12,7 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 
 START_NAMES = ("angle0", "rate0", "rate_before")
 """What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
@@ -44,7 +44,7 @@ class Slot:
 class Groups:
     """Speed groups: mean speed of each, group and speed of each run; `reference` is the group the law refers to.
 
-    `snapped` runs count as being at their group's speed.
+    `snapped` runs count as being at their group's speed; trim_of_fin: the trim moment goes with the authority.
     """
 
     speeds: tuple[float, ...]
@@ -52,15 +52,20 @@ class Groups:
     reference: int
     run_speeds: tuple[float, ...]
     snapped: bool = False
+    trim_of_fin: bool = False
 
 
-def speed_groups(records: Sequence[Record], *, snapped: bool = False) -> Groups:
-    """Return the runs' speed groups by single linkage in log speed; one group when any speed is not known."""
+def speed_groups(records: Sequence[Record], *, snapped: bool = False, trim_of_fin: bool | None = None) -> Groups:
+    """Return the runs' speed groups by single linkage in log speed; one group when any speed is not known.
+
+    trim_of_fin is by default the axis's own.
+    """
+    trim = TRIM_OF_FIN[records[0].axis] if trim_of_fin is None else trim_of_fin
     own = tuple(r.speed for r in records)
     speeds = np.array([r.speed for r in records])
     if not np.isfinite(speeds).all() or (speeds <= 0).any():
         known = speeds[np.isfinite(speeds)]
-        return Groups((float(known.mean()) if known.size else float("nan"),), (0,) * len(records), 0, own, snapped)
+        return Groups((float(known.mean()) if known.size else float("nan"),), (0,) * len(records), 0, own, snapped, trim)
     order = np.argsort(speeds)
     labels = np.zeros(len(records), dtype=int)
     for previous, index in pairwise(order):
@@ -68,7 +73,7 @@ def speed_groups(records: Sequence[Record], *, snapped: bool = False) -> Groups:
     means = tuple(float(speeds[labels == g].mean()) for g in range(labels.max() + 1))
     reference = int(np.argmin(np.abs(np.log(np.array(means) / np.median(means)))))
     of_run = tuple(int(g) for g in labels)
-    return Groups(means, of_run, reference, _run_speeds(own, means, of_run, snapped=snapped), snapped)
+    return Groups(means, of_run, reference, _run_speeds(own, means, of_run, snapped=snapped), snapped, trim)
 
 
 def _run_speeds(own: Sequence[float], means: Sequence[float], of_run: Sequence[int], *, snapped: bool) -> tuple[float, ...]:
@@ -112,11 +117,11 @@ class Layout:
         """Return the speed law of a vector of shared values."""
         names = NAMES[self.axis]
         g = self.groups
-        reference = g.speeds[g.reference]
+        reference, snap = g.speeds[g.reference], SNAP_WIDTH if g.snapped else SENSOR_WIDTH
         if len(g.speeds) == 1:
-            return SpeedLaw(reference, snap=SNAP_WIDTH if g.snapped else SENSOR_WIDTH)
+            return SpeedLaw(reference, snap=snap, trim_of_fin=g.trim_of_fin)
         points = tuple((u, values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
-        return SpeedLaw(reference, values["damping_exponent"], 2.0, points, SNAP_WIDTH if g.snapped else SENSOR_WIDTH)
+        return SpeedLaw(reference, values["damping_exponent"], 2.0, points, snap, g.trim_of_fin)
 
 
 def group_name(authority: str, groups: Groups, index: int) -> str:

@@ -89,7 +89,23 @@ class Lean:
             known = by_name.get(s.name) if s.run in (-1, run.index) else None
             if known is not None:
                 out[known[0], column] = known[1]
+        if layout.groups.trim_of_fin and x[layout.names.index(names.authority)] != 0.0:
+            self._trim_of_fin(x, numbers, authority, out)
         return out
+
+    def _trim_of_fin(self, x: FloatArray, numbers: FloatArray, authority: str, out: FloatArray) -> None:
+        """Set how a run's trim moment, C b / b_reference, moves with its three slots."""
+        names, layout = NAMES[self.problem.layout.axis], self.problem.layout
+        trim, at_reference = (float(x[layout.names.index(n)]) for n in (names.trim, names.authority))
+        over = numbers[2] / at_reference
+        for column, slot in enumerate(self.free):
+            name = layout.slots[slot].name
+            if name == names.trim:
+                out[3, column] = over
+            elif authority != names.authority and name == authority:
+                out[3, column] = trim / at_reference * out[2, column]
+            elif authority != names.authority and name == names.authority:
+                out[3, column] = -trim / at_reference * over
 
 
 def lean(problem: Problem, noise: Noise, free: Sequence[int]) -> Lean | None:

@@ -79,7 +79,8 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared, model.law.damping_exponent)
     # the frozen layout scales authority by s^2: divide that out of the law's own value
     scale = model.law.scale(record.speed)
-    values = dict(model.values) | {names.authority: model.at_speed(record.speed)[names.authority] / scale**2}
+    here = model.at_speed(record.speed)
+    values = dict(model.values) | {names.authority: here[names.authority] / scale**2, names.trim: here[names.trim]}
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
     return Problem((record,), layout), x
 
@@ -166,7 +167,7 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
 def _layout_of_one(layout: Layout, run: int) -> Layout:
     slots = [*layout.slots[: layout.shared], *[_moved(layout.slots[i]) for i in layout.of_run(run)]]
     g = layout.groups
-    groups = Groups(g.speeds, (g.of_run[run],), g.reference, (g.run_speeds[run],), g.snapped)
+    groups = replace(g, of_run=(g.of_run[run],), run_speeds=(g.run_speeds[run],))
     return replace(layout, groups=groups, slots=tuple(slots))
 
 

@@ -57,13 +57,13 @@ class Problem:
         """Return a run's base parameters."""
         names, layout = NAMES[self.layout.axis], self.layout
         v = dict(zip(layout.names, x[: layout.shared], strict=True))
-        group = layout.groups.of_run[run]
         share, ratio = self.scales(run)
+        authority = v[self.authority_of(run)] * ratio**2
         return Base(
             v[names.damping] * share ** v.get("damping_exponent", layout.exponent),
             0.0 if names.stiffness is None else v[names.stiffness],
-            v[group_name(names.authority, layout.groups, group)] * ratio**2,
-            v[names.trim],
+            authority,
+            v[names.trim] * (_over(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
         )
 
     def scales(self, run: int) -> tuple[float, float]:
@@ -149,8 +149,10 @@ class Problem:
         return group_name(NAMES[self.layout.axis].authority, g, g.of_run[run])
 
     def _touches(self, slot: int, run: int) -> bool:
-        """Whether a shared slot enters a run: another speed group's authority does not."""
+        """Whether a shared slot enters a run: another speed group's authority does not, unless the trim refers to it."""
         names, name = NAMES[self.layout.axis], self.layout.slots[slot].name
+        if name == names.authority and self.layout.groups.trim_of_fin:
+            return True
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return name == self.authority_of(run)
         return True
@@ -158,6 +160,11 @@ class Problem:
     def start(self) -> FloatArray:
         """Return the start vector of the layout."""
         return np.array([s.start for s in self.layout.slots])
+
+
+def _over(authority: float, at_reference: float) -> float:
+    """Return a run's authority over that at the reference speed, one where there is none."""
+    return authority / at_reference if at_reference != 0.0 else 1.0
 
 
 def _difference(record: Record, motion: Motion) -> FloatArray:

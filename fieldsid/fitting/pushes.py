@@ -47,7 +47,8 @@ Push = Callable[[slice, FloatArray], None]
 class Pushes:
     """What each slot of a layout does to the core's arrays of one record: the input of its tangents.
 
-    scales are the record's speed over the reference speed and over the speed of its own group; authority is its slot's name.
+    scales are the record's speed over the reference speed and over the speed of its own group; authority is its slot's
+    name.
     """
 
     record: Record
@@ -124,11 +125,11 @@ class Pushes:
         if name == "damping_exponent":
             return self._damping(self.base.damping * float(np.log(share))), self._by_exponent(exponent)
         if name == names.authority or name.startswith(f"{names.authority}@"):
-            return self._authority(ratio**2), none
+            return self._authority(name, ratio**2), none
         if name == names.stiffness:
             return _constant(slice(1, 2)), none
         if name == names.trim:
-            return _constant(slice(2, 4)), none
+            return _constant(slice(2, 4), self._over_reference() if self.layout.groups.trim_of_fin else 1.0), none
         return self._of_effect(name)
 
     def _by_exponent(self, exponent: float) -> FloatArray:
@@ -144,13 +145,32 @@ class Pushes:
 
         return push
 
-    def _authority(self, factor: float) -> Push:
+    def _over_reference(self) -> float:
+        """Return the run's authority over that at the reference speed, one where there is none."""
+        at_reference = self.values[NAMES[self.layout.axis].authority]
+        return self.base.authority / at_reference if at_reference != 0.0 else 1.0
+
+    def _authority(self, name: str, factor: float) -> Push:
+        """Return what an authority slot does: it lifts the fin of its own group's runs, and a trim of the fin's goes with it."""
         start, end = lift(self.arrays.fin, self.arrays.terms)
+        own, moved = name == self.authority, self._moves_trim(name, factor)
 
         def push(part: slice, row: FloatArray) -> None:
-            row[:, 2], row[:, 3] = factor * start[part], factor * end[part]
+            row[:, 2], row[:, 3] = moved, moved
+            if own:
+                row[:, 2] += factor * start[part]
+                row[:, 3] += factor * end[part]
 
         return push
+
+    def _moves_trim(self, name: str, factor: float) -> float:
+        """Return the derivative of the run's trim moment C b / b_reference by an authority slot."""
+        names = NAMES[self.layout.axis]
+        trim, at_reference = self.values[names.trim], self.values[names.authority]
+        if not self.layout.groups.trim_of_fin or self.authority == names.authority or at_reference == 0.0:
+            return 0.0
+        by_own = trim / at_reference
+        return by_own * factor if name == self.authority else -by_own * self._over_reference()
 
     def _of_effect(self, name: str) -> tuple[Push | None, FloatArray]:
         """Central difference of the arrays by an effect's coefficient; they are cheap, and no motion enters."""
@@ -209,9 +229,9 @@ class Pushes:
         return shown, out
 
 
-def _constant(columns: slice) -> Push:
+def _constant(columns: slice, factor: float = 1.0) -> Push:
     def push(_part: slice, row: FloatArray) -> None:
-        row[:, columns] = 1.0
+        row[:, columns] = factor
 
     return push
 

@@ -36,7 +36,7 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
         if names.stiffness is not None:
             full[:, 1] = block[:, 1]
         full[:, base.index(group_name(names.authority, groups, groups.of_run[run]))] = block[:, 2]
-        full[:, -1] = block[:, 3]
+        full[:, -1] = block[:, 3] * (share**2 if groups.trim_of_fin else 1.0)
         rows.append(full)
         targets.append(target)
     matrix, target = np.concatenate(rows), np.concatenate(targets)

@@ -74,6 +74,7 @@ class Model:
         names = NAMES[self.axis]
         out = self.base
         out[names.damping] *= self.law.damping_factor(speed)
+        out[names.trim] *= self.law.trim_factor(speed)
         out[names.authority] = self.law.authority(speed, out[names.authority])
         return out
 
@@ -96,6 +97,7 @@ def save_model(model: Model, path: Path, *, inputs: Sequence[Path] = (), parent:
             "authority_exponent": model.law.authority_exponent,
             "points": [list(p) for p in model.law.points],
             "snap": model.law.snap,
+            "trim_of_fin": model.law.trim_of_fin,
         },
         "noise": {f: getattr(model.noise, f) for f in Noise.__dataclass_fields__},
         "trained": dict(model.trained),
@@ -123,6 +125,7 @@ def load_model(path: Path) -> Model:
                 float(law["authority_exponent"]),
                 tuple((float(a), float(b)) for a, b in law["points"]),
                 float(law["snap"]),
+                bool(law.get("trim_of_fin", False)),
             ),
             noise=Noise(**{k: float(v) for k, v in body["noise"].items()}),
             trained={k: float("nan") if v is None else float(v) for k, v in body["trained"].items()},

@@ -1,8 +1,10 @@
-"""How the base parameters move with speed: damping as (u/u0)^p, authority by u^2 or by speed group, trim constant.
+"""How the base parameters move with speed: damping as (u/u0)^p, authority by u^2 or by speed group, trim as a fin's offset.
 
 With u0 the reference speed and s = u/u0: a(u) = a22 s^p, k(u) = c23 (hydrostatic, no speed), b(u) = b2 s^e or the
-groups' own values with a power law between them. A model of one run keeps p = 1 and e = 2, the scaling of lift
-and linear lift-type damping (Fossen 2011, section 6.3).
+groups' own values with a power law between them. The trim moment of the yaw is that of a bent fin, C b(u)/b(u0), so that
+the fin angle that holds it is the same at every speed; that of the pitch is a weight out of its place, the same at every
+speed. Runs at several speeds may say otherwise. A model of one run keeps p = 1 and e = 2, the scaling of lift and linear
+lift-type damping (Fossen 2011, section 6.3).
 """
 
 from __future__ import annotations
@@ -10,6 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
+from fieldsid.models.axis import Axis
+
+TRIM_OF_FIN = {Axis.YAW: True, Axis.PITCH: False}
+"""Whether the trim moment goes with the authority where runs at several speeds do not say otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +32,7 @@ class SpeedLaw:
     authority_exponent: float = 2.0
     points: tuple[tuple[float, float], ...] = ()
     snap: float = 0.0
+    trim_of_fin: bool = False
 
     def effective(self, speed: float) -> float:
         """Return the speed the law is taken at."""
@@ -42,6 +50,10 @@ class SpeedLaw:
     def damping_factor(self, speed: float) -> float:
         """Return a(u)/a(u0)."""
         return float(self.scale(speed) ** self.damping_exponent)
+
+    def trim_factor(self, speed: float) -> float:
+        """Return C(u)/C(u0)."""
+        return self.authority(speed, 1.0) / self.authority(self.reference, 1.0) if self.trim_of_fin else 1.0
 
     def authority(self, speed: float, at_reference: float) -> float:
         """Return b(u); between groups log-linear in log u, beyond them by the power law from the nearest."""

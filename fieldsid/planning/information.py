@@ -73,10 +73,11 @@ def _layout(scene: Scene) -> tuple[Layout, FloatArray]:
     law = scene.model.law
     reference = law.reference if np.isfinite(law.reference) else scene.speed
     made = layout_of([scene.record(np.linspace(0.0, 0.2, 3), np.zeros(3))], scene.axis, scene.effects)
-    layout = replace(made, groups=replace(made.groups, speeds=(reference,), reference=0))
+    layout = replace(made, groups=replace(made.groups, speeds=(reference,), reference=0, trim_of_fin=law.trim_of_fin))
     names, ratio = NAMES[scene.axis], scene.speed / reference
     at_reference = {names.damping: scene.base.damping / ratio, names.authority: scene.base.authority / ratio**2}
-    known = {**scene.values, names.trim: scene.base.trim, "angle0": 0.0, "rate0": 0.0, **at_reference}
+    at_reference[names.trim] = scene.base.trim / (ratio**2 if law.trim_of_fin else 1.0)
+    known = {**scene.values, "angle0": 0.0, "rate0": 0.0, **at_reference}
     return layout, np.array([float(known.get(s.name, s.start)) for s in layout.slots])
 
 
@@ -92,6 +93,7 @@ def information_of(scene: Scene, response: Response) -> Information:
     ratio = scene.speed / layout.groups.speeds[0]
     unit[layout.names.index(names.damping)] = ratio
     unit[layout.names.index(names.authority)] = ratio**2
+    unit[layout.names.index(names.trim)] = ratio**2 if layout.groups.trim_of_fin else 1.0
     return Information(tuple(layout.names), matrix / np.outer(unit, unit))
 
 

@@ -15,7 +15,7 @@ from fieldsid.effects import pick_effect
 from fieldsid.errors import ArtifactError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise, load_model
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 from fieldsid.registry import near
 
 KIND = "fieldsid/prior"
@@ -68,6 +68,7 @@ def _model_of(body: Mapping[str, Any]) -> Model:
             _number(body["reference_m_s"], "reference_m_s"),
             _number(body.get("damping_exponent", 1.0), "damping_exponent"),
             _number(body.get("authority_exponent", 2.0), "authority_exponent"),
+            trim_of_fin=TRIM_OF_FIN[axis],
         ),
         noise=_noise(body["noise"]),
         method="prior",

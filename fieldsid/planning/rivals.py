@@ -15,7 +15,7 @@ from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Coefficient
 from fieldsid.models.model import Model, Noise
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 
 KIND = "fieldsid/diagnosis"
 PLAIN = "none"
@@ -85,7 +85,7 @@ def _of_candidate(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, A
         units={},
         free=(),
         covariance=np.zeros((0, 0)),
-        law=SpeedLaw(float(law.get("reference_m_s") or body.get("speed_m_s") or np.nan)),
+        law=SpeedLaw(float(law.get("reference_m_s") or body.get("speed_m_s") or np.nan), trim_of_fin=TRIM_OF_FIN[axis]),
         noise=Noise(float(floor["angle_rad"]), float(floor["rate_rad_s"])),
         method="diagnosis",
     )

@@ -157,7 +157,7 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
         damping=column(names.damping) * scale**exponents,
         stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness),
         authority=authority,
-        offset=column(names.trim) / authority,
+        offset=column(names.trim) * model.law.trim_factor(speed) / authority,
         quadratic=cored("quadratic") + cored("crossflow"),
         cross_damping=np.where(coupled > 0, coupled, 1.0),
         cross_rate=cored("cross_rate"),

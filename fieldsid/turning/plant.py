@@ -77,6 +77,13 @@ class Plant:
         level = np.interp(np.log(speed), *self.law) * speed**2
         return np.asarray(self.authority_ratio * self.factors[1] * level)
 
+    def trim_at(self, speed: FloatArray) -> FloatArray:
+        """Return C(u), (d, s) rad/s^2."""
+        if not self.model.law.trim_of_fin:
+            return self.trim
+        there = np.full_like(speed, _known(self.model.law.reference))
+        return np.asarray(self.trim * self.authority_at(speed) / self.authority_at(there))
+
     def one(self, index: int = 0) -> Plant:
         """Return the plant of one draw alone."""
         keep = slice(index, index + 1)

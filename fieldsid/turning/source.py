@@ -15,7 +15,7 @@ from fieldsid.logs.run import FloatArray, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, load_model
 from fieldsid.models.simulate import effects_of
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 from fieldsid.turning.law import ParameterLaw
 from fieldsid.turning.laws import KIND as FIT_KIND
 from fieldsid.turning.laws import Laws, fit_laws, load_laws, with_own_law
@@ -79,7 +79,7 @@ class Source:
     def base_at(self, speed: float) -> dict[str, float]:
         """Return the base parameters at a speed: the point's own where one is there and no law of the user's overrides it.
 
-        Else the laws', or the single point's scaled as lift: damping with u, authority with u^2.
+        Else the laws', or the single point's scaled as lift: damping with u, authority and a fin's offset with u^2.
         """
         here = self._point_at(speed)
         if self.laws is None:
@@ -102,12 +102,14 @@ class Source:
         return nearest if abs(nearest.speed - speed) <= SAME_SPEED * speed else None
 
     def _scaled(self, point: Point, speed: float) -> dict[str, float]:
-        law, names = SpeedLaw(point.speed), NAMES[self.axis]
+        law, names = SpeedLaw(point.speed, trim_of_fin=TRIM_OF_FIN[self.axis]), NAMES[self.axis]
         out = dict(point.values)
         if names.authority in out:
             out[names.authority] = law.authority(speed, out[names.authority])
         if names.damping in out:
             out[names.damping] *= law.damping_factor(speed)
+        if names.trim in out:
+            out[names.trim] *= law.trim_factor(speed)
         return out
 
     def base_draws(self, speed: float, count: int, rng: np.random.Generator) -> dict[str, FloatArray]:

@@ -62,7 +62,7 @@ def balance(
     coupled = core["cross_damping"] > 0
     inverse = np.where(coupled, plant.sway_seen / np.where(coupled, core["cross_damping"], 1.0), 0.0)
     linear = plant.damping_at(surge) + core["cross_rate"] * inverse
-    push = plant.authority_at(surge) * fin + plant.trim + plant.moment + core["cross_fin"] * inverse * fin
+    push = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment + core["cross_fin"] * inverse * fin
     drive = side * push
     if not moments and not np.any(core["crossflow"]):
         return side * _quadratic_root(linear, core["quadratic"], drive)

@@ -66,7 +66,7 @@ def _slope(state: FloatArray, plant: Plant, slowing: Slowing, entry: FloatArray,
     speed = surge[None, :]
     scale = plant.scale(speed)[0]
     core = {n: c.at(plant.scale(speed))[0] for n, c in plant.core.items()}
-    moment = plant.authority_at(speed)[0] * fin + plant.trim[0] + plant.moment[0]
+    moment = plant.authority_at(speed)[0] * fin + plant.trim_at(speed)[0] + plant.moment[0]
     moment = moment - plant.damping_at(speed)[0] * rate - core["quadratic"] * rate * np.abs(rate)
     moment = moment + scale * state[6]
     drift = (core["cross_fin"] * fin - core["cross_rate"] * rate) / scale - core["cross_damping"] * state[6]

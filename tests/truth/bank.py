@@ -21,6 +21,8 @@ VISIBLE = 1.35
 LEARNABLE = 1.2
 """Least base error over the floor on the runs that are judged, and on those that are learned from."""
 TRIES = 4
+BENT = 0.7
+"""Share of the yaw cases whose trim is a bent fin's, the rest a moment that is the same at every speed."""
 WANTS = {
     "current": ("circle", "zigzag"), "compass_deviation": ("circle", "zigzag"), "sway_coupling": ("zigzag",),
     "crossflow_drag": ("circle", "zigzag"), "quadratic_damping": ("circle", "zigzag"), "large_angle_righting": ("stairs",),
@@ -90,7 +92,9 @@ def make_case(index: int, seed: int, *, kind: str | None = None) -> Case:
     kind = drawn if kind is None else kind
     pitching = bool(rng.random() < 0.4)
     names = draw_names(rng, kind, pitching)
-    scene = calibrated(draw_scene(rng, pitching, WANTS.get(names[0], ()) if names else ()))
+    scene = draw_scene(rng, pitching, WANTS.get(names[0], ()) if names else ())
+    scene.notes["bent_fin"] = not pitching and bool(np.random.default_rng([seed, index, 1]).random() < BENT)
+    scene = calibrated(scene)
     hidden = draw_hidden(rng, kind, names, scene)
     goal = np.exp(rng.uniform(np.log(1.45), np.log(8.0))) if kind in ("single", "imperfect") else rng.uniform(2.0, 6.0)
     scene.notes["alone"] = [tune(scene, hidden, i, goal) for i in range(len(hidden.causes))]
@@ -165,7 +169,8 @@ def sample_of(scene, i, motion, noise=(0.0, 0.0)):
     """A run as the base fit sees it."""
     leg = scene.legs[i]
     ratio = leg.speed / scene.base.nominal_speed
-    return Sample(motion.command, motion.angle + noise[0], motion.rate + noise[1], scene.clock.sample, ratio, leg.group)
+    angle, rate = motion.angle + noise[0], motion.rate + noise[1]
+    return Sample(motion.command, angle, rate, scene.clock.sample, ratio, leg.group, scene.trim_factor(leg))
 
 
 def base_errors(scene, samples, floor):

@@ -16,7 +16,7 @@ FITTED_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One run as the fit sees it: fin, angle, rate (n,), interval in s, speed / reference, and its authority group."""
+    """One run as the fit sees it: fin, angle, rate (n,), interval in s, speed / reference, authority group, trim's factor."""
 
     fin: np.ndarray
     angle: np.ndarray
@@ -24,6 +24,7 @@ class Sample:
     interval: float
     ratio: float
     group: int
+    trim_factor: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ def _system(samples, groups, x, exponent, weights):
         every = max(1, round(FITTED_S / s.interval))
         for channel, measured in enumerate((s.angle[::every], s.rate[::every])):
             block, part = np.zeros((measured.size, p)), unit[::every, channel]
-            block[:, s.group], block[:, groups] = part[:, 0], part[:, 1]
+            block[:, s.group], block[:, groups] = part[:, 0], part[:, 1] * s.trim_factor
             block[:, groups + 1 + 2 * i : groups + 3 + 2 * i] = part[:, 2:]
             rows.append(block / weights[channel])
             targets.append(measured / weights[channel])
@@ -182,7 +183,7 @@ def fit_base(samples, start, weights, *, exponent=0.0):
 def left_over(fit, sample, weights):
     """Residuals (n, 2) of angle and rate on a run with nothing but the start refitted."""
     unit = responses(fit.damping * sample.ratio**fit.exponent, fit.stiffness, sample.fin, sample.interval)
-    model = unit[:, :, 0] * fit.authority[sample.group] + unit[:, :, 1] * fit.trim
+    model = unit[:, :, 0] * fit.authority[sample.group] + unit[:, :, 1] * fit.trim * sample.trim_factor
     return start_removed(np.stack([sample.angle, sample.rate], axis=1) - model, unit[:, :, 2:], weights)
 
 

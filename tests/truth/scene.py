@@ -44,12 +44,16 @@ class Scene:
     sigma: tuple[float, float]
     notes: dict[str, object]
 
+    def trim_factor(self, leg):
+        """A leg's trim moment over the nominal one: that of a bent fin goes with the authority."""
+        return (leg.speed / self.base.nominal_speed) ** 2 * self.scatter[leg.group] if self.notes.get("bent_fin") else 1.0
+
     def physics(self, leg, updates):
         """Coefficients of a leg: authority ~ u^2 with scatter, damping ~ u^law, pilot's gains to match."""
         ratio = leg.speed / self.base.nominal_speed
         updates = {k: v for k, v in updates.items() if k not in ("thrust_swing", "roll_push", "depth_spread")}
         times = updates.pop("authority_times", 1.0)
-        trim = self.base.trim + updates.pop("trim", 0.0)
+        trim = self.base.trim * self.trim_factor(leg) + updates.pop("trim", 0.0)
         authority = self.base.authority * ratio**2 * self.scatter[leg.group] * times
         damping = self.base.damping * ratio**self.law
         kp, kd = gains(damping, self.base.stiffness, authority, self.base.kp)
@@ -159,7 +163,7 @@ def calibrated(scene):
         inputs = calm(scene.clock, scene.base.nominal_thrust)
         inputs[kernel.DISTURBANCE] = leg.inputs[kernel.DISTURBANCE]
         quiet = maneuvers.Maneuver("drift", np.zeros(scene.clock.samples), np.full(scene.clock.samples, kernel.OPEN))
-        free = scene.physics(leg, {"trim": -scene.base.trim})._replace(kp=0.0, kd=0.0)
+        free = scene.physics(leg, {"trim": -scene.base.trim * scene.trim_factor(leg)})._replace(kp=0.0, kd=0.0)
         drift = fly(free, scene.clock, quiet, inputs, pitching=scene.pitching, step=0.02).angle
         slope = np.polyfit(scene.clock.time, drift, 1)
         moved.append(np.sqrt(np.mean((drift - np.polyval(slope, scene.clock.time)) ** 2)))
