@@ -17,6 +17,7 @@ from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import ground_of, promise_of, shortened, twin_of
+from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -32,8 +33,6 @@ the base, of a hypothesis with effects, and of one that is only tried in another
 TOLD = 0.01
 """Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
 and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
-UNUSUAL = 1.3
-"""What the errors must fall by for a trim that does not go with the speed as it does as a rule."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST = 4
@@ -110,15 +109,8 @@ class Search:
         """Return the ways speed may enter: runs of one group alike or scaled, the trim by one law or another."""
         groups = speed_groups(self.records)
         snapped = (False, True) if len(groups.speeds) < len(self.records) else (False,)
-        trims = self._trims(groups) if self.trim_of_fin is None else (self.trim_of_fin,)
+        trims = possible_trims(groups) if self.trim_of_fin is None else (self.trim_of_fin,)
         return tuple(speed_groups(self.records, snapped=s, trim_of_fin=t) for t in trims for s in snapped)
-
-    def _trims(self, groups: Groups) -> tuple[bool, ...]:
-        """Return whether the trim may go with the authority: in yaw it does as a rule and need not.
-
-        In pitch a moment that goes with the speed is an effect of its own.
-        """
-        return (True, False) if groups.trim_of_fin and len(groups.speeds) > 1 else (groups.trim_of_fin,)
 
     def _base_trial(self, groups: Groups) -> Trial:
         layout = layout_of(self.records, self.axis, (), groups)
@@ -292,7 +284,7 @@ class Search:
         trial, layout = found.judged.trial, found.judged.trial.problem.layout
         if self.trim_of_fin is not None or not self.asks_for_more(found):
             return None
-        for trim in self._trims(speed_groups(self.records)):
+        for trim in possible_trims(speed_groups(self.records)):
             if trim != layout.groups.trim_of_fin:
                 other = Problem(self.records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
                 fit = judge(other, trial.x, found.judged.noise, self.told, self.family)

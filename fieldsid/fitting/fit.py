@@ -18,6 +18,7 @@ from fieldsid.fitting.predict import Prediction, refit_own
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.remarks import remarks
 from fieldsid.fitting.suspects import suspects
+from fieldsid.fitting.trim_law import groups_by_trim
 from fieldsid.fitting.weights import white_weights
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES, Axis
@@ -78,7 +79,7 @@ def fit(
             found="; ".join(missing),
             hint="map the signal on import, or leave the effect out",
         )
-    problem = Problem(tuple(records), layout_of(records, axis, parts))
+    problem = Problem(tuple(records), layout_of(records, axis, parts, groups_by_trim(records)))
     solution = _solve(problem, method, options or Options())
     return fitted(problem, solution)
 

@@ -74,6 +74,12 @@ def test_a_joint_fit_finds_one_offset_for_all_speeds_and_keeps_it_in_its_file(tm
         assert here["C0"] / here["b2"] == pytest.approx(OFFSET, abs=6e-4)
 
 
+def test_a_joint_fit_keeps_a_moment_that_is_the_same_at_all_speeds():
+    model = fit(runs(bent=False), Axis.YAW).model
+    assert not model.law.trim_of_fin
+    assert [model.at_speed(u)["C0"] for u in GRIP] == pytest.approx([-0.9 * OFFSET] * 3, abs=1e-3)
+
+
 @pytest.mark.parametrize("bent", [True, False])
 def test_the_diagnosis_finds_which_law_the_trim_follows(bent):
     base = search(runs(bent=bent), [flown(1.9, bent=bent, seed=9)], Axis.YAW, ()).base()
