@@ -21,7 +21,7 @@ ENOUGH, BLOCK = 50_000, 1_000
 """Samples that tell the floor well enough; of longer records blocks spread over them are taken."""
 SMALLEST_ANGLE = 1e-7
 SMALLEST_RATE = 1e-7
-RESOLUTION = 1e-3
+RESOLUTION = 1e-4
 ROUNDS, DAMPING = 30, 1e-3
 LEAP = 1.5
 """Longest step of a logarithm: the information says little of what is far away."""
