@@ -51,7 +51,7 @@ def _refuse_clash(effect: Effect) -> None:
             )
         if other.name == effect.name or not set(other.axes) & set(effect.axes):
             continue
-        taken = {c.name for c in other.coefficients} & {c.name for c in effect.coefficients}
+        taken = other.names & effect.names
         if taken:
             name = min(taken)
             raise EffectError(

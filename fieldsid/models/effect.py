@@ -184,6 +184,11 @@ class Effect:
         """Coefficients every run has of its own."""
         return tuple(c for c in self.coefficients if c.per_run)
 
+    @property
+    def names(self) -> set[str]:
+        """Names of the coefficients, those of the forms among them."""
+        return {c.name for c in (*self.coefficients, *(c for f in self.forms for c in f.coefficients))}
+
     def starts(self) -> dict[str, float]:
         """Return the start value of every coefficient."""
         return {c.name: c.start for c in self.coefficients}
