@@ -108,7 +108,7 @@ def test_everything_a_command_may_print_is_declared(effect):
 @each_effect
 def test_coefficients_have_unit_bounds_and_a_start_between_them(effect):
     assert effect.coefficients
-    for c in effect.coefficients:
+    for c in (*effect.coefficients, *(c for f in effect.forms for c in f.coefficients)):
         assert c.unit
         assert c.says
         assert c.low < c.high
@@ -132,7 +132,7 @@ def test_a_rival_of_every_axis_is_named(effect):
 
 @pytest.mark.parametrize("axis", Axis)
 def test_no_two_effects_of_an_axis_share_a_coefficient(axis):
-    names = [c.name for e in all_effects(axis).values() for c in e.coefficients]
+    names = [name for e in all_effects(axis).values() for name in e.names]
     names += [*NAMES[axis].base, NAMES[axis].trim_fin]
     assert len(names) == len(set(names))
 

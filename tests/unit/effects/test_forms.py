@@ -93,9 +93,3 @@ def test_a_servo_of_second_order_is_its_equation_integrated_finely(lag, share):
         mean = np.trapezoid(track, time) / h
         half = 6.0 * np.trapezoid(track * (time - 0.5 * h), time) / h**2
         np.testing.assert_allclose(out[i], [mean - half, mean + half], atol=2e-6)
-
-
-@pytest.mark.parametrize("axis", list(Axis))
-def test_no_two_effects_of_an_axis_share_the_name_of_a_number(axis):
-    names = [name for effect in all_effects(axis).values() for name in effect.names]
-    assert len(names) == len(set(names))
