@@ -116,7 +116,13 @@ def step_change(rng, k):
 
 def prop_moment(rng, k):
     size, swing = _sign(rng) * 1.0 * k.moment / k.thrust, rng.uniform(0.2, 0.4)
-    return lambda s, _u, _i: {"thrust_moment": size * s, "trim": -size * s * k.thrust, "thrust_swing": swing}
+
+    def apply(s, u, _i):
+        # trimmed away by the fin in yaw, which goes with the speed as the thrust does, by a weight in pitch
+        held = k.thrust * (u * u if k.stiffness == 0.0 else 1.0)
+        return {"thrust_moment": size * s, "trim": -size * s * held, "thrust_swing": swing}
+
+    return apply
 
 
 def wave(rng, k):
