@@ -250,6 +250,8 @@ class Search:
             current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if self.pays(current, c)), None) or self._two_at_once(current, children)
             if paying is None:
+                if self._turn(current):
+                    return self.best()
                 break
             current = self._swapped(paying) if size else paying
             if self._turn(current):

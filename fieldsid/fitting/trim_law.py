@@ -12,7 +12,7 @@ from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.weights import white_weights
 from fieldsid.models.record import Record
 
-UNUSUAL = 1.3
+UNUSUAL = 2.0
 """What the product of both channels' errors must fall by for a trim that does not go with the speed as it does as a rule."""
 
 
