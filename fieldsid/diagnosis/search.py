@@ -16,7 +16,7 @@ from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import ground_of, promise_of, shortened, twin_of
+from fieldsid.fitting.starts import carried, ground_of, promise_of, shortened, twin_of
 from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -35,7 +35,8 @@ TOLD = 0.01
 and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
-LARGEST = 4
+LARGEST, PAIR = 4, 2
+"""Effects a hypothesis has at most, and those whose parts were all tried on the way to it."""
 CLEAN = 1.02
 TWINS = 1.0
 """Log likelihood within which two starts of one hypothesis are alike."""
@@ -258,7 +259,7 @@ class Search:
                 return self.best()
             if not self.asks_for_more(current):
                 break
-        found = self._pruned(current)
+        found = self._pruned(self._thinned(current))
         return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
 
     def _turn(self, found: Hypothesis) -> bool:
@@ -320,6 +321,32 @@ class Search:
             if child.score > best.score and self.misfit(child) < ALIKE * self.misfit(best):
                 best = child
         return best
+
+    def _thinned(self, found: Hypothesis) -> Hypothesis:
+        """Leave out each effect that was added before the last two where the rest does as well: the first ones may have stood in.
+
+        What is left out is judged from the numbers of the whole; a pair's parts were tried on the way to it.
+        """
+        while len(found.names) > len(self.known) + PAIR:
+            smaller = [self._without(found, e) for e in found.effects if e.name not in self.known]
+            idle = [h for h in smaller if not self.pays(h, found)]
+            if not idle:
+                break
+            found = max(idle, key=lambda h: h.score)
+        return found
+
+    def _without(self, h: Hypothesis, gone: Effect) -> Hypothesis:
+        """Return a hypothesis without one of its effects, tried from the numbers it has with it."""
+        trial = h.judged.trial
+        old, effects = trial.problem.layout, [e for e in h.effects if e is not gone]
+        problem = Problem(self.records, layout_of(self.records, self.axis, effects, old.groups))
+        judged = judge(problem, carried(old, trial.x, problem.layout), h.judged.noise, self.told, self.family)
+        key = frozenset(e.name for e in effects)
+        before = self.tried.get(key)
+        kept = self._keep(judged)
+        if kept is not before:
+            self.tried[key] = with_free_run(kept, self.floor)
+        return self.tried[key]
 
     def _pruned(self, found: Hypothesis) -> Hypothesis:
         """Return the smallest tried subset that loses nothing worth having."""

@@ -10,8 +10,11 @@ import pytest
 from truth.bank import Case, make_case
 
 from fieldsid.diagnosis import Diagnosis, diagnose
+from fieldsid.diagnosis.search import search, usable
+from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
 
 SEED = 2026
 
@@ -55,6 +58,18 @@ def test_nothing_is_named_where_nothing_is_hidden(first: int) -> None:
     assert found.verdict == "sufficient"
     assert found.effects == ()
     assert found.final == found.base
+
+
+def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:
+    case = visible_case("pair", 0)
+    axis = Axis(case.axis)
+    training, unseen = ([record_of(r, axis) for r in runs_of(logs, "run")] for logs in (case.training, case.validation))
+    catalogue, _ = usable(all_effects(axis).values(), [*training, *unseen])
+    work = search(training, unseen, axis, catalogue)
+    found = work.best()
+    longer = work.grow(found)[0]
+    assert len(longer.names) == len(found.names) + 1 == 3
+    assert set(work._thinned(longer).names) == set(found.names)
 
 
 def test_a_cause_that_no_catalogue_has_is_not_given_a_name() -> None:
