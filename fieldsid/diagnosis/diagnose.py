@@ -15,8 +15,9 @@ from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.records import Candidate, Diagnosis
 from fieldsid.diagnosis.refitted import refitted_model
 from fieldsid.diagnosis.remainder import remainder_of
-from fieldsid.diagnosis.search import Search, search, usable
+from fieldsid.diagnosis.search import Search, search
 from fieldsid.diagnosis.split import held_back
+from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.verdict import MOSTLY, Verdict, added, explained, probabilities, verdict_of
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import carried, ground_of, promise_of, shortened, twin_of
+from fieldsid.fitting.starts import carried, ground_of, overlaid, promise_of, shortened, twin_of
 from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -220,9 +220,7 @@ class Search:
     def _judged_from(self, h: Hypothesis, other: Hypothesis) -> Judged:
         """Judge a hypothesis from the numbers of another one where it has them, else from its own."""
         here, there = h.judged.trial, other.judged.trial
-        known = {(s.name, s.run): value for s, value in zip(there.problem.layout.slots, there.x, strict=True)}
-        slots = zip(here.problem.layout.slots, here.x, strict=True)
-        x = np.array([known.get((s.name, s.run), value) for s, value in slots])
+        x = overlaid(there.problem.layout, there.x, here.problem.layout, here.x)
         return judge(here.problem, x, other.judged.noise, self.told, self.family)
 
     def _free_runs(self, key: frozenset[str]) -> None:
@@ -385,18 +383,6 @@ class Search:
 def _at_least(noise: Noise, share: float, errors: Noise) -> Noise:
     """Return a white noise, raised to a share of the errors (both angle and rate)."""
     return Noise(max(noise.angle, share * errors.angle), max(noise.rate, share * errors.rate))
-
-
-def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tuple[Effect, ...], dict[str, str]]:
-    """Return the effects whose signals every run has, and why each other one is skipped."""
-    kept, skipped = [], {}
-    for effect in catalogue:
-        missing = sorted({role for role in effect.needs for r in records if role not in r.signals})
-        if missing:
-            skipped[effect.name] = f"needs {', '.join(missing)}, which the log lacks"
-        else:
-            kept.append(effect)
-    return tuple(kept), skipped
 
 
 def search(

@@ -70,6 +70,12 @@ def carried(old: Layout, x: FloatArray, new: Layout, values: Mapping[str, float]
     return np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in new.slots])
 
 
+def overlaid(old: Layout, x: FloatArray, new: Layout, own: FloatArray) -> FloatArray:
+    """Return a layout's own vector with the numbers of another layout's wherever that has them."""
+    known = {(s.name, s.run): v for s, v in zip(old.slots, x, strict=True)}
+    return np.array([known.get((s.name, s.run), v) for s, v in zip(new.slots, own, strict=True)])
+
+
 def twin_of(problem: Problem, x: FloatArray, effect: Effect) -> FloatArray | None:
     """Return the other start that has the same response at one speed, None where the effect has none."""
     layout = problem.layout

@@ -10,7 +10,8 @@ import pytest
 from truth.bank import Case, make_case
 
 from fieldsid.diagnosis import Diagnosis, diagnose
-from fieldsid.diagnosis.search import search, usable
+from fieldsid.diagnosis.search import search
+from fieldsid.diagnosis.usable import usable
 from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
