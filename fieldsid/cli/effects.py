@@ -120,8 +120,7 @@ def _render_one(to: Console, effect: Effect) -> None:
     to.print(f"{effect.name}: {effect.says}\n")
     to.print(table("", ("", ""), facts, left=2))
     rows = [
-        (c.name, c.unit, f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
-        for c in (*effect.coefficients, *(c for f in effect.forms for c in f.coefficients))
+        (c.name, c.unit, f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else "")) for c in effect.every
     ]
     to.print()
     to.print(table("", ("coefficient", "unit", "range", "is"), rows, left=4))

@@ -7,7 +7,6 @@ from itertools import product
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.fitting.descent import descend
-from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried
 from fieldsid.logs.run import FloatArray
@@ -28,8 +27,7 @@ def _begun(h: Hypothesis, effect: Effect, form: Form) -> tuple[Problem, FloatArr
     """Return the form's problem and the best of its starts, each after a few rounds under the hypothesis' noise."""
     trial, noise = h.judged.trial, h.judged.noise
     old = trial.problem.layout
-    effects = [in_form(e, form) if e is effect else e for e in h.effects]
-    problem = Problem(trial.problem.records, layout_of(trial.problem.records, old.axis, effects, old.groups))
+    problem = trial.problem.with_effects([in_form(e, form) if e is effect else e for e in h.effects])
     names = [c.name for c in form.coefficients]
     points = [dict(zip(names, p, strict=True)) for p in product(*(c.scan or (c.start,) for c in form.coefficients))]
     starts = [carried(old, trial.x, problem.layout, point) for point in points]

@@ -16,8 +16,6 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, bare_model, flown_by, hypo
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.trial import Trial, judge, refine
-from fieldsid.fitting.layout import layout_of
-from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import Promise, ground_of, promise_of, shortened
 
@@ -54,16 +52,16 @@ def _tried(search: Search, current: Trial) -> list[tuple[Trial, Pair]]:
     for promise in promises[:TRIED]:
         search.report("+".join((*current.names, promise.effect.name)))
         screened = refine(promise.problem, shortened(ground, promise).start, current.weights, ROUNDS, FINE)
-        trial = min((screened, _declared(search, promise, current)), key=lambda t: t.weights.angle * t.weights.rate)
+        trial = min((screened, _declared(promise, current)), key=lambda t: t.weights.angle * t.weights.rate)
         flown = flown_by(bare_model(trial.problem, trial.x, noise), trial, search.validation)
         found.append((trial, Pair(training_errors(trial), unseen_errors(flown, search.validation))))
     return found
 
 
-def _declared(search: Search, promise: Promise, current: Trial) -> Trial:
+def _declared(promise: Promise, current: Trial) -> Trial:
     """Return the free run from the textbook's model and the effects' declared values: the base may have bent its numbers."""
-    layout = layout_of(search.records, search.axis, promise.problem.layout.effects, promise.problem.layout.groups)
-    return refine(Problem(search.records, layout), start_vector(search.records, layout), current.weights, ROUNDS, FINE)
+    problem = promise.problem
+    return refine(problem, start_vector(problem.records, problem.layout), current.weights, ROUNDS, FINE)
 
 
 def _fall(new: Pair, old: Pair, *, unseen: bool) -> float:

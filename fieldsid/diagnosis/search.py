@@ -336,10 +336,10 @@ class Search:
     def _without(self, h: Hypothesis, gone: Effect) -> Hypothesis:
         """Return a hypothesis without one of its effects, tried from the numbers it has with it."""
         trial = h.judged.trial
-        old, effects = trial.problem.layout, [e for e in h.effects if e is not gone]
-        problem = Problem(self.records, layout_of(self.records, self.axis, effects, old.groups))
-        judged = judge(problem, carried(old, trial.x, problem.layout), h.judged.noise, self.told, self.family)
-        key = frozenset(e.name for e in effects)
+        problem = trial.problem.with_effects([e for e in h.effects if e is not gone])
+        x = carried(trial.problem.layout, trial.x, problem.layout)
+        judged = judge(problem, x, h.judged.noise, self.told, self.family)
+        key = frozenset(judged.trial.names)
         before = self.tried.get(key)
         kept = self._keep(judged)
         if kept is not before:

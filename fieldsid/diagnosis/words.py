@@ -8,7 +8,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.verdict import WORSE, Verdict, explained, worse_unseen
-from fieldsid.models.effect import effect_named
+from fieldsid.models.effect import effect_named, form_of
 from fieldsid.models.model import Noise
 
 
@@ -60,7 +60,7 @@ def _says(h: Hypothesis, name: str) -> str:
     """Return what an effect of a hypothesis does, with the form it was fitted in where that is not the textbook's."""
     effect = effect_named(name)
     fitted = {c.name for e in h.effects if e.name == name for c in e.coefficients}
-    form = next((f for f in effect.forms if {c.name for c in f.coefficients} <= fitted), None)
+    form = form_of(effect, fitted)
     return effect.says if form is None else f"{effect.says}: {form.says}"
 
 

@@ -2,14 +2,34 @@
 
 A run starts from x = -(cross_rate / cross_damping) f r0, where a steady rate r0 before it had led to: each run's own
 number (`rate_before` in fitting/layout.py). No motion within that rate leaves x further from zero.
+In its other forms it has a power of the speed of its own, and drag that grows with the square of the cross speed,
+    x' = -cross_damping f x - (cross_quadratic / f) x|x| - cross_rate f^2 r + cross_fin f^3 delta
+With x = -a21 v, a21 ~ f: the drag D v|v| becomes D/|a21| x|x|. Then the fin's own lift no longer drops out of the
+transfer function. Source: Prestero 2001, table of coefficients (the cross flow Yvv is most of a torpedo's sway drag).
 """
 
 from __future__ import annotations
 
-from fieldsid.models.effect import Core, Values
+from fieldsid.models.effect import Coefficient, Core, Form, Values
+
+OWN_POWER = Coefficient("cross_exponent", "1", -1.0, 3.0, 1.0, step=1e-3, says="power of the speed its damping goes with")
+SQUARE = Coefficient(
+    "cross_quadratic", "s", 0.0, 1e5, 3.0, scan=(1.0, 10.0, 100.0), step=1e-3, says="drag with the square of the cross speed"
+)
+OF_FIN = Coefficient("cross_fin", "1/s^3", -50.0, 50.0, 0.0, says="what the fin's own lift does to it")
+FORMS = (
+    Form("it has a power of the speed of its own", (OWN_POWER,)),
+    Form("its drag grows with the square of its speed", (SQUARE, OF_FIN)),
+    Form("its drag grows with the square of its speed, and it has a power of the speed of its own", (SQUARE, OF_FIN, OWN_POWER)),
+)
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients at `scale` times the reference speed, p the exponent of the damping's speed law."""
-    lift = scale ** values.get("damping_exponent", 1.0)
-    return Core(cross_damping=values["cross_damping"] * lift, cross_rate=values["cross_rate"] * lift**2)
+    """Return the core's coefficients at `scale` times the reference speed; p is the damping's where it has none of its own."""
+    lift = scale ** values.get("cross_exponent", values.get("damping_exponent", 1.0))
+    return Core(
+        cross_damping=values["cross_damping"] * lift,
+        cross_rate=values["cross_rate"] * lift**2,
+        cross_fin=values.get("cross_fin", 0.0) * lift**3,
+        cross_quadratic=values.get("cross_quadratic", 0.0) / lift,
+    )

@@ -8,7 +8,7 @@ Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the pa
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import core
+from fieldsid.effects._cross_state import FORMS, core
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage
 
@@ -36,4 +36,5 @@ EFFECT = Effect(
     source="Prestero 2001, chapter 6; the paper's pitch model before heave is dropped",
     extra_states=("heave",),
     core=core,
+    forms=FORMS,
 )

@@ -9,7 +9,7 @@ Source: Fossen 2011, section 7.2 (second-order Nomoto: K, T1, T2, T3 are the sam
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import core
+from fieldsid.effects._cross_state import FORMS, core
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage
 
@@ -31,4 +31,5 @@ EFFECT = Effect(
     source="Fossen 2011, section 7.2; the paper's yaw model before sway is dropped",
     extra_states=("sway",),
     core=core,
+    forms=FORMS,
 )

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fieldsid.fitting.descent import descend
-from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import carried, ground_of, promises_of, shortened, twin_of
@@ -30,7 +29,7 @@ def grown_start(problem: Problem, floor: Noise) -> FloatArray:
     layout = problem.layout
     if not layout.effects:
         return start_vector(problem.records, layout)
-    current = Problem(problem.records, layout_of(problem.records, layout.axis, (), layout.groups))
+    current = problem.with_effects(())
     x = _refined(current, start_vector(current.records, current.layout), floor)
     left = list(layout.effects)
     while left:

@@ -14,6 +14,7 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.linear_core import PARAMETERS, accumulate
 from fieldsid.models.model import Noise
 from fieldsid.models.signal_path import pieces_for
+from fieldsid.models.speed_law import over_reference
 
 LARGEST = 1e12
 """A residual beyond this counts as a motion without bound."""
@@ -97,7 +98,7 @@ class Lean:
         """Set how a run's trim moment, C b / b_reference, moves with its three slots."""
         names, layout = NAMES[self.problem.layout.axis], self.problem.layout
         trim, at_reference = (float(x[layout.names.index(n)]) for n in (names.trim, names.authority))
-        over = numbers[2] / at_reference
+        over = over_reference(float(numbers[2]), at_reference)
         for column, slot in enumerate(self.free):
             name = layout.slots[slot].name
             if name == names.trim:

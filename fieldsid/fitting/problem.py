@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fieldsid.fitting.layout import START_NAMES, Layout, group_name
+from fieldsid.fitting.layout import START_NAMES, Layout, group_name, layout_of
 from fieldsid.fitting.pushes import Pushes
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Motion, Values
+from fieldsid.models.effect import Effect, Motion, Values
 from fieldsid.models.record import Record, first_part
 from fieldsid.models.signal_path import (
     Assembled,
@@ -22,6 +22,7 @@ from fieldsid.models.signal_path import (
     run_core,
     with_moments,
 )
+from fieldsid.models.speed_law import over_reference
 
 REMEMBERED = 20_000
 """Samples of the longest run whose arrays are kept for the next call."""
@@ -53,6 +54,10 @@ class Problem:
             return self
         return Problem(tuple(first_part(r, samples) for r in self.records), self.layout)
 
+    def with_effects(self, effects: Sequence[Effect]) -> Problem:
+        """Return the problem of the same records and speed groups with other effects."""
+        return Problem(self.records, layout_of(self.records, self.layout.axis, effects, self.layout.groups))
+
     def base_of(self, x: FloatArray, run: int) -> Base:
         """Return a run's base parameters."""
         names, layout = NAMES[self.layout.axis], self.layout
@@ -63,7 +68,7 @@ class Problem:
             v[names.damping] * share ** v.get("damping_exponent", layout.exponent),
             0.0 if names.stiffness is None else v[names.stiffness],
             authority,
-            v[names.trim] * (_over(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
+            v[names.trim] * (over_reference(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
         )
 
     def scales(self, run: int) -> tuple[float, float]:
@@ -160,11 +165,6 @@ class Problem:
     def start(self) -> FloatArray:
         """Return the start vector of the layout."""
         return np.array([s.start for s in self.layout.slots])
-
-
-def _over(authority: float, at_reference: float) -> float:
-    """Return a run's authority over that at the reference speed, one where there is none."""
-    return authority / at_reference if at_reference != 0.0 else 1.0
 
 
 def _difference(record: Record, motion: Motion) -> FloatArray:

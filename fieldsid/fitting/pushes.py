@@ -25,14 +25,16 @@ from fieldsid.models.signal_path import (
     measured,
     run_core,
 )
+from fieldsid.models.speed_law import over_reference
 
 CROSS = START_NAMES.index("rate_before")
-DAMPING, RATE = (kernels.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate"))
+DAMPING, RATE, SQUARE = (kernels.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate", "cross_quadratic"))
+CROSS_PUSH = kernels.DRIVES.index("cross_push")
 MOMENT = tuple(kernels.DRIVES.index(name) for name in ("moment_start", "moment_end"))
 ENTERED = {
-    "fin": (*MOMENT, kernels.DRIVES.index("cross_push")),
+    "fin": (*MOMENT, CROSS_PUSH),
     "terms": (*MOMENT, kernels.DRIVES.index("damping"), kernels.DRIVES.index("cross_factor")),
-    "core": (kernels.DRIVES.index("cross_push"),),
+    "core": (CROSS_PUSH,),
     "moment": MOMENT,
 }
 """The drives that an effect's hooks enter, by their place; what else a core pushes are constants."""
@@ -77,7 +79,7 @@ class Pushes:
             yield slice(first, end), out[: end - first], sens[:, :, : end - first]
 
     def _directions(self, slots: tuple[int, ...]) -> tuple[list[Push], FloatArray, FloatArray, FloatArray]:
-        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 9), initial states (P, 3)."""
+        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 10), initial states (P, 3)."""
         count = len(slots)
         rows: list[Push] = []
         which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
@@ -85,7 +87,7 @@ class Pushes:
             name = self.layout.slots[slot].name
             if name in START_NAMES:
                 part = START_NAMES.index(name)
-                d_start[j, part] = 1.0 if part < CROSS else self.arrays.core.settled(1.0)
+                d_start[j, part] = 1.0 if part < CROSS else self._settles(self.arrays.constants[RATE])
                 continue
             push, d_c[j] = self._push(name)
             d_start[j, CROSS] = self._moves_start(d_c[j])
@@ -98,10 +100,15 @@ class Pushes:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _moves_start(self, d_c: FloatArray) -> float:
-        """Return how the start of the cross state moves with the core's constants (9,), the rate before the run held."""
-        damping, d_damping, d_rate = self.arrays.constants[DAMPING], d_c[DAMPING], d_c[RATE]
-        before = self.values.get("rate_before", 0.0)
-        return -float(d_rate * before + d_damping * self.start[CROSS]) / damping if damping > 0.0 else 0.0
+        """Return how the start of the cross state moves with the core's constants (10,), the rate before the run held."""
+        x, before = self.start[CROSS], self.values.get("rate_before", 0.0)
+        return self._settles(d_c[RATE] * before + d_c[DAMPING] * x + d_c[SQUARE] * x * abs(x))
+
+    def _settles(self, push: float) -> float:
+        """Return how far a small push holds the cross state back from where the run starts with it."""
+        damping = self.arrays.constants[DAMPING]
+        stiff = damping + 2.0 * self.arrays.constants[SQUARE] * abs(self.start[CROSS])
+        return -float(push) / float(stiff) if damping > 0.0 else 0.0
 
     def _march(
         self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
@@ -123,7 +130,7 @@ class Pushes:
         if name == names.damping:
             return self._damping(share**exponent), none
         if name == "damping_exponent":
-            return self._damping(self.base.damping * float(np.log(share))), self._by_exponent(exponent)
+            return self._by_exponent(self.base.damping * float(np.log(share)), exponent)
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return self._authority(name, ratio**2), none
         if name == names.stiffness:
@@ -132,10 +139,17 @@ class Pushes:
             return _constant(slice(2, 4), self._over_reference() if self.layout.groups.trim_of_fin else 1.0), none
         return self._of_effect(name)
 
-    def _by_exponent(self, exponent: float) -> FloatArray:
-        """Return how the core's constants move with the exponent of the damping's speed law, (9,)."""
-        ends = [constants_of(self._core(self.values | {"damping_exponent": exponent + s})) for s in (EXPONENT, -EXPONENT)]
-        return (ends[0] - ends[1]) / (2 * EXPONENT)
+    def _by_exponent(self, factor: float, exponent: float) -> tuple[Push, FloatArray]:
+        """Return what the exponent of the speed law does to the damping and the fin's push on the cross state, and (10,)."""
+        up, down = (self._core(self.values | {"damping_exponent": exponent + s}) for s in (EXPONENT, -EXPONENT))
+        of_damping, by_fin = self._damping(factor), (up.cross_fin - down.cross_fin) / (2 * EXPONENT)
+        mean = self.arrays.fin.mean
+
+        def push(part: slice, row: FloatArray) -> None:
+            of_damping(part, row)
+            row[:, CROSS_PUSH] = by_fin * mean[part]
+
+        return push, (constants_of(up) - constants_of(down)) / (2 * EXPONENT)
 
     def _damping(self, factor: float) -> Push:
         shape = self.arrays.terms.damping_factor
@@ -146,9 +160,7 @@ class Pushes:
         return push
 
     def _over_reference(self) -> float:
-        """Return the run's authority over that at the reference speed, one where there is none."""
-        at_reference = self.values[NAMES[self.layout.axis].authority]
-        return self.base.authority / at_reference if at_reference != 0.0 else 1.0
+        return over_reference(self.base.authority, self.values[NAMES[self.layout.axis].authority])
 
     def _authority(self, name: str, factor: float) -> Push:
         """Return what an authority slot does: it lifts the fin of its own group's runs, and a trim of the fin's goes with it."""
@@ -186,7 +198,7 @@ class Pushes:
         return (_columns(slopes) if slopes else None), (up - down) / (high - low)
 
     def _entered(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
-        """Return the drives that an effect enters, by their place, and the core's constants (9,), at these values."""
+        """Return the drives that an effect enters, by their place, and the core's constants (10,), at these values."""
         effects, record = self.layout.effects, self.record
         fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
         terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)

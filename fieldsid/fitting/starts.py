@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.fitting.descent import cost_of
-from fieldsid.fitting.layout import Layout, layout_of
+from fieldsid.fitting.layout import Layout
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
@@ -55,13 +55,14 @@ class Ground:
 
 def grown(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[str, float]) -> tuple[Problem, FloatArray]:
     """Return the problem with one effect more, and the parent's x with the effect's slots at the given values."""
-    layout = layout_of(parent.records, parent.layout.axis, (*parent.layout.effects, effect), parent.layout.groups)
+    problem = parent.with_effects((*parent.layout.effects, effect))
+    layout = problem.layout
     start = carried(parent.layout, x, layout, values)
     if effect.extra_states and "damping_exponent" in layout.names:
         # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
         place = layout.names.index("damping_exponent")
         start[place] = np.clip(start[place], 0.0, 1.2)
-    return Problem(parent.records, layout), start
+    return problem, start
 
 
 def carried(old: Layout, x: FloatArray, new: Layout, values: Mapping[str, float] = MappingProxyType({})) -> FloatArray:

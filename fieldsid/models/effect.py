@@ -5,14 +5,15 @@ Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENS
     p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| - crossflow F(w, p)
          + heading_sin sin(angle) + heading_cos cos(angle) + righting_sin (angle - sin angle)
          + righting_cos (cos angle - 1) + x
-    x' = -cross_damping g x - cross_rate g^2 p + cross_fin delta
+    x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p + cross_fin delta
 with p the rate and x the cross state (sway or heave, scaled so that its moment is +x). A run starts with x where some
 steady rate before it had left it; no motion within that rate leaves it further from zero.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -111,6 +112,7 @@ class Core:
     cross_damping: float = 0.0
     cross_rate: float = 0.0
     cross_fin: float = 0.0
+    cross_quadratic: float = 0.0
 
     def plus(self, other: Core) -> Core:
         """Return the sum of two sets of coefficients; `length` is taken from whichever sets it."""
@@ -119,7 +121,11 @@ class Core:
 
     def settled(self, rate: float) -> float:
         """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none."""
-        return -self.cross_rate / self.cross_damping * rate if self.cross_damping > 0.0 else 0.0
+        if self.cross_damping <= 0.0:
+            return 0.0
+        push = -self.cross_rate * rate
+        # the root of damping x + quadratic x|x| = push, written so that a small quadratic loses no digits
+        return 2.0 * push / (self.cross_damping + math.sqrt(self.cross_damping**2 + 4.0 * self.cross_quadratic * abs(push)))
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)
@@ -185,9 +191,14 @@ class Effect:
         return tuple(c for c in self.coefficients if c.per_run)
 
     @property
+    def every(self) -> tuple[Coefficient, ...]:
+        """Its coefficients, and those that forms take besides, each once."""
+        return tuple({c.name: c for c in (*self.coefficients, *(c for f in self.forms for c in f.coefficients))}.values())
+
+    @property
     def names(self) -> set[str]:
         """Names of the coefficients, those of the forms among them."""
-        return {c.name for c in (*self.coefficients, *(c for f in self.forms for c in f.coefficients))}
+        return {c.name for c in self.every}
 
     def starts(self) -> dict[str, float]:
         """Return the start value of every coefficient."""
@@ -199,12 +210,16 @@ def in_form(effect: Effect, form: Form) -> Effect:
     return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=())
 
 
+def form_of(effect: Effect, known: Collection[str]) -> Form | None:
+    """Return the form whose coefficients are all among the known names, the largest of several; None for the textbook's."""
+    fitting = [f for f in effect.forms if all(c.name in known for c in f.coefficients)]
+    return max(fitting, key=lambda f: len(f.coefficients), default=None)
+
+
 def as_fitted(effect: Effect, values: Values) -> Effect:
     """Return an effect in the form that a model's values belong to."""
-    for form in effect.forms:
-        if all(c.name in values for c in form.coefficients):
-            return in_form(effect, form)
-    return effect
+    form = form_of(effect, values)
+    return effect if form is None else in_form(effect, form)
 
 
 def held(values: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
     y' = p
     p' = -a p - k y + m(t) - Q p|p| - X F(w/L, p) + hs sin y + hc cos y + rs (y - sin y) + rc (cos y - 1) + x
-    x' = -e g x - f g^2 p + q
+    x' = -e g x - (D/g) x|x| - f g^2 p + q
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
 a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
 start to its end. The tangents are the
@@ -19,9 +19,11 @@ from fieldsid.models.jit import jit
 DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
 CONSTANTS = (
     "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
-    "cross_damping", "cross_rate",
+    "cross_damping", "cross_rate", "cross_quadratic",
 )  # fmt: skip
 DIVERGED = 1e4
+SLOWEST = 0.01
+"""Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
 
 
 @jit
@@ -77,7 +79,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
-        e, f_cross, q = c[7] * drive[i, 4], c[8] * drive[i, 4] ** 2, drive[i, 5]
+        e, f_cross, drag, q = c[7] * drive[i, 4], c[8] * drive[i, 4] ** 2, c[9] / max(drive[i, 4], SLOWEST), drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -93,7 +95,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
                 if turning:
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
-                ky, kp, kx = ps, f, -e * xs - f_cross * ps + q
+                ky, kp, kx = ps, f, -(e + drag * abs(xs)) * xs - f_cross * ps + q
                 ty += _weight(stage) * ky
                 tp += _weight(stage) * kp
                 tx += _weight(stage) * kx
@@ -123,7 +125,7 @@ def tangents(
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
     d_drive (K, n-1, 8) holds derivatives of the drives; which (P,) is the row of each parameter in it, -1 for
-    none; d_c (P, 9) those of the constants; d_start (P, 3) those of the initial state.
+    none; d_c (P, 10) those of the constants; d_start (P, 3) those of the initial state.
     """
     n = steps.shape[0] + 1
     count = d_c.shape[0]
@@ -142,7 +144,7 @@ def tangents(
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
         fast = drive[i, 4]
-        damp, turn, q = c[7] * fast, c[8] * fast * fast, drive[i, 5]
+        damp, turn, hold, q = c[7] * fast, c[8] * fast * fast, c[9] / max(fast, SLOWEST), drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -170,26 +172,30 @@ def tangents(
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
                     by_y += c[3] * cos - c[4] * sin + c[5] * (1.0 - cos) - c[6] * sin
+                square = xs * abs(xs)
+                by_x = damp + 2.0 * hold * abs(xs)
                 for j in range(count):
                     dy = s[j, 0] + g * kt[j, 0]
                     dp = s[j, 1] + g * kt[j, 1]
                     dx = s[j, 2] + g * kt[j, 2]
                     e = by_y * dy + by_p * dp + dx
-                    z = -damp * dx - turn * dp
+                    z = -by_x * dx - turn * dp
                     r = int(which[j])
                     if r >= 0:
                         d0, d1 = d_drive[r, i, 2], d_drive[r, i, 3]
                         e += d0 + (d1 - d0) * part - d_drive[r, i, 0] * ps - d_drive[r, i, 1] * ys
-                        z += d_drive[r, i, 5] - d_drive[r, i, 4] * (c[7] * xs + 2.0 * fast * c[8] * ps)
+                        z += d_drive[r, i, 5] - d_drive[r, i, 4] * (
+                            c[7] * xs + 2.0 * fast * c[8] * ps - hold / max(fast, SLOWEST) * square
+                        )
                     if has_c[j]:
                         e -= d_c[j, 0] * drag + d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
                         e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * (ys - sin) + d_c[j, 6] * (cos - 1.0)
-                        z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps
+                        z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / max(fast, SLOWEST) * square
                     kt[j, 0], kt[j, 1], kt[j, 2] = dp, e, z
                     acc[j, 0] += wt * dp
                     acc[j, 1] += wt * e
                     acc[j, 2] += wt * z
-                ky, kp, kx = ps, f, -damp * xs - turn * ps + q
+                ky, kp, kx = ps, f, -damp * xs - hold * square - turn * ps + q
                 ty += wt * ky
                 tp += wt * kp
                 tx += wt * kx

@@ -122,7 +122,7 @@ def _flow(end: str, record: Record) -> FloatArray:
 
 
 def constants_of(core: Core) -> FloatArray:
-    """Return a core's coefficients as the vector (9,) that the kernel takes; the fin's push on the cross state is a drive."""
+    """Return a core's coefficients as the vector (10,) that the kernel takes; the fin's push on the cross state is a drive."""
     return np.array([getattr(core, name) for name in kernels.CONSTANTS])
 
 

@@ -19,6 +19,11 @@ TRIM_OF_FIN = {Axis.YAW: True, Axis.PITCH: False}
 """Whether the trim moment goes with the authority where runs at several speeds do not say otherwise."""
 
 
+def over_reference(authority: float, at_reference: float) -> float:
+    """Return an authority over that at the reference speed, one where there is none: what a bent fin's trim goes with."""
+    return authority / at_reference if at_reference != 0.0 else 1.0
+
+
 @dataclass(frozen=True, slots=True)
 class SpeedLaw:
     """Speeds in m/s; `points` are (speed, authority) of the groups, empty where the power law holds.
@@ -53,7 +58,7 @@ class SpeedLaw:
 
     def trim_factor(self, speed: float) -> float:
         """Return C(u)/C(u0)."""
-        return self.authority(speed, 1.0) / self.authority(self.reference, 1.0) if self.trim_of_fin else 1.0
+        return over_reference(self.authority(speed, 1.0), self.authority(self.reference, 1.0)) if self.trim_of_fin else 1.0
 
     def authority(self, speed: float, at_reference: float) -> float:
         """Return b(u); between groups log-linear in log u, beyond them by the power law from the nearest."""

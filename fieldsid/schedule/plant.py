@@ -1,6 +1,6 @@
 """The linear plant a controller meets at one speed: fin command to angle, over draws of the identified parameters.
 
-y'' = -a y' - k y + b delta + x,   x' = -c x - c_r y' + c_f delta
+y'' = -a y' - k y + b delta + x,   x' = -c x - c_q x|x| - c_r y' + c_f delta
 angle/fin = (b (s + c) + c_f) / ((s^2 + a s + k)(s + c) + c_r s),   fin/command = exp(-T s) / (lag s + 1)
 """
 
@@ -24,14 +24,15 @@ from fieldsid.turning.source import Source, draw_values
 ComplexArray = npt.NDArray[np.complex128]
 PARTS = (
     "damping", "stiffness", "authority", "offset", "quadratic", "cross_damping", "cross_rate", "cross_fin",
-    "lag", "delay", "fin_rate",
+    "cross_quadratic", "lag", "delay", "fin_rate",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class LinearPlant:
-    """Coefficients (d,) over draws at one speed, the estimate first; `quadratic` acts in time simulations only.
+    """Coefficients (d,) over draws at one speed, the estimate first.
 
+    `quadratic` and `cross_quadratic` act in time simulations only.
     `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited.
     """
 
@@ -45,6 +46,7 @@ class LinearPlant:
     cross_damping: FloatArray
     cross_rate: FloatArray
     cross_fin: FloatArray
+    cross_quadratic: FloatArray
     lag: FloatArray
     delay: FloatArray
     fin_rate: FloatArray
@@ -123,7 +125,7 @@ def _plant_of_points(source: Source, speed: float, limits: FinLimits, draws: int
     actuator = _actuator({}, limits, draws)
     return LinearPlant(
         source.axis, speed, _same_sign(base[names.damping]), stiffness, authority, base[names.trim] / authority,
-        zero, zero + 1.0, zero, zero, *actuator,
+        zero, zero + 1.0, zero, zero, zero, *actuator,
     )  # fmt: skip
 
 
@@ -162,6 +164,7 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
         cross_damping=np.where(coupled > 0, coupled, 1.0),
         cross_rate=cored("cross_rate"),
         cross_fin=cored("cross_fin"),
+        cross_quadratic=cored("cross_quadratic"),
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
     )
 

@@ -1,6 +1,6 @@
 """The identified yaw model as arrays over draws of its parameters, ready for steady turns at any speed.
 
-    0 = -(a(u) + a') r - q r|r| - F(v, r) + b(u) delta + m + M(r) + x,   x = (-c_r(u) r + c_d(u) delta) / c(u)
+    0 = -(a(u) + a') r - q r|r| - F(v, r) + b(u) delta + m + M(r) + x,   c(u) x + c_q(u) x|x| = -c_r(u) r + c_d(u) delta
 with every coefficient at the speed u kept in the turn, by the model's own speed law and its effects' own scaling.
 The actuator's effects are taken as they leave a fin that was told to stay at its limit.
 """
@@ -24,7 +24,7 @@ SETTLE_S = 60.0
 STEP_S = 0.05
 SCALES = np.geomspace(0.2, 5.0, 9)
 EXPONENT = "damping_exponent"
-CROSS = ("cross_damping", "cross_rate", "cross_fin", "quadratic", "crossflow")
+CROSS = ("cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "quadratic", "crossflow")
 
 
 @dataclass(frozen=True, slots=True)

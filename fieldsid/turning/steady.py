@@ -64,9 +64,9 @@ def balance(
     linear = plant.damping_at(surge) + core["cross_rate"] * inverse
     push = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment + core["cross_fin"] * inverse * fin
     drive = side * push
-    if not moments and not np.any(core["crossflow"]):
+    if not moments and not np.any(core["crossflow"]) and not np.any(core["cross_quadratic"]):
         return side * _quadratic_root(linear, core["quadratic"], drive)
-    return side * _bisected(plant, slowing, core, linear, drive, side, moments)
+    return side * _bisected(plant, slowing, core, linear, drive, side * fin, side, moments)
 
 
 def crossflow(drift: FloatArray, rate: FloatArray) -> FloatArray:
@@ -97,6 +97,7 @@ def _bisected(
     core: Mapping[str, FloatArray],
     linear: FloatArray,
     drive: FloatArray,
+    fin: FloatArray,
     side: float,
     moments: Mapping[str, FloatArray],
 ) -> FloatArray:
@@ -106,6 +107,8 @@ def _bisected(
     def surplus(rate: FloatArray) -> FloatArray:
         drift = -slowing.drift_per_rate * rate / plant.length
         left = drive - linear * rate - core["quadratic"] * rate**2 - core["crossflow"] * crossflow(drift, rate)
+        if np.any(core["cross_quadratic"]):
+            left = left + plant.sway_seen * _held_back(core, core["cross_fin"] * fin - core["cross_rate"] * rate)
         if moments:
             left = left + side * np.interp(side * rate, moments["rate"], moments["moment"])
         return left
@@ -116,6 +119,12 @@ def _bisected(
         above = surplus(middle) > 0
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.where(good, 0.5 * (low + high), np.nan)
+
+
+def _held_back(core: Mapping[str, FloatArray], push: FloatArray) -> FloatArray:
+    """Return the settled cross state under a push less what it would be without its quadratic drag, arrays alike."""
+    damping, quadratic = core["cross_damping"], core["cross_quadratic"]
+    return np.asarray(2.0 * push / (damping + np.sqrt(damping**2 + 4.0 * quadratic * np.abs(push))) - push / damping)
 
 
 def _moment_tables(plant: Plant) -> dict[str, FloatArray]:

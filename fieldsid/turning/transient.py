@@ -69,7 +69,8 @@ def _slope(state: FloatArray, plant: Plant, slowing: Slowing, entry: FloatArray,
     moment = plant.authority_at(speed)[0] * fin + plant.trim_at(speed)[0] + plant.moment[0]
     moment = moment - plant.damping_at(speed)[0] * rate - core["quadratic"] * rate * np.abs(rate)
     moment = moment + scale * state[6]
-    drift = (core["cross_fin"] * fin - core["cross_rate"] * rate) / scale - core["cross_damping"] * state[6]
+    drift = (core["cross_fin"] * fin - core["cross_rate"] * rate) / scale
+    drift = drift - (core["cross_damping"] + core["cross_quadratic"] * scale * np.abs(state[6])) * state[6]
     if np.any(core["crossflow"]):
         moment = moment - core["crossflow"] * crossflow(-slowing.drift_per_rate[0] * rate / plant.length[0], rate)
     drag, turn, loss = slowing.drag[0], slowing.turn[0], slowing.fin[0]

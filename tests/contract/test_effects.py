@@ -108,7 +108,7 @@ def test_everything_a_command_may_print_is_declared(effect):
 @each_effect
 def test_coefficients_have_unit_bounds_and_a_start_between_them(effect):
     assert effect.coefficients
-    for c in (*effect.coefficients, *(c for f in effect.forms for c in f.coefficients)):
+    for c in effect.every:
         assert c.unit
         assert c.says
         assert c.low < c.high

@@ -8,12 +8,12 @@ import pytest
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.effects._paths import Beyond
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import FinPath, Motion, as_fitted, in_form
+from fieldsid.models.effect import CORE_FIELDS, FinPath, Motion, as_fitted, in_form
 from fieldsid.models.simulate import command_record
 
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
-    "deviation_sin2": 0.0, "deviation_cos2": 0.0,
+    "deviation_sin2": 0.0, "deviation_cos2": 0.0, "cross_quadratic": 0.0, "cross_fin": 0.0, "cross_exponent": 1.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 
@@ -32,6 +32,9 @@ def shown(effect, values, log):
     if effect.measure is not None:
         motion = effect.measure(Motion(np.linspace(-3.0, 3.0, len(log)), np.ones(len(log))), values, log)
         return np.concatenate([motion.angle, motion.rate])
+    if effect.core is not None:
+        core = effect.core(values, 1.7)
+        return np.array([getattr(core, name) for name in CORE_FIELDS])
     terms = effect.terms(values, log)
     return np.concatenate([part for part in (terms.moment, terms.authority_factor) if part is not None])
 

@@ -80,6 +80,9 @@ def test_the_cross_state_scales_with_speed_as_lift_does():
     for name in ("sway_coupling", "heave_coupling"):
         core = pick_effect(name).core({"cross_damping": 1.0, "cross_rate": 1.0}, 2.0)
         assert (core.cross_damping, core.cross_rate) == (2.0, 4.0)
+        own = {"cross_damping": 1.0, "cross_rate": 1.0, "cross_fin": 1.0, "cross_quadratic": 1.0, "damping_exponent": 7.0}
+        core = pick_effect(name).core(own | {"cross_exponent": 2.0}, 2.0)
+        assert (core.cross_damping, core.cross_rate, core.cross_fin, core.cross_quadratic) == (4.0, 16.0, 64.0, 0.25)
 
 
 def test_each_core_effect_sets_its_own_terms_only():

@@ -16,7 +16,7 @@ from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import effect_named
+from fieldsid.models.effect import effect_named, in_form
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 
@@ -30,7 +30,7 @@ def record(row, seed=1, **change):
 
 
 def problem_of(records, effects=()):
-    parts = tuple(effect_named(e) for e in effects)
+    parts = tuple(effect_named(e) if isinstance(e, str) else e for e in effects)
     return Problem(tuple(records), layout_of(records, records[0].axis, parts))
 
 
@@ -76,6 +76,22 @@ def test_the_start_of_a_hidden_state_moves_with_its_coefficients_and_the_speed_l
         x[[s.name == name for s in problem.layout.slots]] = value
     for run in range(2):
         assert problem.state_of(x, run)[2] == pytest.approx(0.15 * 0.4 / 0.8 * problem.scales(run)[0] ** 0.8)
+        compare_with_slopes(problem, x, run, 2e-5)
+
+
+@pytest.mark.parametrize("which", range(3))
+def test_the_start_of_a_hidden_state_moves_with_the_coefficients_of_its_forms(which):
+    records = [record(YAW[1], speed=1.0), record(YAW[1], 2, speed=1.6)]
+    sway = effect_named("sway_coupling")
+    problem = problem_of(records, [in_form(sway, sway.forms[which])])
+    x = moved_start(problem)
+    for name, value in {"cross_rate": -0.4, "rate_before": 0.15, "cross_quadratic": 6.0, "cross_fin": 0.3}.items():
+        x[[s.name == name for s in problem.layout.slots]] = value
+    for run in range(2):
+        values = problem.values_of(x, run)
+        state, core = problem.state_of(x, run)[2], sway.core(values, problem.scales(run)[0])
+        held = core.cross_damping * state + core.cross_quadratic * state * abs(state)
+        assert held == pytest.approx(-core.cross_rate * values["rate_before"])
         compare_with_slopes(problem, x, run, 2e-5)
 
 

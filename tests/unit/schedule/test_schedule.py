@@ -50,6 +50,7 @@ def plant(speed=1.5, count=1, **own):
         "cross_damping": 1.0,
         "cross_rate": 0.0,
         "cross_fin": 0.0,
+        "cross_quadratic": 0.0,
         "lag": 0.0,
         "delay": 0.0,
         "fin_rate": np.inf,
@@ -124,14 +125,15 @@ def test_margins_of_a_known_loop_are_those_of_the_textbook():
 
 
 def test_step_agrees_with_an_ode_solver():
-    own = plant(lag=0.25, quadratic=0.8, cross_rate=-0.4, cross_damping=0.7, offset=0.01)
+    own = plant(lag=0.25, quadratic=0.8, cross_rate=-0.4, cross_damping=0.7, cross_quadratic=3.0, offset=0.01)
     row = replace(design_schedule_row(), gains=Gains(-0.6, 0.0, -0.2), feed_forward=-0.01, fin_limit=10.0)
     ours = step_response(own, row, reference=0.3, seconds=15.0)
 
     def slope(_t, s):
         y, p, x, fin = s
         command = -0.6 * (0.3 - y) + 0.2 * p - 0.01
-        return [p, -1.2 * p - 1.6 * (fin + 0.01) - 0.8 * p * abs(p) + x, -0.7 * x + 0.4 * p, (command - fin) / 0.25]
+        sway = -(0.7 + 3.0 * abs(x)) * x + 0.4 * p
+        return [p, -1.2 * p - 1.6 * (fin + 0.01) - 0.8 * p * abs(p) + x, sway, (command - fin) / 0.25]
 
     theirs = solve_ivp(slope, (0.0, 15.0), [0.0, 0.0, 0.0, -0.01], t_eval=ours.time, rtol=1e-9, atol=1e-11)
     assert np.max(np.abs(ours.angle[:, 0] - theirs.y[0])) < 2e-3

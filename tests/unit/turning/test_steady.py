@@ -19,6 +19,7 @@ EFFECTS = {
     "plain": ((), {}),
     "quadratic": (("quadratic_damping",), {"quadratic": 3.0}),
     "sway": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4}),
+    "sway squared": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4, "cross_quadratic": 4.0, "cross_fin": 0.1}),
     "fins": (("servo_lag", "rate_limit", "asymmetric_fin"), {"lag": 0.2, "max_rate": 0.5, "asymmetry": 0.1}),
     "stall": (("stall",), None),
     "all": (
