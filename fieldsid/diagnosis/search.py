@@ -285,7 +285,8 @@ class Search:
         trial, layout = found.judged.trial, found.judged.trial.problem.layout
         if self.trim_of_fin is not None or not self.asks_for_more(found):
             return None
-        for trim in possible_trims(speed_groups(self.records)):
+        varying = any(e.terms is not None for e in found.effects)
+        for trim in possible_trims(speed_groups(self.records), varying=varying):
             if trim != layout.groups.trim_of_fin:
                 other = Problem(self.records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
                 fit = judge(other, trial.x, found.judged.noise, self.told, self.family)

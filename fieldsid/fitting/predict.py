@@ -75,12 +75,14 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start."""
     names = NAMES[model.axis]
     layout = layout_of([record], model.axis, effects)
-    groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),))
+    of_fin = model.law.trim_of_fin
+    groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),), trim_of_fin=of_fin)
     layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared, model.law.damping_exponent)
-    # the frozen layout scales authority by s^2: divide that out of the law's own value
+    # the frozen layout scales authority by s^2, and a bent fin's trim with it: divide that out of the law's own values
     scale = model.law.scale(record.speed)
     here = model.at_speed(record.speed)
-    values = dict(model.values) | {names.authority: here[names.authority] / scale**2, names.trim: here[names.trim]}
+    trim = here[names.trim] / (scale**2 if of_fin else 1.0)
+    values = dict(model.values) | {names.authority: here[names.authority] / scale**2, names.trim: trim}
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
     return Problem((record,), layout), x
 

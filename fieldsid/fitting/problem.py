@@ -69,6 +69,7 @@ class Problem:
             0.0 if names.stiffness is None else v[names.stiffness],
             authority,
             v[names.trim] * (over_reference(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
+            layout.groups.trim_of_fin,
         )
 
     def scales(self, run: int) -> tuple[float, float]:

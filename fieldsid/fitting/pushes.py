@@ -136,7 +136,7 @@ class Pushes:
         if name == names.stiffness:
             return _constant(slice(1, 2)), none
         if name == names.trim:
-            return _constant(slice(2, 4), self._over_reference() if self.layout.groups.trim_of_fin else 1.0), none
+            return self._trim(), none
         return self._of_effect(name)
 
     def _by_exponent(self, factor: float, exponent: float) -> tuple[Push, FloatArray]:
@@ -159,16 +159,35 @@ class Pushes:
 
         return push
 
+    def _trim(self) -> Push:
+        """Return what the trim slot does: a moment that stays, or one that goes with the authority."""
+        if not self.layout.groups.trim_of_fin:
+            return _constant(slice(2, 4))
+        over, shape = self._over_reference(), self._authority_shape()
+
+        def push(part: slice, row: FloatArray) -> None:
+            row[:, 2], row[:, 3] = over * shape[0][part], over * shape[1][part]
+
+        return push
+
+    def _authority_shape(self) -> tuple[FloatArray, FloatArray]:
+        """Return the authority factor at both ends of each interval, (n-1,) each."""
+        factor = self.arrays.terms.authority_factor
+        if factor is None:
+            ones = np.ones(len(self.record) - 1)
+            return ones, ones
+        return factor[:-1], factor[1:]
+
     def _over_reference(self) -> float:
         return over_reference(self.base.authority, self.values[NAMES[self.layout.axis].authority])
 
     def _authority(self, name: str, factor: float) -> Push:
         """Return what an authority slot does: it lifts the fin of its own group's runs, and a trim of the fin's goes with it."""
         start, end = lift(self.arrays.fin, self.arrays.terms)
-        own, moved = name == self.authority, self._moves_trim(name, factor)
+        own, moved, shape = name == self.authority, self._moves_trim(name, factor), self._authority_shape()
 
         def push(part: slice, row: FloatArray) -> None:
-            row[:, 2], row[:, 3] = moved, moved
+            row[:, 2], row[:, 3] = moved * shape[0][part], moved * shape[1][part]
             if own:
                 row[:, 2] += factor * start[part]
                 row[:, 3] += factor * end[part]

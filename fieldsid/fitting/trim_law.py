@@ -16,12 +16,13 @@ UNUSUAL = 2.0
 """What the product of both channels' errors must fall by for a trim that does not go with the speed as it does as a rule."""
 
 
-def possible_trims(groups: Groups) -> tuple[bool, ...]:
+def possible_trims(groups: Groups, *, varying: bool = False) -> tuple[bool, ...]:
     """Return whether the trim may go with the authority, what it does as a rule first: in yaw it does and need not.
 
-    In pitch a moment that goes with the speed is an effect of its own.
+    In pitch a moment that goes with the speed is an effect of its own. At one speed nothing tells, unless an effect lets
+    the authority vary within a run.
     """
-    return (True, False) if groups.trim_of_fin and len(groups.speeds) > 1 else (groups.trim_of_fin,)
+    return (True, False) if groups.trim_of_fin and (varying or len(groups.speeds) > 1) else (groups.trim_of_fin,)
 
 
 def groups_by_trim(records: Sequence[Record]) -> Groups:

@@ -25,17 +25,21 @@ MOMENT_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Base:
-    """Base parameters at a run's own speed: damping (1/s), stiffness (1/s^2), authority (1/s^2), trim (rad/s^2)."""
+    """Base parameters at a run's own speed: damping (1/s), stiffness (1/s^2), authority (1/s^2), trim (rad/s^2).
+
+    trim_of_fin: the trim is a bent fin's, so that whatever changes the authority within a run changes it too.
+    """
 
     damping: float
     stiffness: float
     authority: float
     trim: float
+    trim_of_fin: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """Arrays of the core: drive (n-1, 8), constants (9,), pieces per interval; and what they came from: fin path, terms, core."""
+    """Arrays of the core: drive (n-1, 8), constants (10,), pieces per interval; what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
@@ -111,7 +115,9 @@ def drive_of(place: int, record: Record, base: Base, fin: FinPath, terms: Terms,
 
 def _moment(end: str, base: Base, fin: FinPath, terms: Terms) -> FloatArray:
     side, of_time = (0, slice(None, -1)) if end == "moment_start" else (1, slice(1, None))
-    moment = base.authority * lift(fin, terms)[side] + base.trim
+    factor = terms.authority_factor if base.trim_of_fin else None
+    trim = base.trim if factor is None else base.trim * factor[of_time]
+    moment = base.authority * lift(fin, terms)[side] + trim
     return moment if terms.moment is None else moment + terms.moment[of_time]
 
 

@@ -38,7 +38,8 @@ def base_at(model: Model, speed: float) -> Base:
     """Return the model's base parameters at a speed."""
     names = NAMES[model.axis]
     v = model.at_speed(speed)
-    return Base(v[names.damping], 0.0 if names.stiffness is None else v[names.stiffness], v[names.authority], v[names.trim])
+    stiffness = 0.0 if names.stiffness is None else v[names.stiffness]
+    return Base(v[names.damping], stiffness, v[names.authority], v[names.trim], model.law.trim_of_fin)
 
 
 def simulate(

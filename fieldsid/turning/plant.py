@@ -82,7 +82,7 @@ class Plant:
         if not self.model.law.trim_of_fin:
             return self.trim
         there = np.full_like(speed, _known(self.model.law.reference))
-        return np.asarray(self.trim * self.authority_at(speed) / self.authority_at(there))
+        return np.asarray(self.trim * self.factors[1] * self.authority_at(speed) / self.authority_at(there))
 
     def one(self, index: int = 0) -> Plant:
         """Return the plant of one draw alone."""

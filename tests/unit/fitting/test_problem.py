@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from truth.paper import PITCH, YAW, YawRow, paper_run
 
+from fieldsid.diagnosis.hypothesis import bare_model
 from fieldsid.fitting import stream
 from fieldsid.fitting.descent import Prior, cost_of, descend, normal_equations
 from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.lean import lean
+from fieldsid.fitting.predict import frozen_problem
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.logs.run import Run
@@ -93,6 +95,23 @@ def test_the_start_of_a_hidden_state_moves_with_the_coefficients_of_its_forms(wh
         held = core.cross_damping * state + core.cross_quadratic * state * abs(state)
         assert held == pytest.approx(-core.cross_rate * values["rate_before"])
         compare_with_slopes(problem, x, run, 2e-5)
+
+
+def test_a_bent_fins_trim_follows_what_changes_the_authority_within_a_run():
+    n = len(record(YAW[1]))
+    faster = {"surge": 1.3 + 0.3 * np.sin(np.arange(n) / 60.0)}
+    problem = problem_of([record(YAW[1], speed=1.3, signals=faster), record(YAW[1], 2, speed=1.9)], ["speed_varying"])
+    assert problem.layout.groups.trim_of_fin
+    x = moved_start(problem)
+    x[problem.layout.names.index("C0")] = 0.2
+    for run in range(2):
+        compare_with_slopes(problem, x, run, 2e-4)
+    model = bare_model(problem, x, NOISE)
+    for run, log in enumerate(problem.records):
+        ours, start = frozen_problem(model, log, problem.layout.effects)
+        held = {s.name: x[i] for i, s in enumerate(problem.layout.slots) if s.run == run}
+        start = np.array([held.get(s.name, v) for s, v in zip(ours.layout.slots, start, strict=True)])
+        np.testing.assert_allclose(ours.residual(start, 0)[0], problem.residual(x, run)[0], atol=1e-9)
 
 
 def test_a_hidden_state_that_is_not_driven_starts_at_zero():
