@@ -231,15 +231,14 @@ class Search:
                 self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
 
     def _reshape(self, key: frozenset[str]) -> None:
-        """Put a hypothesis's effects into other forms than the textbook's as long as that pays."""
-        for problem, start in in_other_forms(self.tried[key]) if self.asks_for_more(self.tried[key]) else ():
+        """Put a hypothesis's effects into other forms than the textbook's, the best one first, as long as that pays."""
+        while self.asks_for_more(self.tried[key]):
             known = self.tried[key]
-            judged = judge(problem, start, known.judged.noise, self.told, self.family, rival=known.judged.likelihood)
-            other = with_free_run(hypothesis_of(judged, self.validation), self.floor)
-            if self.pays(known, other):
-                self.tried[key] = other
-                self._reshape(key)
-                return
+            others = in_other_forms(known, self.floor, self.told, self.family)
+            best = max(others, key=lambda h: h.score, default=known)
+            if not self.pays(known, best):
+                break
+            self.tried[key] = best
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""

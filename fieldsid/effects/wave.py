@@ -1,7 +1,9 @@
 """A regular wave shakes the hull: moment = amplitude sin(2 pi (t - t_first) / period + phase).
 
-period (s) and amplitude (rad/s^2, >= 0) are those of the sea state, phase (rad) is each run's own.
-Source: Fossen 2011, section 8.2 (first-order wave moment of one component).
+period (s) and amplitude (rad/s^2, >= 0) are those of the sea state, phase (rad) is each run's own. In its other forms a
+second component of another period joins it, with an amplitude and phase of each run's own, or the frequency shifts
+evenly over a run, f(t) = (1 + sweep (t - t_middle)) / period, as it does where speed or course change.
+Source: Fossen 2011, section 8.2 (first-order wave moment, one or more components; frequency of encounter).
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
 from fieldsid.models.record import Record
 
 SHORTEST_S, LONGEST_S, TRIED, KEPT = 1.0, 30.0, 60, 2
@@ -21,11 +23,26 @@ SHORTEST_S, LONGEST_S, TRIED, KEPT = 1.0, 30.0, 60, 2
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the wave's moment, (n,) rad/s^2."""
-    angle = 2.0 * math.pi * (record.time - record.time[0]) / values["period"] + values["phase"]
-    return Terms(moment=values["amplitude"] * np.sin(angle))
+    since = record.time - record.time[0]
+    shifted = since + 0.5 * values.get("sweep", 0.0) * since * (since - since[-1])
+    moment = values["amplitude"] * np.sin(2.0 * math.pi * shifted / values["period"] + values["phase"])
+    if "second_period" in values:
+        angle = 2.0 * math.pi * since / values["second_period"]
+        moment = moment + values["second_sin"] * np.sin(angle) + values["second_cos"] * np.cos(angle)
+    return Terms(moment=moment)
 
 
 def suggest(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
+    """Return the wave of each period that stands out of what is left."""
+    return [{"period": period, "amplitude": 0.02} for period in swings(records, residuals)]
+
+
+def suggest_second(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
+    """Return the second component of each period that stands out of what the first has left."""
+    return [{"second_period": period} for period in swings(records, residuals)]
+
+
+def swings(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[float]:
     """Return the periods at which the rate residual of all runs together swings most (Lomb-Scargle by projection)."""
     periods = np.geomspace(SHORTEST_S, LONGEST_S, TRIED)
     power = np.zeros(periods.size)
@@ -37,8 +54,36 @@ def suggest(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[
         power += (np.sin(turn) @ e) ** 2 / e.size + (np.cos(turn) @ e) ** 2 / e.size
     peaks = [i for i in range(periods.size) if power[i] == power[max(0, i - 3) : i + 4].max()]
     best = sorted(peaks, key=lambda i: -power[i])[:KEPT]
-    return [{"period": float(periods[i]), "amplitude": 0.02} for i in best]
+    return [float(periods[i]) for i in best]
 
+
+SECOND = "rad/s^2", -2.0, 2.0, 0.0
+FORMS = (
+    Form(
+        "a second component of another period joins it",
+        (
+            Coefficient("second_period", "s", 1.0, 30.0, 4.0, step=1e-3, says="period of the second component"),
+            Coefficient("second_sin", *SECOND, per_run=True, says="its sine part at the run's first sample"),
+            Coefficient("second_cos", *SECOND, per_run=True, says="its cosine part at the run's first sample"),
+        ),
+        suggest_second,
+    ),
+    Form(
+        "its frequency shifts over a run",
+        (
+            Coefficient(
+                "sweep",
+                "1/s",
+                -0.05,
+                0.05,
+                0.0,
+                scan=(-0.01, -0.003, 0.003, 0.01),
+                step=1e-5,
+                says="share of the frequency it shifts by in a second",
+            ),
+        ),
+    ),
+)
 
 EFFECT = Effect(
     name="wave",
@@ -60,8 +105,8 @@ EFFECT = Effect(
         Coefficient(
             "phase",
             "rad",
-            -math.pi,
-            math.pi,
+            -4.0 * math.pi,
+            4.0 * math.pi,
             0.0,
             scan=(-0.75 * math.pi, -0.25 * math.pi, 0.25 * math.pi, 0.75 * math.pi),
             step=1e-3,
@@ -75,4 +120,5 @@ EFFECT = Effect(
     source="Fossen 2011, section 8.2",
     terms=terms,
     suggest=suggest,
+    forms=FORMS,
 )

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from fieldsid.models.record import Record
 
 Values = Mapping[str, float]
+Suggest = Callable[[Sequence["Record"], Sequence[FloatArray]], list[dict[str, float]]]
 
 
 class Stage(StrEnum):
@@ -62,11 +63,13 @@ class Coefficient:
 class Form:
     """A shape of an effect that is not the textbook's, in a few words, and the coefficients it takes besides.
 
-    The effect's hooks take the textbook's shape where the values lack them.
+    The effect's hooks take the textbook's shape where the values lack them. suggest gives the start values of the shared
+    ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids.
     """
 
     says: str
     coefficients: tuple[Coefficient, ...]
+    suggest: Suggest | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +177,7 @@ class Effect:
     core: Callable[[Values, float], Core] | None = None
     moment: Callable[[Motion, Values, Record], FloatArray] | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None
-    suggest: Callable[[Sequence[Record], Sequence[FloatArray]], list[dict[str, float]]] | None = None
+    suggest: Suggest | None = None
     twin: Callable[[Values, Axis], dict[str, float] | None] | None = None
     forms: tuple[Form, ...] = ()
     handicap: float = 0.0
@@ -211,8 +214,8 @@ def in_form(effect: Effect, form: Form) -> Effect:
 
 
 def form_of(effect: Effect, known: Collection[str]) -> Form | None:
-    """Return the form whose coefficients are all among the known names, the largest of several; None for the textbook's."""
-    fitting = [f for f in effect.forms if all(c.name in known for c in f.coefficients)]
+    """Return the form whose shared numbers are all among the known names, the largest of several; None for the textbook's."""
+    fitting = [f for f in effect.forms if all(c.name in known for c in f.coefficients if not c.per_run)]
     return max(fitting, key=lambda f: len(f.coefficients), default=None)
 
 

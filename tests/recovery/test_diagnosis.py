@@ -84,3 +84,13 @@ def test_probabilities_of_all_hypotheses_never_exceed_one() -> None:
     found = diagnosed(visible_case("single", 40))
     assert 0.0 < sum(c.probability for c in found.candidates) <= 1.0 + 1e-9
     assert all(0.0 <= c.explained <= 1.0 for c in found.candidates)
+
+
+@pytest.mark.parametrize(("seed", "index"), [(111, 37), (111, 76), (110, 20)], ids=("heave", "sway", "wave"))
+def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, index: int) -> None:
+    case = make_case(index, seed)
+    found = diagnosed(case)
+    assert (found.verdict, found.effects) == ("effect", case.effects)
+    after = found.final.validation
+    for channel, error in (("angle_rad", after.angle_rms_rad), ("rate_rad_s", after.rate_rms_rad_s)):
+        assert error < 1.06 * case.floor[channel]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from fieldsid.models.simulate import command_record
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
     "deviation_sin2": 0.0, "deviation_cos2": 0.0, "cross_quadratic": 0.0, "cross_fin": 0.0, "cross_exponent": 1.0,
+    "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 
@@ -96,3 +99,23 @@ def test_a_servo_of_second_order_is_its_equation_integrated_finely(lag, share):
         mean = np.trapezoid(track, time) / h
         half = 6.0 * np.trapezoid(track * (time - 0.5 * h), time) / h**2
         np.testing.assert_allclose(out[i], [mean - half, mean + half], atol=2e-6)
+
+
+@pytest.mark.parametrize("sweep", [0.0, 0.012, -0.02])
+def test_the_frequency_of_a_swept_wave_is_the_one_declared_and_the_period_its_mean(sweep):
+    log, wave = record(), pick_effect("wave")
+    values = {"period": 4.0, "amplitude": 0.3, "phase": 0.2, "sweep": sweep}
+    fine = np.linspace(0.0, log.time[-1], 20001)
+    frequency = (1.0 + sweep * (fine - 0.5 * fine[-1])) / 4.0
+    phase = 0.2 + 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(0.5 * (frequency[1:] + frequency[:-1]) * np.diff(fine))])
+    expected = 0.3 * np.sin(np.interp(log.time, fine, phase))
+    np.testing.assert_allclose(wave.terms(values, log).moment, expected, atol=1e-6)
+    assert np.mean(frequency) == pytest.approx(0.25)
+
+
+def test_a_second_component_is_suggested_at_the_period_that_the_first_has_left():
+    log, wave = record(), pick_effect("wave")
+    second = next(f for f in wave.forms if f.suggest is not None)
+    left = np.stack([np.zeros(len(log)), 0.02 * np.cos(2.0 * np.pi * log.time / 3.1)])
+    seen = replace(log, angle_ok=np.ones(len(log), bool), rate_ok=np.ones(len(log), bool))
+    assert min(abs(p["second_period"] - 3.1) for p in second.suggest([seen], [left])) < 0.2
