@@ -14,7 +14,8 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
 from fieldsid.models.record import Record
 
-GRID = tuple(round(0.05 * i, 2) for i in range(1, 20))
+GRID = tuple(round(0.05 * i, 2) for i in range(1, 21))
+"""Shares of a run; at the last of them nothing has happened in it."""
 
 
 def happened(share: float, record: Record, ramp: float = 0.0) -> FloatArray:

@@ -12,6 +12,7 @@ from itertools import product
 from types import MappingProxyType
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Layout
@@ -24,6 +25,7 @@ from fieldsid.models.model import Noise
 
 MOST_POINTS = 12
 SHORTENINGS = 4
+ROUNDS_ALIKE = 8
 GENTLE = 0.03
 """A coefficient of either sign is tried this much weaker too: a slow ship's are far below a small vehicle's."""
 WORTHLESS = 1e-9
@@ -210,19 +212,67 @@ def projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, F
 
 
 def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effect, c: Coefficient) -> FloatArray:
-    """Return x with one per-run nuisance at the grid point each run alone likes best."""
+    """Return x with one per-run nuisance at the grid point each run likes best, the effect's shared numbers alike for all.
+
+    Each run alone would take the event of its own that suits it, large or small; a run without any would find one.
+    """
     x = x.copy()
     new = _new_slots(problem, effect)
+    shared = [i for i in new if problem.layout.slots[i].run < 0]
+    grid = c.scan or (c.start,)
+    places, squares = [], []
     for run in range(len(problem.records)):
         slot = next(i for i in problem.layout.of_run(run) if problem.layout.slots[i].name == c.name)
-        others = [i for i in new if i != slot and problem.layout.slots[i].run in (-1, run)]
-        scored = []
-        for value in c.scan or (c.start,):
+        own = [i for i in new if i != slot and problem.layout.slots[i].run == run]
+        for value in grid:
             x[slot] = value
-            e, columns = run_columns(ground, problem, x, run, others)
-            cost, step = projected(ground.own_basis[run], e, columns)
-            names = [problem.layout.slots[i].name for i in others]
-            wrong = any(s + x[i] < problem.layout.low[i] for s, i, n in zip(step, others, names, strict=True) if n == "amplitude")
-            scored.append((cost if not wrong else cost + ground.cost, value))
-        x[slot] = min(scored)[1]
+            e, columns = run_columns(ground, problem, x, run, [*shared, *own])
+            basis = _orthonormal_beside(ground.own_basis[run], columns[:, len(shared) :])
+            squares.append(_square(basis, e, columns[:, : len(shared)]))
+        places.append(slot)
+    size = len(shared) + 1
+    square = np.array(squares).reshape(len(places), len(grid), size, size)
+    low, high = (bound[shared] - x[shared] for bound in (problem.layout.low, problem.layout.high))
+    x[places] = np.array(grid)[_alike(square, low, high)]
     return x
+
+
+def _orthonormal_beside(basis: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (rows, rank) of a basis and the columns beside it."""
+    if not columns.any():
+        return basis
+    return np.concatenate([basis, _orthonormal(columns - basis @ (basis.T @ columns))], axis=1)
+
+
+def _square(basis: FloatArray, e: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the products (1 + k, 1 + k) of a residual and k columns among each other, once both are projected off a basis."""
+    both = np.column_stack([e, columns])
+    left = both - basis @ (basis.T @ both)
+    return np.asarray(left.T @ left)
+
+
+def _alike(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the grid points (R,) whose costs sum to the least for one step, within its bounds (k,), that all runs take.
+
+    square (R, G, 1 + k, 1 + k) are each run's products at each grid point. The step is sought among those that a run
+    alone would take at a grid point, then improved with what all runs have chosen.
+    """
+
+    def costs(step: FloatArray) -> FloatArray:
+        row = np.concatenate([[1.0], -step])
+        return np.asarray(np.einsum("i,rgij,j->rg", row, square, row))
+
+    def solved(one: FloatArray) -> FloatArray:
+        size = np.sqrt(np.maximum(np.diag(one)[1:], np.finfo(float).tiny))
+        step = np.linalg.lstsq(one[1:, 1:] / np.outer(size, size), one[1:, 0] / size, rcond=1e-10)[0] / size
+        return np.asarray(np.clip(step, low, high))
+
+    alone = (solved(one) for one in square.reshape(-1, *square.shape[2:]))
+    best = min((costs(step) for step in alone), key=lambda c: float(c.min(axis=1).sum()))
+    runs, chosen = np.arange(square.shape[0]), best.argmin(axis=1)
+    for _ in range(ROUNDS_ALIKE):
+        again = costs(solved(square[runs, chosen].sum(axis=0))).argmin(axis=1)
+        if (again == chosen).all():
+            break
+        chosen = again
+    return np.asarray(chosen)

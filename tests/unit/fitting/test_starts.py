@@ -1,0 +1,55 @@
+"""Where a refit starts: the event that every run may have once, at the same size, or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.trial import refine
+from fieldsid.effects import pick_effect
+from fieldsid.fitting.layout import layout_of
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.start import start_vector
+from fieldsid.fitting.starts import ground_of, promise_of
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.simulate import command_record, simulate
+from fieldsid.models.speed_law import SpeedLaw
+
+EVENTS, SIZE = (0.3, 1.0, 0.6), -0.005
+
+
+def logged(seed, event):
+    """A run of 40 s under pulses with a change of the moment at an event, measured with noise; at 1 nothing happens."""
+    rng, time = np.random.default_rng(seed), np.arange(0.0, 40.0, 0.1)
+    fin = 0.15 * np.repeat(rng.choice([-1.0, 0.0, 1.0], 20), 20)
+    values = {"a22": 1.0, "b2": -0.8, "C0": 0.01, "loss": 0.02, "moment_step": SIZE}
+    model = Model(Axis.YAW, ("step_change",), values, {}, (), np.zeros((0, 0)), SpeedLaw(1.2), Noise(0.005, 0.005))
+    record = command_record(Axis.YAW, time, fin, speed=1.2, name=f"run{seed}")
+    motion = simulate(model, record, state=(0.1, 0.0, 0.0), nuisance={"event_time": event})
+    ok = np.ones(time.size, bool)
+    angle, rate = (v + 0.005 * rng.standard_normal(time.size) for v in (motion.angle, motion.rate))
+    return replace(record, angle=angle, rate=rate, angle_ok=ok, rate_ok=ok)
+
+
+def found_events(seed):
+    """Event times of the three runs, and the change's size, where the screen's start leads."""
+    records = tuple(logged(10 * seed + i, event) for i, event in enumerate(EVENTS))
+    layout = layout_of(records, Axis.YAW, ())
+    base = refine(Problem(records, layout), start_vector(records, layout), floor_of(records))
+    promise = promise_of(ground_of(base.problem, base.x, base.weights), pick_effect("step_change"))
+    found = refine(promise.problem, promise.start, base.weights)
+    names, slots = found.problem.layout.names, found.problem.layout.slots
+    return [x for s, x in zip(slots, found.x, strict=True) if s.name == "event_time"], found.x[names.index("moment_step")]
+
+
+def test_a_run_without_an_event_is_not_given_one_of_another_size():
+    right = 0
+    for seed in range(1, 25):
+        times, size = found_events(seed)
+        right += times == pytest.approx(EVENTS, abs=0.03) and size == pytest.approx(SIZE, rel=0.1)
+    # 22 with one size for all runs, 13 where each run takes the event that suits it alone
+    assert right >= 20
