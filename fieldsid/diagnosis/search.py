@@ -11,6 +11,7 @@ from fieldsid.diagnosis.forms import in_other_forms
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
+from fieldsid.diagnosis.worth import ALIKE, WORTH, likelier, pays
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
@@ -40,16 +41,6 @@ LARGEST, PAIR = 4, 2
 CLEAN = 1.02
 TWINS = 1.0
 """Log likelihood within which two starts of one hypothesis are alike."""
-WORTH = 6.0
-"""Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
-LEARNED = 4.0
-"""Log likelihood an addition must gain on the runs it is fitted to, or its numbers come from nowhere."""
-MATTERS = 0.97
-"""Share the free-run error must fall to: significant is not important."""
-ALIKE = 1.03
-"""Hypotheses predict alike within this factor of each other's error."""
-MATTERS_MORE = 0.02
-"""What a third and each further effect must bring beyond that: long explanations are the easier to find."""
 
 
 @dataclass(slots=True)
@@ -147,7 +138,7 @@ class Search:
             self._back_from_child(key)
             self._free_runs(key)
             for child in self._children(key)[:FREE_RUNS]:
-                if self.likelier(self.tried[key], child):
+                if likelier(self.tried[key], child):
                     self._reshape(frozenset(child.names))
         return self._children(key)
 
@@ -236,7 +227,7 @@ class Search:
             known = self.tried[key]
             others = in_other_forms(known, self.floor, self.told, self.family)
             best = max(others, key=lambda h: h.score, default=known)
-            if not self.pays(known, best):
+            if not pays(known, best):
                 break
             self.tried[key] = best
 
@@ -246,7 +237,7 @@ class Search:
         for size in range(LARGEST):
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
-            paying = next((c for c in children if self.pays(current, c)), None) or self._two_at_once(current, children)
+            paying = next((c for c in children if pays(current, c)), None) or self._two_at_once(current, children)
             if paying is None:
                 if self._turn(current):
                     return self.best()
@@ -295,15 +286,15 @@ class Search:
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
         """Return a pair that pays where the first of the two has evidence but the error falls with the second only."""
-        first = next((c for c in children if self.likelier(current, c)), None)
+        first = next((c for c in children if likelier(current, c)), None)
         if first is None:
             return None
-        return next((c for c in self.grow(first) if self.pays(first, c) and self.pays(current, c)), None)
+        return next((c for c in self.grow(first) if pays(first, c) and pays(current, c)), None)
 
     def admissible(self, h: Hypothesis) -> bool:
         """Whether every effect of a hypothesis is worth having: it pays over each smaller one that was tried."""
         key = frozenset(h.names)
-        return all(self.pays(self.tried[k], h) for k in self.tried if k < key)
+        return all(pays(self.tried[k], h) for k in self.tried if k < key)
 
     def _swapped(self, found: Hypothesis) -> Hypothesis:
         """Drop each effect in turn and add the best other one; keep what scores higher and predicts as well."""
@@ -315,23 +306,28 @@ class Search:
             if rest not in self.tried:
                 continue
             children = self.grow(self.tried[rest], most=PROMISING_INSTEAD)
-            child = next((c for c in children if self.pays(self.tried[rest], c)), best)
-            if child.score > best.score and self.misfit(child) < ALIKE * self.misfit(best):
+            child = next((c for c in children if pays(self.tried[rest], c)), best)
+            if child.score > best.score and child.judging.mean < ALIKE * best.judging.mean:
                 best = child
         return best
 
     def _thinned(self, found: Hypothesis) -> Hypothesis:
         """Leave out each effect that was added before the last two where the rest does as well: the first ones may have stood in.
 
-        What is left out is judged from the numbers of the whole; a pair's parts were tried on the way to it.
+        What is left out is judged from the numbers of the whole; a pair's parts were tried on the way to it, though not in
+        the forms that the pair has taken since.
         """
-        while len(found.names) > len(self.known) + PAIR:
+        while len(found.names) > len(self.known) + (1 if self._is_shaped(found) else PAIR):
             smaller = [self._without(found, e) for e in found.effects if e.name not in self.known]
-            idle = [h for h in smaller if not self.pays(h, found)]
+            idle = [h for h in smaller if not pays(h, found)]
             if not idle:
                 break
             found = max(idle, key=lambda h: h.score)
         return found
+
+    def _is_shaped(self, h: Hypothesis) -> bool:
+        """Whether one of a hypothesis's effects is in another form than the textbook's."""
+        return any(e not in self.catalogue for e in h.effects)
 
     def _without(self, h: Hypothesis, gone: Effect) -> Hypothesis:
         """Return a hypothesis without one of its effects, tried from the numbers it has with it."""
@@ -349,23 +345,9 @@ class Search:
     def _pruned(self, found: Hypothesis) -> Hypothesis:
         """Return the smallest tried subset that loses nothing worth having."""
         for key in sorted(self.tried, key=len):
-            if self.root <= key < frozenset(found.names) and not self.pays(self.tried[key], found):
+            if self.root <= key < frozenset(found.names) and not pays(self.tried[key], found):
                 return self.tried[key]
         return found
-
-    def pays(self, without: Hypothesis, with_: Hypothesis) -> bool:
-        """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
-        matters = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
-        return self.likelier(without, with_) and self.misfit(with_) < matters * self.misfit(without)
-
-    def likelier(self, without: Hypothesis, with_: Hypothesis) -> bool:
-        """Whether an addition brings evidence, whatever it does to the free run."""
-        learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
-        return learned and with_.score - without.score > WORTH
-
-    def misfit(self, h: Hypothesis) -> float:
-        """Return the mean of both channels' errors."""
-        return h.judging.mean
 
     def error(self, h: Hypothesis) -> float:
         """Return the free-run error over the noise floor."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
-from fieldsid.diagnosis.search import ALIKE, Search
+from fieldsid.diagnosis.search import Search
+from fieldsid.diagnosis.worth import ALIKE
 
 TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
@@ -75,7 +76,7 @@ def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
         if h is not found
         and len(h.names) == len(found.names)
         and abs(found.score - h.score) < margin
-        and search.misfit(h) < ALIKE * search.misfit(found)
+        and h.judging.mean < ALIKE * found.judging.mean
         and search.admissible(h)
     )
 

@@ -1,7 +1,8 @@
 """Small fin angles do nothing: delta = 0 inside +/-width, command - width sign(command) outside (width >= 0, rad).
 
 Subtractive, so the fin moves off smoothly at the edge. In its other forms the edge is rounded over deadband_blend, or the
-fin jumps at it by the share deadband_jump of the width. Source: Tao and Kokotovic 1996, Adaptive Control of Systems
+fin jumps at it by the share deadband_jump of the width, and may hold on until |command| < release * width.
+Source: Tao and Kokotovic 1996, Adaptive Control of Systems
 with Actuator and Sensor Nonlinearities.
 """
 
@@ -13,7 +14,47 @@ from fieldsid.effects._paths import Beyond, through_map
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
+from fieldsid.models.jit import jit
 from fieldsid.models.record import Record
+
+
+@jit
+def _share(here: float, there: float, edge: float) -> float:
+    """Return the share of the way from one size to another at which an edge is met, 0..1."""
+    return min(max((edge - here) / (there - here), 0.0), 1.0) if there != here else 0.0
+
+
+@jit
+def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_go: float, out: FloatArray) -> None:
+    """Fill out (n-1, 2) with mean and change over each interval of a fin that takes off at `width` and stops at `let_go`.
+
+    Once it moves it stands `lost` short of the command. Lengths in rad, let_go <= width.
+    """
+    moves = abs(start[0]) > width
+    for i in range(start.shape[0]):
+        a, b = start[i], end[i]
+        here, there = abs(a), abs(b)
+        moves = here > width or (moves and here >= let_go)
+        before, after, mean = max(here - lost, 0.0) if moves else 0.0, 0.0, 0.0
+        across = a * b < 0.0
+        goes_on = there > width or (moves and there >= let_go and not across)
+        if across:
+            zero = here / (here + there)
+            stops = zero * _share(here, 0.0, let_go) if moves else 0.0
+            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * (1.0 if a > 0.0 else -1.0)
+        elif moves and not goes_on:
+            stops = _share(here, there, let_go)
+            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * (1.0 if a > 0.0 else -1.0)
+        if goes_on:
+            after = there - lost
+            if across or not moves:
+                takes_off = zero + (1.0 - zero) * _share(0.0, there, width) if across else _share(here, there, width)
+                mean += 0.5 * (1.0 - takes_off) * (width - lost + after) * (1.0 if b > 0.0 else -1.0)
+            else:
+                mean += 0.5 * (before + after) * (1.0 if b > 0.0 else -1.0)
+        out[i, 0] = mean
+        out[i, 1] = after * (1.0 if b > 0.0 else -1.0) - before * (1.0 if a > 0.0 else -1.0)
+        moves = goes_on
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
@@ -21,6 +62,10 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     width, kept = values["width"], values.get("deadband_jump", 0.0)
     if width <= 0.0:
         return path
+    if "release" in values:
+        out = np.empty((path.start.size, 2))
+        held_on(path.start, path.end, width, (1.0 - kept) * width, values["release"] * width, out)
+        return FinPath(out[:, 0] - 0.5 * out[:, 1], out[:, 0] + 0.5 * out[:, 1])
     beyond = Beyond(width, values.get("deadband_blend", 0.0))
 
     def value(d: FloatArray) -> FloatArray:
@@ -67,6 +112,22 @@ EFFECT = Effect(
             (
                 Coefficient(
                     "deadband_jump", "1", 0.0, 1.0, 0.8, scan=(0.5, 1.0), step=1e-3, says="share of the width it jumps by"
+                ),
+            ),
+        ),
+        Form(
+            "the fin jumps at the edge, and stays out until the command is well inside it",
+            (
+                Coefficient("deadband_jump", "1", 0.0, 1.0, 1.0, step=1e-3, says="share of the width it jumps by"),
+                Coefficient(
+                    "release",
+                    "1",
+                    0.0,
+                    1.0,
+                    0.5,
+                    scan=(0.2, 0.4, 0.6, 0.8),
+                    step=1e-2,
+                    says="share of the width inside which the fin goes back",
                 ),
             ),
         ),

@@ -20,9 +20,18 @@ EFFECT = Effect(
     axes=(Axis.YAW,),
     equation="r' += x; x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p, p the damping's exponent",
     coefficients=(
-        Coefficient("cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.3, 0.8, 2.5), step=1e-3, says="damping of the sway speed"),
         Coefficient(
-            "cross_rate", "1/s^2", -20.0, 20.0, 0.1, scan=(-0.3, 0.3), says="Munk moment the turn rate builds up; minus turns on"
+            "cross_damping", "1/s", 0.05, 10.0, 0.8, scan=(0.25, 0.7, 2.0), step=1e-3, pace=1, says="damping of the sway speed"
+        ),
+        Coefficient(
+            "cross_rate",
+            "1/s^2",
+            -20.0,
+            20.0,
+            0.1,
+            scan=(-0.2, 0.2),
+            pace=2,
+            says="Munk moment the turn rate builds up; minus turns on",
         ),
     ),
     telltale="the rate overshoots or creeps on after a command where a first-order yaw would have settled",

@@ -15,10 +15,11 @@ from fieldsid.diagnosis.diagnose import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.refitted import refitted_model
-from fieldsid.diagnosis.search import MATTERS, WORTH, Search, search
+from fieldsid.diagnosis.search import Search, search
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.diagnosis.usable import usable
+from fieldsid.diagnosis.worth import MATTERS, WORTH
 from fieldsid.effects import pick_effect
 from fieldsid.errors import DataError, ModelError, UsageError
 from fieldsid.fitting.between import said

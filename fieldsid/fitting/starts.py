@@ -29,6 +29,8 @@ ROUNDS_ALIKE = 8
 GENTLE = 0.03
 """A coefficient of either sign is tried this much weaker too: a slow ship's are far below a small vehicle's."""
 WORTHLESS = 1e-9
+SLOWEST_PACE = 1e-3
+"""1/s; a base fitted without what is missing may show next to no damping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,12 +141,21 @@ def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
     """Return the starts of an effect's shared coefficients: what it suggests itself, else the points of its grids."""
     if effect.suggest is not None and (suggested := effect.suggest(ground.problem.records, ground.residuals)):
         return suggested
-    grids = [c.scan or (c.start,) for c in effect.shared]
+    pace = pace_of(ground.problem, ground.x)
+    grids = [tuple(v * pace**c.pace for v in c.scan) or (c.start,) for c in effect.shared]
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MOST_POINTS)
     points = points[::step]
     signed = {c.name for c in effect.shared if c.low < 0.0 < c.high and c.scan}
     return points + [{n: GENTLE * v if n in signed else v for n, v in point.items()} for point in points if signed]
+
+
+def pace_of(problem: Problem, x: FloatArray) -> float:
+    """Return how fast the hull itself is at the reference speed, 1/s: its damping, and what its stiffness swings it at."""
+    layout = problem.layout
+    names, values = NAMES[layout.axis], dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    stiffness = 0.0 if names.stiffness is None else values[names.stiffness]
+    return float(max(abs(values[names.damping]) + np.sqrt(abs(stiffness)), SLOWEST_PACE))
 
 
 def _new_slots(problem: Problem, effect: Effect) -> list[int]:

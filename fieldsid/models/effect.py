@@ -45,7 +45,8 @@ class Coefficient:
 
     `scan` gives start values tried before the descent; `step` the half width of the central difference.
     `per_run` marks a nuisance (a phase, an event time) that every run has of its own and that is refitted
-    on validation runs; its bounds are then fractions of the run's length when `unit` is "run".
+    on validation runs; its bounds are then fractions of the run's length when `unit` is "run". `pace` is the power of
+    the hull's own pace (1/s) that the points of the grid are multiples of: a slow hull's numbers are slow too.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Coefficient:
     start: float
     scan: tuple[float, ...] = ()
     step: float = 1e-4
+    pace: int = 0
     per_run: bool = False
     says: str = ""
 

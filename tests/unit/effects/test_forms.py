@@ -16,7 +16,7 @@ from fieldsid.models.simulate import command_record
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
     "deviation_sin2": 0.0, "deviation_cos2": 0.0, "cross_quadratic": 0.0, "cross_fin": 0.0, "cross_exponent": 1.0,
-    "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0,
+    "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0, "release": 1.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 
@@ -119,3 +119,23 @@ def test_a_second_component_is_suggested_at_the_period_that_the_first_has_left()
     left = np.stack([np.zeros(len(log)), 0.02 * np.cos(2.0 * np.pi * log.time / 3.1)])
     seen = replace(log, angle_ok=np.ones(len(log), bool), rate_ok=np.ones(len(log), bool))
     assert min(abs(p["second_period"] - 3.1) for p in second.suggest([seen], [left])) < 0.2
+
+
+@pytest.mark.parametrize(("jump", "release"), [(1.0, 0.5), (0.6, 0.7), (0.0, 1.0)])
+def test_a_fin_that_stays_out_is_its_rule_applied_finely(jump, release):
+    rng, width = np.random.default_rng(8), 0.08
+    knots = np.concatenate([[0.0], 0.2 * rng.standard_normal(60)])
+    start, end = knots[:-1], knots[1:]
+    steps = rng.random(60) < 0.4
+    end = np.where(steps, start, end)
+    values = {"width": width, "deadband_jump": jump, "release": release}
+    path = pick_effect("deadband").fin(FinPath(start, end), values, record())
+    moves = False
+    for i in range(start.size):
+        fine = start[i] + (end[i] - start[i]) * (np.arange(4000) + 0.5) / 4000
+        shown = np.zeros(4000)
+        for k, d in enumerate(fine):
+            moves = abs(d) > width or (moves and abs(d) >= release * width)
+            shown[k] = np.sign(d) * (abs(d) - (1.0 - jump) * width) if moves else 0.0
+        assert path.mean[i] == pytest.approx(shown.mean(), abs=2e-4)
+        assert path.end[i] - path.start[i] == pytest.approx(shown[-1] - shown[0], abs=3e-4)

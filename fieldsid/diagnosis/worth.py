@@ -1,0 +1,28 @@
+"""When an addition to a hypothesis is worth having: what it must bring in evidence, on the runs fitted to, and on unseen ones."""
+
+from __future__ import annotations
+
+from fieldsid.diagnosis.hypothesis import Hypothesis
+
+WORTH = 6.0
+"""Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
+LEARNED = 4.0
+"""Log likelihood an addition must gain on the runs it is fitted to, or its numbers come from nowhere."""
+MATTERS = 0.97
+"""Share the free-run error must fall to: significant is not important."""
+ALIKE = 1.03
+"""Hypotheses predict alike within this factor of each other's error."""
+MATTERS_MORE = 0.02
+"""What a third and each further effect must bring beyond that: long explanations are the easier to find."""
+
+
+def pays(without: Hypothesis, with_: Hypothesis) -> bool:
+    """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
+    matters = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
+    return likelier(without, with_) and with_.judging.mean < matters * without.judging.mean
+
+
+def likelier(without: Hypothesis, with_: Hypothesis) -> bool:
+    """Whether an addition brings evidence, whatever it does to the free run."""
+    learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
+    return learned and with_.score - without.score > WORTH
