@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+
+import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import Trial, judge
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.descent import descend
+from fieldsid.fitting.layout import Layout
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.effect import Effect, Form, in_form
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, in_form
 from fieldsid.models.model import Noise
 
-ROUNDS, COARSE = 6, 1e-3
-"""Rounds each start of a form is followed for before the best is judged, and the share of the cost a round must gain."""
+GLIMPSE, KEPT, ROUNDS, COARSE = 2, 3, 6, 1e-3
+"""Rounds every start of a form is followed for, how many go on, for how many more before the best is judged; and the share
+of the cost a round must gain."""
 
 
 def in_other_forms(h: Hypothesis, floor: Noise, told: Noise, family: str) -> Iterator[Hypothesis]:
@@ -29,18 +33,33 @@ def in_other_forms(h: Hypothesis, floor: Noise, told: Noise, family: str) -> Ite
 
 
 def _begun(h: Hypothesis, effect: Effect, form: Form) -> tuple[Problem, FloatArray]:
-    """Return the form's problem and the best of its starts, each after a few rounds under the hypothesis' noise."""
+    """Return the form's problem and the best of its starts after a few rounds under the hypothesis' noise.
+
+    The edges of an actuator are sought again with the form's own numbers: a cost with edges has many ends.
+    """
     trial, noise = h.judged.trial, h.judged.noise
     old = trial.problem.layout
     problem = trial.problem.with_effects([in_form(e, form) if e is effect else e for e in h.effects])
-    starts = [carried(old, trial.x, problem.layout, point) for point in _points(trial, form)]
-    found = [descend(problem, x, noise, rounds=ROUNDS, tolerance=COARSE) for x in starts]
-    return problem, min(found, key=lambda d: d.cost).x
+    again = [{}, *_grid_points(effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
+    points = [(point, edges) for point in _points(trial, form) for edges in again]
+    starts = [_moved(problem.layout, carried(old, trial.x, problem.layout, point), edges) for point, edges in points]
+    found = [descend(problem, x, noise, rounds=GLIMPSE, tolerance=COARSE) for x in starts]
+    best = sorted(found, key=lambda d: d.cost)[:KEPT]
+    return problem, min((descend(problem, d.x, noise, rounds=ROUNDS, tolerance=COARSE) for d in best), key=lambda d: d.cost).x
 
 
 def _points(trial: Trial, form: Form) -> list[dict[str, float]]:
     """Return the start values of a form's shared coefficients: what it suggests from what is left, else its grids' points."""
     if form.suggest is not None:
         return form.suggest(trial.problem.records, residuals_of(trial.problem, trial.x))
-    grids = {c.name: c.scan or (c.start,) for c in form.coefficients}
+    return _grid_points(form.coefficients)
+
+
+def _grid_points(coefficients: Sequence[Coefficient]) -> list[dict[str, float]]:
+    grids = {c.name: c.scan or (c.start,) for c in coefficients}
     return [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
+
+
+def _moved(layout: Layout, x: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """Return x with some shared slots at other values."""
+    return np.array([values.get(s.name, v) for s, v in zip(layout.slots, x, strict=True)])
