@@ -15,7 +15,7 @@ from fieldsid.fitting.layout import Layout
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, in_form
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Suggest, in_form
 from fieldsid.models.model import Noise
 
 GLIMPSE, KEPT, ROUNDS, COARSE = 2, 3, 6, 1e-3
@@ -40,22 +40,18 @@ def _begun(h: Hypothesis, effect: Effect, form: Form) -> tuple[Problem, FloatArr
     trial, noise = h.judged.trial, h.judged.noise
     old = trial.problem.layout
     problem = trial.problem.with_effects([in_form(e, form) if e is effect else e for e in h.effects])
-    again = [{}, *_grid_points(effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
-    points = [(point, edges) for point in _points(trial, form) for edges in again]
+    again = [{}, *_points(trial, effect.suggest, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
+    points = [(point, edges) for point in _points(trial, form.suggest, form.coefficients) for edges in again]
     starts = [_moved(problem.layout, carried(old, trial.x, problem.layout, point), edges) for point, edges in points]
     found = [descend(problem, x, noise, rounds=GLIMPSE, tolerance=COARSE) for x in starts]
     best = sorted(found, key=lambda d: d.cost)[:KEPT]
     return problem, min((descend(problem, d.x, noise, rounds=ROUNDS, tolerance=COARSE) for d in best), key=lambda d: d.cost).x
 
 
-def _points(trial: Trial, form: Form) -> list[dict[str, float]]:
-    """Return the start values of a form's shared coefficients: what it suggests from what is left, else its grids' points."""
-    if form.suggest is not None:
-        return form.suggest(trial.problem.records, residuals_of(trial.problem, trial.x))
-    return _grid_points(form.coefficients)
-
-
-def _grid_points(coefficients: Sequence[Coefficient]) -> list[dict[str, float]]:
+def _points(trial: Trial, suggest: Suggest | None, coefficients: Sequence[Coefficient]) -> list[dict[str, float]]:
+    """Return the start values of shared coefficients: what is suggested by what is left, else the points of their grids."""
+    if suggest is not None:
+        return suggest(trial.problem.records, residuals_of(trial.problem, trial.x))
     grids = {c.name: c.scan or (c.start,) for c in coefficients}
     return [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
 

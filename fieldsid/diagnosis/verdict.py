@@ -21,6 +21,9 @@ BEYOND_CHANCE, BESIDE_AN_EFFECT = 2e-2, 1e-6
 is never exact."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
+FAINT, STORM = 2.0, 4.0
+"""Error over the noise floor below which only what moves with the vehicle is told from the sea, since gusts come in bursts
+too; and the error above which no sea is taken for granted."""
 WORSE = 2.0
 """Error on unseen runs over that on fitted ones above which a disturbance, alike on both, is not all that is left."""
 MOSTLY = 0.7
@@ -38,9 +41,11 @@ class Verdict:
 
 def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     """Return the verdict on the hypothesis a search ended at."""
-    visible = search.error(found) > VISIBLE
+    error = search.error(found)
+    visible = error > VISIBLE
     if frozenset(found.names) == search.root:
-        odd = left.p < BEYOND_CHANCE or worse_unseen(search, found) > WORSE
+        p = 3.0 * left.relation if error < FAINT else left.p
+        odd = p < BEYOND_CHANCE or error > STORM or worse_unseen(search, found) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
     if visible and left.p < BESIDE_AN_EFFECT and explained(search, found) < MOSTLY:
         return Verdict("unexplained", ())

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.effects._paths import line_of_two_pieces
+from fieldsid.effects._reach import shares_of_reach
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
@@ -42,19 +43,20 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     return FinPath(out[:, 0].copy(), out[:, 1].copy())
 
 
+GAP = Coefficient("gap", "rad", 0.0, 0.3, 0.05, step=5e-4, says="full width of the play")
+
 EFFECT = Effect(
     name="backlash",
     says="play in the linkage: the fin hangs half a gap behind the command, on the side it came from",
     stage=Stage.ACTUATOR,
     axes=(Axis.YAW, Axis.PITCH),
     equation="delta = play(command, gap): |delta - command| <= gap/2, and delta rests inside",
-    coefficients=(
-        Coefficient("gap", "rad", 0.0, 0.3, 0.05, scan=(0.005, 0.02, 0.06, 0.12), step=5e-4, says="full width of the play"),
-    ),
+    coefficients=(GAP,),
     telltale="the same command gives two different rates, by whether it was reached from port or from starboard",
     excited_by=("stairs", "multisine", "chirp", "three_two_one_one", "square_pulses"),
     mistaken_for=("deadband", "servo_lag", "asymmetric_fin", "stall"),
     source="Nordin and Gutman 2002, Automatica 38, Controlling mechanical systems with backlash",
     order=40,
     fin=fin,
+    suggest=shares_of_reach(GAP, (0.02, 0.08, 0.25, 0.6)),
 )

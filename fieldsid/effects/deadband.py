@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.effects._paths import Beyond, through_map
+from fieldsid.effects._reach import shares_of_reach
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
@@ -77,15 +78,15 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     return through_map(path, value, area)
 
 
+WIDTH = Coefficient("width", "rad", 0.0, 0.2, 0.03, step=5e-4, says="half width of the dead zone")
+
 EFFECT = Effect(
     name="deadband",
     says="small fin angles do nothing",
     stage=Stage.ACTUATOR,
     axes=(Axis.YAW, Axis.PITCH),
     equation="delta = 0 for |command| <= width, else command - width * sign(command)",
-    coefficients=(
-        Coefficient("width", "rad", 0.0, 0.2, 0.03, scan=(0.01, 0.03, 0.08), step=5e-4, says="half width of the dead zone"),
-    ),
+    coefficients=(WIDTH,),
     telltale="small commands give too little turn and large ones too much: the gain read from small steps is low",
     excited_by=("stairs", "multisine", "chirp", "square_pulses"),
     mistaken_for=("backlash", "stall", "quadratic_damping", "asymmetric_fin"),
@@ -133,4 +134,5 @@ EFFECT = Effect(
         ),
     ),
     fin=fin,
+    suggest=shares_of_reach(WIDTH, (0.05, 0.1, 0.2, 0.32, 0.5)),
 )

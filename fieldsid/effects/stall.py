@@ -9,6 +9,7 @@ report 933 (lift of low-aspect-ratio control surfaces).
 from __future__ import annotations
 
 from fieldsid.effects._paths import Beyond, through_map
+from fieldsid.effects._reach import shares_of_reach
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
 from fieldsid.models.record import Record
@@ -25,6 +26,8 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     )
 
 
+ANGLE = Coefficient("stall_angle", "rad", 0.03, 0.6, 0.2, step=5e-4, says="angle where the lift falls off")
+
 EFFECT = Effect(
     name="stall",
     says="the lift of the fin falls off beyond an angle",
@@ -32,9 +35,7 @@ EFFECT = Effect(
     axes=(Axis.YAW, Axis.PITCH),
     equation="delta = sign(d) * (stall_angle + slope_after * (|d| - stall_angle)) for |d| > stall_angle, else d",
     coefficients=(
-        Coefficient(
-            "stall_angle", "rad", 0.03, 0.6, 0.2, scan=(0.08, 0.14, 0.2, 0.28), step=5e-4, says="angle where the lift falls off"
-        ),
+        ANGLE,
         Coefficient("slope_after", "1", -1.0, 0.95, 0.0, says="slope of the lift beyond it, as a share of the slope before"),
     ),
     telltale="large commands give less turn than simulated while small ones fit, whatever the rate",
@@ -60,4 +61,5 @@ EFFECT = Effect(
         ),
     ),
     fin=fin,
+    suggest=shares_of_reach(ANGLE, (0.3, 0.5, 0.7, 0.85, 0.95)),
 )
