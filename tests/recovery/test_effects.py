@@ -23,7 +23,7 @@ from fieldsid.models.simulate import simulate
 
 CLOCK = Clock(0.05, 1000)
 BASE = {
-    Axis.YAW: Physics(damping=1.1, authority=-0.9, trim=0.01, kp=0.9, kd=0.5),
+    Axis.YAW: Physics(damping=1.1, authority=-0.9, fin_bend=-0.01, kp=0.9, kd=0.5),
     Axis.PITCH: Physics(damping=1.8, stiffness=0.4, authority=1.2, trim=-0.02, kp=0.9, kd=0.5),
 }
 

@@ -69,7 +69,7 @@ def slope(y, out, q, t, fin, now, pitching):
     if q.righting > 0.0:
         restoring = q.stiffness * math.sin(y[ANGLE]) - q.trim * math.cos(y[ANGLE])
     out[ANGLE] = y[RATE]
-    out[RATE] = -damping * y[RATE] - restoring + authority * fin + m
+    out[RATE] = -damping * y[RATE] - restoring + authority * (fin + q.fin_bend) + m
     out[CROSS] = (
         -q.cross_damping * y[CROSS] - q.cross_rate * y[RATE] + q.cross_fin * fin - q.cross_quadratic * y[CROSS] * abs(y[CROSS])
     )

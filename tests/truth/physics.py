@@ -1,7 +1,7 @@
 """Numbers of the truth: base model, actuator, hydrodynamics, sensor, and what no catalogue has.
 
 Angle y, rate p, fin d, speed u, time t since the log's start:
-    y' = p,  p' = -damping p - stiffness y + authority d + trim + effects.
+    y' = p,  p' = -damping p - stiffness y + authority (d + fin_bend) + trim + effects.
 Every field is zero (or infinite) where its effect is absent.
 """
 
@@ -17,6 +17,7 @@ class Physics(NamedTuple):
     stiffness: float = 0.0
     authority: float = -1.0
     trim: float = 0.0
+    fin_bend: float = 0.0
     # actuator, in the order of the path
     delay: float = 0.0
     max_rate: float = 0.0

@@ -53,13 +53,15 @@ class Scene:
         ratio = leg.speed / self.base.nominal_speed
         updates = {k: v for k, v in updates.items() if k not in ("thrust_swing", "roll_push", "depth_spread")}
         times = updates.pop("authority_times", 1.0)
-        trim = self.base.trim * self.trim_factor(leg) + updates.pop("trim", 0.0)
+        trim, bend = (0.0, self.base.trim / self.base.authority) if self.notes.get("bent_fin") else (self.base.trim, 0.0)
+        trim += updates.pop("trim", 0.0)
         authority = self.base.authority * ratio**2 * self.scatter[leg.group] * times
         damping = self.base.damping * ratio**self.law
         kp, kd = gains(damping, self.base.stiffness, authority, self.base.kp)
         return self.base._replace(
-            authority=authority, damping=damping, trim=trim, kp=kp, kd=kd, nominal_speed=leg.speed, median_speed=leg.speed
-        )._replace(**updates)
+            authority=authority, damping=damping, trim=trim, fin_bend=bend, kp=kp, kd=kd,
+            nominal_speed=leg.speed, median_speed=leg.speed,
+        )._replace(**updates)  # fmt: skip
 
 
 def gains(damping, stiffness, authority, omega):
