@@ -12,13 +12,13 @@ from functools import cached_property
 
 import numpy as np
 
+from fieldsid.diagnosis.predictive import Unseen, moves_of, predictive
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
 from fieldsid.fitting.descent import cost_of
-from fieldsid.fitting.noise import estimate_noise, floor_of, log_likelihood
+from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import frozen_problem, refit_own, with_times
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -115,20 +115,11 @@ def flown_by(model: Model, trial: Trial, validation: Sequence[Record]) -> Flown:
 
 
 def unseen_likelihood(judged: Judged, validation: Sequence[Record], flown: Flown) -> FloatArray:
-    """Return each validation run's log likelihood under the noise that all of them together ask for.
-
-    The parameters are the training runs'; the noise is not, or a hypothesis that is right where it was fitted
-    and a little wrong elsewhere would be punished for having been right.
-    """
+    """Return each validation run's log predictive likelihood."""
     if not validation:
         return np.zeros(0)
-    residuals = [left_over(p, x) for p, x in flown]
-    dynamics = [(b.damping, b.stiffness) for b in (p.base_of(x, 0) for p, x in flown)]
-    noise, _ = estimate_noise(validation, dynamics, residuals, judged.family, judged.noise, floor=judged.floor)
-    vector = noise_vector(noise)
-    return np.array(
-        [log_likelihood(p.records, [d], [e], vector) for (p, _), d, e in zip(flown, dynamics, residuals, strict=True)]
-    )
+    runs = [Unseen(p, x, left_over(p, x), moves_of(judged, p, r.speed)) for (p, x), r in zip(flown, validation, strict=True)]
+    return predictive(judged, runs, validation)
 
 
 def left_over(problem: Problem, x: FloatArray) -> FloatArray:

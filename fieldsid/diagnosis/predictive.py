@@ -1,0 +1,134 @@
+"""What the training runs make of the unseen ones: the predictive likelihood, the doubt in the parameters allowed for.
+
+The likelihood of unseen runs at the parameters' estimate punishes a hypothesis whose numbers the training runs hardly
+determine as if it were wrong. With theta ~ N(estimate, Lambda^-1) after the training runs, residual e and sensitivities S
+of an unseen run, both whitened, |e - S d|^2 = e'e - 2 b'd + d'A d, and to first order
+
+    log p(run) = -e'e/2 + (Lambda m + b)' (Lambda + A)^-1 (Lambda m + b) / 2 - m' Lambda m / 2 - log det(I + Lambda^-1 A) / 2
+
+after which Lambda <- Lambda + A and m is where the two together lead. A run's own slots are projected out of A and b.
+Source: MacKay 1992, Neural Computation 4(3), Bayesian interpolation; Kass and Raftery 1995, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.diagnosis.trial import Judged
+from fieldsid.fitting.descent import normal_equations
+from fieldsid.fitting.noise import estimate_noise, log_likelihood
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.whitening import noise_vector
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.axis import NAMES
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+STEP = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """An unseen run: its one-run problem and x, residual (2, n), and how its shared slots move with the training ones (F, S)."""
+
+    problem: Problem
+    x: FloatArray
+    residual: FloatArray
+    moves: FloatArray
+
+
+def predictive(judged: Judged, runs: Sequence[Unseen], records: Sequence[Record]) -> FloatArray:
+    """Return the log predictive likelihood of each unseen run, in turn, under the noise that all of them together ask for.
+
+    The parameters are the training runs'; the noise is not, or a hypothesis that is right where it was fitted and a little
+    wrong elsewhere would be punished for having been right.
+    """
+    dynamics = [(b.damping, b.stiffness) for b in (r.problem.base_of(r.x, 0) for r in runs)]
+    known = precision(judged)
+
+    _, led = _under(judged.noise, runs, dynamics, known)
+    found = []
+    for residuals in ([r.residual for r in runs], led):
+        noise, _ = estimate_noise(records, dynamics, residuals, judged.family, judged.noise, floor=judged.floor)
+        found.append(_under(noise, runs, dynamics, known)[0])
+    return max(found, key=lambda v: float(v.sum()))
+
+
+def precision(judged: Judged) -> FloatArray:
+    """Return the precision (S, S) that the training runs leave the shared slots with, their own slots projected out."""
+    problem, x = judged.trial.problem, judged.trial.x
+    shared = problem.layout.shared
+    _, normal, _, _ = normal_equations(problem, x, judged.noise, range(x.size))
+    width = (problem.layout.high - problem.layout.low)[:shared]
+    a, _ = _without_own(normal, np.zeros(x.size), shared)
+    return a + np.diag(1.0 / width**2)
+
+
+def moves_of(judged: Judged, frozen: Problem, speed: float) -> FloatArray:
+    """Return how the shared slots of a run's one-run problem move with the shared ones of the training problem, (F, S)."""
+    layout, x = judged.trial.problem.layout, judged.trial.x
+    names = NAMES[layout.axis]
+    out = np.zeros((frozen.layout.shared, layout.shared))
+
+    def at(values: dict[str, float]) -> FloatArray:
+        law = layout.law(values)
+        scale = law.scale(speed)
+        here = values | {
+            names.damping: values[names.damping] * scale ** (law.damping_exponent - frozen.layout.exponent),
+            names.authority: law.authority(speed, values[names.authority]) / scale**2,
+            names.trim: values[names.trim] * law.trim_factor(speed) / (scale**2 if law.trim_of_fin else 1.0),
+        }
+        return np.array([here[n] for n in frozen.layout.names])
+
+    values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    for j, name in enumerate(layout.names):
+        step = STEP * max(abs(values[name]), STEP)
+        out[:, j] = (at(values | {name: values[name] + step}) - at(values | {name: values[name] - step})) / (2.0 * step)
+    return out
+
+
+def _under(
+    noise: Noise, runs: Sequence[Unseen], dynamics: Sequence[tuple[float, float]], known: FloatArray
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Return each run's log predictive likelihood under a noise, and its residual where the runs have led the parameters."""
+    vector, values, parts = noise_vector(noise), list[float](), []
+    middle: FloatArray = np.zeros(known.shape[0])
+    doubt = known
+    for run, d in zip(runs, dynamics, strict=True):
+        likelihood = log_likelihood(run.problem.records, [d], [run.residual], vector)
+        shared = run.problem.layout.shared
+        _, normal, gradient, results = normal_equations(run.problem, run.x, noise, range(run.x.size))
+        parts.append((normal, results[0]))
+        if np.isfinite(results[0].sensitivity).all():
+            a, b = _without_own(normal, gradient, shared)
+            a, b = run.moves.T @ a @ run.moves, run.moves.T @ b
+            pull = doubt @ middle
+            moved = np.linalg.solve(doubt + a, pull + b)
+            gain = 0.5 * float((pull + b) @ moved - middle @ pull)
+            likelihood += gain - 0.5 * (_log_det(doubt + a) - _log_det(doubt))
+            middle, doubt = np.asarray(moved), doubt + a
+        values.append(likelihood)
+    return np.array(values), [_led(run, n, r.sensitivity, middle) for run, (n, r) in zip(runs, parts, strict=True)]
+
+
+def _led(run: Unseen, normal: FloatArray, sensitivity: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return a run's residual (2, n) with the shared slots moved, its own slots following."""
+    shared = run.problem.layout.shared
+    step = run.moves @ middle
+    own = -np.linalg.lstsq(normal[shared:, shared:], normal[shared:, :shared] @ step, rcond=1e-12)[0]
+    return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), sensitivity, axes=1))
+
+
+def _without_own(normal: FloatArray, gradient: FloatArray, shared: int) -> tuple[FloatArray, FloatArray]:
+    """Return normal matrix and gradient of the shared slots with the others at their best."""
+    cross = normal[shared:, :shared]
+    inverse = np.linalg.pinv(normal[shared:, shared:], rcond=1e-12, hermitian=True)
+    a = normal[:shared, :shared] - cross.T @ inverse @ cross
+    return 0.5 * (a + a.T), gradient[:shared] - cross.T @ inverse @ gradient[shared:]
+
+
+def _log_det(matrix: FloatArray) -> float:
+    return float(np.linalg.slogdet(matrix)[1])

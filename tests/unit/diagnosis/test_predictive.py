@@ -1,0 +1,86 @@
+"""The predictive likelihood against the average of the likelihood over what the training runs leave open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from truth.paper import YAW, paper_run
+
+from fieldsid.diagnosis.hypothesis import bare_model, flown_by, left_over
+from fieldsid.diagnosis.predictive import Unseen, _under, moves_of, precision
+from fieldsid.diagnosis.trial import Judged, refine
+from fieldsid.fitting.descent import cost_of, descend
+from fieldsid.fitting.layout import layout_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.start import start_vector
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
+from fieldsid.models.record import first_part, record_of
+
+NOISE = Noise(0.01, 0.01)
+
+
+def record(row, seed, **change):
+    log = paper_run(row, angle_noise=0.01, rate_noise=0.01, seed=seed)
+    return replace(record_of(Run(f"run{seed}", log.pop("time_s"), log), Axis.YAW), **change)
+
+
+@pytest.fixture(scope="module")
+def judged():
+    """A short run and a faster one leave the parameters in doubt."""
+    runs = (first_part(record(YAW[1], 1, speed=1.0), 220), first_part(record(YAW[1], 2, speed=1.3), 220))
+    layout = layout_of(runs, Axis.YAW, ())
+    trial = refine(Problem(runs, layout), start_vector(runs, layout), NOISE)
+    x = descend(trial.problem, trial.x, NOISE).x
+    return Judged(replace(trial, x=x), NOISE, 0.0, "disturbance", NOISE)
+
+
+def unseen(judged, log):
+    model = bare_model(judged.trial.problem, judged.trial.x, NOISE)
+    ((problem, x),) = flown_by(model, judged.trial, (log,))
+    return Unseen(problem, x, left_over(problem, x), moves_of(judged, problem, log.speed))
+
+
+@pytest.mark.parametrize("speed", [1.0, 1.3])
+def test_it_is_the_likelihood_averaged_over_what_the_training_runs_leave_open(judged, speed):
+    run = unseen(judged, record(YAW[1], 7, speed=speed))
+    dynamics = [(b.damping, b.stiffness) for b in [run.problem.base_of(run.x, 0)]]
+    known = precision(judged)
+    value, led = _under(NOISE, [run], dynamics, known)
+    shared = run.problem.layout.shared
+    drawn = np.random.default_rng(3).multivariate_normal(np.zeros(known.shape[0]), np.linalg.inv(known), 600)
+    costs = []
+    for d in drawn:
+        x = run.x.copy()
+        x[:shared] += run.moves @ d
+        costs.append(descend(run.problem, x, NOISE, free=range(shared, x.size), rounds=4).cost)
+    plain = cost_of(run.problem, run.x, NOISE)
+    averaged = np.log(np.mean(np.exp(-0.5 * (np.array(costs) - plain))))
+    at_estimate = _under(NOISE, [run], dynamics, 1e12 * known)[0]
+    assert value[0] - at_estimate[0] == pytest.approx(averaged, abs=0.3)
+    assert abs(averaged) > 0.5
+    assert np.sum((led[0] / 0.01) ** 2) < plain
+
+
+def test_the_shared_slots_of_a_run_move_as_the_law_says(judged):
+    log = record(YAW[1], 7, speed=1.15)
+    run, layout = unseen(judged, log), judged.trial.problem.layout
+    x = judged.trial.x
+    for j, name in enumerate(layout.names):
+        step = 1e-3 * max(abs(x[j]), 1e-2)
+        ends = []
+        for s in (step, -step):
+            moved = np.where(np.arange(x.size) == j, x + s, x)
+            ((problem, own),) = flown_by(bare_model(judged.trial.problem, moved, NOISE), judged.trial, (log,))
+            own[problem.layout.shared :] = run.x[run.problem.layout.shared :]
+            ends.append(problem.simulate(own, 0)[0].rate)
+        slope = (ends[0] - ends[1]) / (2 * step)
+        direct = np.zeros_like(slope)
+        result = run.problem.linearise(run.x, 0)
+        for i, slot in enumerate(result.slots):
+            if slot < run.problem.layout.shared:
+                direct += result.sensitivity[i, 1] * run.moves[slot, j]
+        np.testing.assert_allclose(direct, slope, atol=2e-3 * np.abs(slope).max() + 1e-9, err_msg=name)
