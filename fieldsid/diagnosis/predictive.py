@@ -28,6 +28,8 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 STEP = 1e-4
+ALIKE = 4.0
+"""Sum of squares over the noise floor within which residuals ask for the same noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +51,19 @@ def predictive(judged: Judged, runs: Sequence[Unseen], records: Sequence[Record]
     dynamics = [(b.damping, b.stiffness) for b in (r.problem.base_of(r.x, 0) for r in runs)]
     known = precision(judged)
 
+    plain = [r.residual for r in runs]
     _, led = _under(judged.noise, runs, dynamics, known)
     found = []
-    for residuals in ([r.residual for r in runs], led):
+    for residuals in (plain, led) if _differ(plain, led, judged.floor) else (plain,):
         noise, _ = estimate_noise(records, dynamics, residuals, judged.family, judged.noise, floor=judged.floor)
         found.append(_under(noise, runs, dynamics, known)[0])
     return max(found, key=lambda v: float(v.sum()))
+
+
+def _differ(plain: Sequence[FloatArray], led: Sequence[FloatArray], floor: Noise) -> bool:
+    """Whether two sets of residuals differ by more than a noise could tell: its parameters see no less than that."""
+    sigma = np.array([[floor.angle], [floor.rate]])
+    return sum(float(np.sum(((a - b) / sigma) ** 2)) for a, b in zip(plain, led, strict=True)) > ALIKE
 
 
 def precision(judged: Judged) -> FloatArray:

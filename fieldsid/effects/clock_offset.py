@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
 from fieldsid.models.record import Record
@@ -21,6 +22,15 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
         return motion
     then = record.time - offset
     return Motion(np.interp(then, record.time, motion.angle), np.interp(then, record.time, motion.rate))
+
+
+def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+    """Return small moves of the motion (P, 2, n) as they are logged, `offset` seconds later."""
+    time = record.time
+    then = np.clip(time - values["offset"], time[0], time[-1])
+    before = np.clip(np.searchsorted(time, then, side="right") - 1, 0, time.size - 2)
+    share = (then - time[before]) / (time[before + 1] - time[before])
+    return np.asarray(moves[:, :, before] * (1.0 - share) + moves[:, :, before + 1] * share)
 
 
 EFFECT = Effect(
@@ -39,5 +49,6 @@ EFFECT = Effect(
     mistaken_for=("delay", "servo_lag", "rate_limit"),
     source="Ljung 1999, System Identification, chapter 14",
     measure=measure,
+    carry=carry,
     handicap=15.0,
 )

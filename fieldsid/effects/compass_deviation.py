@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
 from fieldsid.models.record import Record
@@ -21,6 +22,15 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
     if "deviation_sin2" in values:
         shown = shown + values["deviation_sin2"] * np.sin(2.0 * psi) + values["deviation_cos2"] * np.cos(2.0 * psi)
     return Motion(shown, motion.rate)
+
+
+def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+    """Return small moves of the motion (P, 2, n) as the compass shows them."""
+    psi = motion.angle
+    slope = 1.0 + values["deviation_sin"] * np.cos(psi) - values["deviation_cos"] * np.sin(psi)
+    if "deviation_sin2" in values:
+        slope += 2.0 * (values["deviation_sin2"] * np.cos(2.0 * psi) - values["deviation_cos2"] * np.sin(2.0 * psi))
+    return np.asarray(moves * np.stack([slope, np.ones_like(slope)]))
 
 
 EFFECT = Effect(
@@ -38,6 +48,7 @@ EFFECT = Effect(
     mistaken_for=("current", "gyro_scale", "gyro_bias"),
     source="Groves 2013, chapter 6",
     measure=measure,
+    carry=carry,
     forms=(
         Form(
             "it goes twice around with the heading as well",

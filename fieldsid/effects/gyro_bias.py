@@ -6,6 +6,7 @@ Shows only where the angle is measured beside the rate, or where the trim is kno
 
 from __future__ import annotations
 
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
 from fieldsid.models.record import Record
@@ -14,6 +15,11 @@ from fieldsid.models.record import Record
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
     return Motion(motion.angle, motion.rate + values["bias"])
+
+
+def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+    """Return small moves of the motion (P, 2, n) as the gyro shows them: a constant offset leaves them."""
+    return moves
 
 
 EFFECT = Effect(
@@ -28,4 +34,5 @@ EFFECT = Effect(
     mistaken_for=("gyro_scale", "asymmetric_fin", "trim_drift"),
     source="Groves 2013, chapter 4",
     measure=measure,
+    carry=carry,
 )

@@ -5,6 +5,9 @@ Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Nav
 
 from __future__ import annotations
 
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
 from fieldsid.models.record import Record
@@ -13,6 +16,11 @@ from fieldsid.models.record import Record
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
     return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"]))
+
+
+def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+    """Return small moves of the motion (P, 2, n) as the gyro shows them."""
+    return np.asarray(moves * np.array([[1.0], [1.0 + values["scale_error"]]]))
 
 
 EFFECT = Effect(
@@ -27,4 +35,5 @@ EFFECT = Effect(
     mistaken_for=("gyro_bias", "compass_deviation", "speed_varying"),
     source="Groves 2013, chapter 4",
     measure=measure,
+    carry=carry,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -235,29 +235,44 @@ class Pushes:
         return next(c for e in self.layout.effects for c in e.coefficients if c.name == name)
 
     def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> tuple[Motion, FloatArray]:
-        """Return what the sensors show, with the sensitivities carried through them by directional differences.
+        """Return what the sensors show, with the sensitivities carried through them."""
+        sensors = [e for e in self.layout.effects if e.measure is not None]
+        if not sensors:
+            return motion, sens
+        shown = measured(motion, self.record, sensors, self.values)
+        out = self._carried(motion, shown, sensors, sens)
+        own = {c.name: c for e in sensors for c in e.coefficients}
+        for j, slot in enumerate(slots):
+            name = self.layout.slots[slot].name
+            if name in own:
+                step = own[name].step
+                ends = (self.values | {name: self.values[name] + s} for s in (step, -step))
+                plus, minus = (measured(motion, self.record, sensors, values) for values in ends)
+                out[j] = _between(plus, minus, 2.0 * step)
+        return shown, out
+
+    def _carried(self, motion: Motion, shown: Motion, sensors: Sequence[Effect], sens: FloatArray) -> FloatArray:
+        """Return sensitivities (P, 2, n) seen through the sensors, by differences along each where one has no slope of its own.
 
         A step of 1e-6 rad is so small against the scale of any sensor's law that a one-sided difference is exact to 1e-6.
         """
-        effects = self.layout.effects
-        if all(e.measure is None for e in effects):
-            return motion, sens
-        shown = measured(motion, self.record, effects, self.values)
-        out = np.empty_like(sens)
-        sensor_names = {c.name: c for e in effects if e.measure is not None for c in e.coefficients}
-        for j, slot in enumerate(slots):
-            name = self.layout.slots[slot].name
-            if name in sensor_names:
-                step = 2.0 * sensor_names[name].step
-                ends = (self.values | {name: self.values[name] + 0.5 * s} for s in (step, -step))
-                plus, minus = (measured(motion, self.record, effects, values) for values in ends)
-            else:
-                size = float(np.max(np.abs(sens[j])))
-                step = 1e-6 / size if size > 0 else 1.0
-                plus, minus = measured(_moved(motion, sens[j], step), self.record, effects, self.values), shown
-            out[j, 0] = (plus.angle - minus.angle) / step
-            out[j, 1] = (plus.rate - minus.rate) / step
-        return shown, out
+        out = sens.copy()
+        if all(e.carry is not None for e in sensors):
+            for effect in sensors:
+                if effect.carry is not None:
+                    out = effect.carry(out, motion, self.values, self.record)
+                motion = measured(motion, self.record, (effect,), self.values)
+            return out
+        for j, direction in enumerate(sens):
+            size = float(np.max(np.abs(direction)))
+            step = 1e-6 / size if size > 0 else 1.0
+            out[j] = _between(measured(_moved(motion, direction, step), self.record, sensors, self.values), shown, step)
+        return out
+
+
+def _between(plus: Motion, minus: Motion, step: float) -> FloatArray:
+    """Return the difference quotient of two motions, (2, n)."""
+    return np.stack([plus.angle - minus.angle, plus.rate - minus.rate]) / step
 
 
 def _constant(columns: slice, factor: float = 1.0) -> Push:

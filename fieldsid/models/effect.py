@@ -153,6 +153,8 @@ class Effect:
     core(values, scale) -> Core                             hydrodynamics inside the core; scale = speed / reference
     moment(motion, values, record) -> (n,) rad/s^2          hydrodynamics evaluated along the last trajectory
     measure(motion, values, record) -> Motion               sensor
+    carry(moves, motion, values, record) -> (P, 2, n)       sensor, optional: the derivative of measure, applied to P small
+                                                            moves (P, 2, n) of the motion; without it differences are taken
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
@@ -179,6 +181,7 @@ class Effect:
     core: Callable[[Values, float], Core] | None = None
     moment: Callable[[Motion, Values, Record], FloatArray] | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None
+    carry: Callable[[FloatArray, Motion, Values, Record], FloatArray] | None = None
     suggest: Suggest | None = None
     twin: Callable[[Values, Axis], dict[str, float] | None] | None = None
     forms: tuple[Form, ...] = ()
