@@ -7,7 +7,8 @@ from fieldsid.diagnosis.hypothesis import Hypothesis
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
 LEARNED = 4.0
-"""Log likelihood an addition must gain on the runs it is fitted to, or its numbers come from nowhere."""
+"""Log likelihood an addition with numbers of every run's own must gain on the runs it is fitted to: on unseen runs those
+numbers are fitted too, and might come from nowhere. One without must only not lose there."""
 MATTERS = 0.97
 """Share the free-run error must fall to: significant is not important."""
 ALIKE = 1.03
@@ -24,5 +25,7 @@ def pays(without: Hypothesis, with_: Hypothesis) -> bool:
 
 def likelier(without: Hypothesis, with_: Hypothesis) -> bool:
     """Whether an addition brings evidence, whatever it does to the free run."""
-    learned = float(with_.by_run.sum() - without.by_run.sum()) > LEARNED
+    known = {e.name for e in without.effects}
+    own = any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
+    learned = float(with_.by_run.sum() - without.by_run.sum()) > (LEARNED if own else 0.0)
     return learned and with_.score - without.score > WORTH
