@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.advise import next_maneuver
+from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.freely import freely
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.records import Candidate, Diagnosis
@@ -30,8 +31,6 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record, record_of
 
 SHOWN = 8
-TRACE = 0.5
-"""Coloured over white sensor noise below which the floor is the white one."""
 
 
 def diagnose(
@@ -129,18 +128,6 @@ def confusable(work: Search, h: Hypothesis, others: Sequence[Hypothesis]) -> tup
         for o in others
         if o is not h and len(o.names) == len(h.names) and mine > 0.0 and explained(work, o) > 0.8 * mine
     )[:4]
-
-
-def shown_floor(floor: Noise, noise: Noise) -> Noise:
-    """Return the sensor noise of both channels, its coloured part included where it is more than a trace.
-
-    A trace depends on the hypothesis, and would let the floor move from one generation of a model to the next.
-    """
-    return Noise(_with_colour(floor.angle, noise.coloured_angle), _with_colour(floor.rate, noise.coloured_rate))
-
-
-def _with_colour(white: float, coloured: float) -> float:
-    return float(np.hypot(white, coloured)) if coloured > TRACE * white else white
 
 
 def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[tuple[Place, ...], tuple[Note, ...]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
@@ -45,7 +46,8 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     visible = error > VISIBLE
     if frozenset(found.names) == search.root:
         p = 3.0 * left.relation if error < FAINT else left.p
-        odd = p < BEYOND_CHANCE or error > STORM or worse_unseen(search, found) > WORSE
+        sea = found.judging.over(shown_floor(search.floor, found.judged.noise))
+        odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
     if visible and left.p < BESIDE_AN_EFFECT and explained(search, found) < MOSTLY:
         return Verdict("unexplained", ())

@@ -58,5 +58,5 @@ EFFECT = Effect(
     source="Nordin and Gutman 2002, Automatica 38, Controlling mechanical systems with backlash",
     order=40,
     fin=fin,
-    suggest=shares_of_reach(GAP, (0.02, 0.08, 0.25, 0.6)),
+    suggest=shares_of_reach(GAP, (0.015, 0.06, 0.2, 0.5)),
 )

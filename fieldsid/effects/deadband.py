@@ -134,5 +134,5 @@ EFFECT = Effect(
         ),
     ),
     fin=fin,
-    suggest=shares_of_reach(WIDTH, (0.05, 0.1, 0.2, 0.32, 0.5)),
+    suggest=shares_of_reach(WIDTH, (0.015, 0.05, 0.1, 0.2, 0.32, 0.5)),
 )

@@ -20,7 +20,7 @@ EFFECT = Effect(
     equation="q' += x; x' = -cross_damping f x - cross_rate f^2 q, f = (speed/reference)^p, p the damping's exponent",
     coefficients=(
         Coefficient(
-            "cross_damping", "1/s", 0.05, 10.0, 0.8, scan=(0.25, 0.7, 2.0), step=1e-3, pace=1, says="damping of the heave speed"
+            "cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.25, 0.7, 2.0), step=1e-3, pace=1, says="damping of the heave speed"
         ),
         Coefficient(
             "cross_rate",

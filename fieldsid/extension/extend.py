@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.diagnosis.diagnose import shown_floor
+from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.refitted import refitted_model

@@ -142,7 +142,7 @@ def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
     if effect.suggest is not None and (suggested := effect.suggest(ground.problem.records, ground.residuals)):
         return suggested
     pace = pace_of(ground.problem, ground.x)
-    grids = [tuple(v * pace**c.pace for v in c.scan) or (c.start,) for c in effect.shared]
+    grids = [tuple(dict.fromkeys(np.clip(v * pace**c.pace, c.low, c.high) for v in c.scan)) or (c.start,) for c in effect.shared]
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MOST_POINTS)
     points = points[::step]
@@ -151,11 +151,18 @@ def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
 
 
 def pace_of(problem: Problem, x: FloatArray) -> float:
-    """Return how fast the hull itself is at the reference speed, 1/s: its damping, and what its stiffness swings it at."""
+    """Return how fast the hull itself is at the reference speed, 1/s: its damping, and what its stiffness swings it at.
+
+    Drag that grows with the motion may leave the linear damping next to nothing: the rate the fin's moment keeps up tells.
+    """
     layout = problem.layout
     names, values = NAMES[layout.axis], dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
     stiffness = 0.0 if names.stiffness is None else values[names.stiffness]
-    return float(max(abs(values[names.damping]) + np.sqrt(abs(stiffness)), SLOWEST_PACE))
+    fin = np.concatenate([r.fin[r.rate_ok] for r in problem.records])
+    rate = np.concatenate([r.rate[r.rate_ok] for r in problem.records])
+    swing = float(np.std(rate)) if rate.size else 0.0
+    kept_up = abs(values[names.authority]) * float(np.std(fin)) / swing if swing > 0.0 else 0.0
+    return float(max(abs(values[names.damping]) + np.sqrt(abs(stiffness)), kept_up, SLOWEST_PACE))
 
 
 def _new_slots(problem: Problem, effect: Effect) -> list[int]:
