@@ -17,9 +17,11 @@ TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
 RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
-BEYOND_CHANCE, BESIDE_AN_EFFECT = 2e-2, 1e-6
-"""p-values below which what is left is not a disturbance: where nothing was found, and beside an effect whose form
-is never exact."""
+BEYOND_CHANCE = 2e-2
+"""p-value below which what is left is not a disturbance, where nothing was found."""
+BESIDE = ((0.7, 1e-6), (0.5, 1e-3))
+"""Share of the excess error an effect must explain to be named where what is left is less likely than this p-value: a form
+is never exact, but the less it explains the less it may leave."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
 FAINT, STORM = 2.0, 4.0
@@ -27,8 +29,7 @@ FAINT, STORM = 2.0, 4.0
 too; and the error above which no sea is taken for granted."""
 WORSE = 2.0
 """Error on unseen runs over that on fitted ones above which a disturbance, alike on both, is not all that is left."""
-MOSTLY = 0.7
-"""Share of the excess error an effect must explain to be named where something else is left as well."""
+MOSTLY = BESIDE[0][0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +46,13 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     error = search.error(found)
     visible = error > VISIBLE
     if frozenset(found.names) == search.root:
-        p = 3.0 * left.relation if error < FAINT else left.p
-        sea = found.judging.over(shown_floor(search.floor, found.judged.noise))
+        floor = shown_floor(search.floor, found.judged.noise)
+        sea = max(found.judging.over(floor), found.train.over(floor))
+        p = 3.0 * left.relation if max(error, found.train.over(search.floor)) < FAINT else left.p
         odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
-    if visible and left.p < BESIDE_AN_EFFECT and explained(search, found) < MOSTLY:
+    share = explained(search, found)
+    if visible and any(left.p < p and share < enough for enough, p in BESIDE):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
