@@ -20,6 +20,7 @@ import numpy as np
 from fieldsid.diagnosis.trial import Judged
 from fieldsid.fitting.descent import normal_equations
 from fieldsid.fitting.noise import estimate_noise, log_likelihood
+from fieldsid.fitting.predict import values_held
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
@@ -79,17 +80,13 @@ def precision(judged: Judged) -> FloatArray:
 def moves_of(judged: Judged, frozen: Problem, speed: float) -> FloatArray:
     """Return how the shared slots of a run's one-run problem move with the shared ones of the training problem, (F, S)."""
     layout, x = judged.trial.problem.layout, judged.trial.x
-    names = NAMES[layout.axis]
+    damping = NAMES[layout.axis].damping
     out = np.zeros((frozen.layout.shared, layout.shared))
 
     def at(values: dict[str, float]) -> FloatArray:
         law = layout.law(values)
-        scale = law.scale(speed)
-        here = values | {
-            names.damping: values[names.damping] * scale ** (law.damping_exponent - frozen.layout.exponent),
-            names.authority: law.authority(speed, values[names.authority]) / scale**2,
-            names.trim: values[names.trim] * law.trim_factor(speed) / (scale**2 if law.trim_of_fin else 1.0),
-        }
+        here = values_held(law, values, layout.axis, speed)
+        here[damping] *= law.scale(speed) ** (law.damping_exponent - frozen.layout.exponent)
         return np.array([here[n] for n in frozen.layout.names])
 
     values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))

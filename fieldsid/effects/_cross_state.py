@@ -12,6 +12,37 @@ from __future__ import annotations
 
 from fieldsid.models.effect import Coefficient, Core, Form, Values
 
+
+def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
+    """Return the two numbers of a cross state, `cross` its name and builds_up what drives it and where to, in words.
+
+    A state slower than ten seconds cannot be told from a drift in runs of a minute.
+    """
+    return (
+        Coefficient(
+            "cross_damping",
+            "1/s",
+            0.1,
+            10.0,
+            0.8,
+            scan=(0.25, 0.7, 2.0),
+            step=1e-3,
+            pace=1,
+            says=f"damping of the {cross} speed",
+        ),
+        Coefficient(
+            "cross_rate",
+            "1/s^2",
+            -20.0,
+            20.0,
+            0.1,
+            scan=(-0.2, 0.2),
+            pace=2,
+            says=f"Munk moment {builds_up}",
+        ),
+    )
+
+
 OWN_POWER = Coefficient("cross_exponent", "1", -1.0, 3.0, 1.0, step=1e-3, says="power of the speed its damping goes with")
 SQUARE = Coefficient(
     "cross_quadratic", "s", 0.0, 1e5, 3.0, scan=(1.0, 10.0, 100.0), step=1e-3, says="drag with the square of the cross speed"

@@ -8,9 +8,9 @@ Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the pa
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import FORMS, core
+from fieldsid.effects._cross_state import FORMS, coefficients, core
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage
+from fieldsid.models.effect import Effect, Stage
 
 EFFECT = Effect(
     name="heave_coupling",
@@ -18,21 +18,7 @@ EFFECT = Effect(
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.PITCH,),
     equation="q' += x; x' = -cross_damping f x - cross_rate f^2 q, f = (speed/reference)^p, p the damping's exponent",
-    coefficients=(
-        Coefficient(
-            "cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.25, 0.7, 2.0), step=1e-3, pace=1, says="damping of the heave speed"
-        ),
-        Coefficient(
-            "cross_rate",
-            "1/s^2",
-            -20.0,
-            20.0,
-            0.1,
-            scan=(-0.2, 0.2),
-            pace=2,
-            says="Munk moment the pitch rate builds up; minus pitches on",
-        ),
-    ),
+    coefficients=coefficients("heave", "the pitch rate builds up; minus pitches on"),
     telltale="the pitch creeps on or overshoots after a command where a second-order pitch would have settled",
     excited_by=("multisine", "three_two_one_one", "square_pulses", "chirp"),
     mistaken_for=("servo_lag", "delay", "large_angle_righting", "depth_buoyancy", "quadratic_damping"),

@@ -9,9 +9,9 @@ Source: Fossen 2011, section 7.2 (second-order Nomoto: K, T1, T2, T3 are the sam
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import FORMS, core
+from fieldsid.effects._cross_state import FORMS, coefficients, core
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage
+from fieldsid.models.effect import Effect, Stage
 
 EFFECT = Effect(
     name="sway_coupling",
@@ -19,21 +19,7 @@ EFFECT = Effect(
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW,),
     equation="r' += x; x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p, p the damping's exponent",
-    coefficients=(
-        Coefficient(
-            "cross_damping", "1/s", 0.1, 10.0, 0.8, scan=(0.25, 0.7, 2.0), step=1e-3, pace=1, says="damping of the sway speed"
-        ),
-        Coefficient(
-            "cross_rate",
-            "1/s^2",
-            -20.0,
-            20.0,
-            0.1,
-            scan=(-0.2, 0.2),
-            pace=2,
-            says="Munk moment the turn rate builds up; minus turns on",
-        ),
-    ),
+    coefficients=coefficients("sway", "the turn rate builds up; minus turns on"),
     telltale="the rate overshoots or creeps on after a command where a first-order yaw would have settled",
     excited_by=("multisine", "zigzag", "three_two_one_one", "turning_circle", "square_pulses"),
     mistaken_for=("servo_lag", "delay", "quadratic_damping", "crossflow_drag", "roll_coupling"),

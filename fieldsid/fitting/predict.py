@@ -17,12 +17,13 @@ from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import is_white
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.axis import NAMES
+from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import fin_path
 from fieldsid.models.simulate import effects_of
+from fieldsid.models.speed_law import SpeedLaw
 
 OWN_ROUNDS, OWN = 15, 1e-6
 """Rounds for a run's own slots, and the share of the sum of squares a round must gain."""
@@ -73,18 +74,23 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
 
 def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
     """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start."""
-    names = NAMES[model.axis]
     layout = layout_of([record], model.axis, effects)
     of_fin = model.law.trim_of_fin
     groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),), trim_of_fin=of_fin)
     layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared, model.law.damping_exponent)
-    # the frozen layout scales authority by s^2, and a bent fin's trim with it: divide that out of the law's own values
-    scale = model.law.scale(record.speed)
-    here = model.at_speed(record.speed)
-    trim = here[names.trim] / (scale**2 if of_fin else 1.0)
-    values = dict(model.values) | {names.authority: here[names.authority] / scale**2, names.trim: trim}
+    values = values_held(model.law, model.values, model.axis, record.speed)
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
     return Problem((record,), layout), x
+
+
+def values_held(law: SpeedLaw, values: Mapping[str, float], axis: Axis, speed: float) -> dict[str, float]:
+    """Return a model's values as the one-run problem at a speed holds them.
+
+    Its layout scales the authority by s^2, and a bent fin's trim with it: that is divided out of the law's own values.
+    """
+    names, scale = NAMES[axis], law.scale(speed)
+    trim = values[names.trim] * law.trim_factor(speed) / (scale**2 if law.trim_of_fin else 1.0)
+    return dict(values) | {names.authority: law.authority(speed, values[names.authority]) / scale**2, names.trim: trim}
 
 
 def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
