@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
-from fieldsid.diagnosis.trial import Trial, judge
+from fieldsid.diagnosis.trial import judge
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.descent import descend
 from fieldsid.fitting.layout import Layout
@@ -17,6 +17,7 @@ from fieldsid.fitting.starts import carried
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Suggest, in_form
 from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
 
 GLIMPSE, KEPT, ROUNDS, COARSE = 2, 3, 6, 1e-3
 """Rounds every start of a form is followed for, how many go on, for how many more before the best is judged; and the share
@@ -25,14 +26,15 @@ of the cost a round must gain."""
 
 def in_other_forms(h: Hypothesis, floor: Noise, told: Noise, family: str) -> Iterator[Hypothesis]:
     """Yield a hypothesis with every form that one of its effects has besides its own, judged as in the search."""
+    left = residuals_of(h.judged.trial.problem, h.judged.trial.x) if any(e.forms for e in h.effects) else []
     for effect in h.effects:
         for form in effect.forms:
-            problem, start = _begun(h, effect, form)
+            problem, start = _begun(h, effect, form, left)
             judged = judge(problem, start, h.judged.noise, told, family, rival=h.judged.likelihood)
             yield with_free_run(hypothesis_of(judged, h.validation), floor)
 
 
-def _begun(h: Hypothesis, effect: Effect, form: Form) -> tuple[Problem, FloatArray]:
+def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:
     """Return the form's problem and the best of its starts after a few rounds under the hypothesis' noise.
 
     The edges of an actuator are sought again with the form's own numbers: a cost with edges has many ends.
@@ -40,18 +42,21 @@ def _begun(h: Hypothesis, effect: Effect, form: Form) -> tuple[Problem, FloatArr
     trial, noise = h.judged.trial, h.judged.noise
     old = trial.problem.layout
     problem = trial.problem.with_effects([in_form(e, form) if e is effect else e for e in h.effects])
-    again = [{}, *_points(trial, effect.suggest, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
-    points = [(point, edges) for point in _points(trial, form.suggest, form.coefficients) for edges in again]
+    records = trial.problem.records
+    again = [{}, *_points(records, left, effect.suggest, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
+    points = [(point, edges) for point in _points(records, left, form.suggest, form.coefficients) for edges in again]
     starts = [_moved(problem.layout, carried(old, trial.x, problem.layout, point), edges) for point, edges in points]
     found = [descend(problem, x, noise, rounds=GLIMPSE, tolerance=COARSE) for x in starts]
     best = sorted(found, key=lambda d: d.cost)[:KEPT]
     return problem, min((descend(problem, d.x, noise, rounds=ROUNDS, tolerance=COARSE) for d in best), key=lambda d: d.cost).x
 
 
-def _points(trial: Trial, suggest: Suggest | None, coefficients: Sequence[Coefficient]) -> list[dict[str, float]]:
+def _points(
+    records: Sequence[Record], left: Sequence[FloatArray], suggest: Suggest | None, coefficients: Sequence[Coefficient]
+) -> list[dict[str, float]]:
     """Return the start values of shared coefficients: what is suggested by what is left, else the points of their grids."""
     if suggest is not None:
-        return suggest(trial.problem.records, residuals_of(trial.problem, trial.x))
+        return suggest(records, left)
     grids = {c.name: c.scan or (c.start,) for c in coefficients}
     return [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
 

@@ -118,7 +118,10 @@ def unseen_likelihood(judged: Judged, validation: Sequence[Record], flown: Flown
     """Return each validation run's log predictive likelihood."""
     if not validation:
         return np.zeros(0)
-    runs = [Unseen(p, x, left_over(p, x), moves_of(judged, p, r.speed)) for (p, x), r in zip(flown, validation, strict=True)]
+    runs = [
+        Unseen(p, x, left_over(p, x), moves_of(judged, p, r.speed), p.linearise(x, 0))
+        for (p, x), r in zip(flown, validation, strict=True)
+    ]
     return predictive(judged, runs, validation)
 
 

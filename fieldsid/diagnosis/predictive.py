@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.diagnosis.trial import Judged
-from fieldsid.fitting.descent import normal_equations
+from fieldsid.fitting.descent import normal_equations, products
 from fieldsid.fitting.noise import estimate_noise, log_likelihood
 from fieldsid.fitting.predict import values_held
-from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
@@ -35,12 +35,16 @@ ALIKE = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """An unseen run: its one-run problem and x, residual (2, n), and how its shared slots move with the training ones (F, S)."""
+    """An unseen run: its one-run problem and x, residual (2, n), and how its shared slots move with the training ones (F, S).
+
+    `line` is the problem linearised at x in all its slots: no noise enters it.
+    """
 
     problem: Problem
     x: FloatArray
     residual: FloatArray
     moves: FloatArray
+    line: RunResult
 
 
 def predictive(judged: Judged, runs: Sequence[Unseen], records: Sequence[Record]) -> FloatArray:
@@ -100,16 +104,15 @@ def _under(
     noise: Noise, runs: Sequence[Unseen], dynamics: Sequence[tuple[float, float]], known: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return each run's log predictive likelihood under a noise, and its residual where the runs have led the parameters."""
-    vector, values, parts = noise_vector(noise), list[float](), []
+    vector, values, parts = noise_vector(noise), list[float](), list[FloatArray | None]()
     middle: FloatArray = np.zeros(known.shape[0])
     doubt = known
     for run, d in zip(runs, dynamics, strict=True):
         likelihood = log_likelihood(run.problem.records, [d], [run.residual], vector)
-        shared = run.problem.layout.shared
-        _, normal, gradient, results = normal_equations(run.problem, run.x, noise, range(run.x.size))
-        parts.append((normal, results[0]))
-        if np.isfinite(results[0].sensitivity).all():
-            a, b = _without_own(normal, gradient, shared)
+        product = products(run.problem.records[0], noise, *d, run.line)
+        parts.append(product)
+        if product is not None:
+            a, b = _without_own(product[1:, 1:], product[1:, 0], run.problem.layout.shared)
             a, b = run.moves.T @ a @ run.moves, run.moves.T @ b
             pull = doubt @ middle
             moved = np.linalg.solve(doubt + a, pull + b)
@@ -117,15 +120,16 @@ def _under(
             likelihood += gain - 0.5 * (_log_det(doubt + a) - _log_det(doubt))
             middle, doubt = np.asarray(moved), doubt + a
         values.append(likelihood)
-    return np.array(values), [_led(run, n, r.sensitivity, middle) for run, (n, r) in zip(runs, parts, strict=True)]
+    led = [run.residual if p is None else _led(run, p[1:, 1:], middle) for run, p in zip(runs, parts, strict=True)]
+    return np.array(values), led
 
 
-def _led(run: Unseen, normal: FloatArray, sensitivity: FloatArray, middle: FloatArray) -> FloatArray:
+def _led(run: Unseen, normal: FloatArray, middle: FloatArray) -> FloatArray:
     """Return a run's residual (2, n) with the shared slots moved, its own slots following."""
     shared = run.problem.layout.shared
     step = run.moves @ middle
     own = -np.linalg.lstsq(normal[shared:, shared:], normal[shared:, :shared] @ step, rcond=1e-12)[0]
-    return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), sensitivity, axes=1))
+    return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), run.line.sensitivity, axes=1))
 
 
 def _without_own(normal: FloatArray, gradient: FloatArray, shared: int) -> tuple[FloatArray, FloatArray]:

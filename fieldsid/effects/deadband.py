@@ -34,7 +34,7 @@ def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_g
     moves = abs(start[0]) > width
     for i in range(start.shape[0]):
         a, b = start[i], end[i]
-        here, there = abs(a), abs(b)
+        here, there, from_side, to_side = abs(a), abs(b), 1.0 if a > 0.0 else -1.0, 1.0 if b > 0.0 else -1.0
         moves = here > width or (moves and here >= let_go)
         before, after, mean = max(here - lost, 0.0) if moves else 0.0, 0.0, 0.0
         across = a * b < 0.0
@@ -42,19 +42,19 @@ def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_g
         if across:
             zero = here / (here + there)
             stops = zero * _share(here, 0.0, let_go) if moves else 0.0
-            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * (1.0 if a > 0.0 else -1.0)
+            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * from_side
         elif moves and not goes_on:
             stops = _share(here, there, let_go)
-            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * (1.0 if a > 0.0 else -1.0)
+            mean += 0.5 * stops * (before + max(let_go - lost, 0.0)) * from_side
         if goes_on:
             after = there - lost
             if across or not moves:
                 takes_off = zero + (1.0 - zero) * _share(0.0, there, width) if across else _share(here, there, width)
-                mean += 0.5 * (1.0 - takes_off) * (width - lost + after) * (1.0 if b > 0.0 else -1.0)
+                mean += 0.5 * (1.0 - takes_off) * (width - lost + after) * to_side
             else:
-                mean += 0.5 * (before + after) * (1.0 if b > 0.0 else -1.0)
+                mean += 0.5 * (before + after) * to_side
         out[i, 0] = mean
-        out[i, 1] = after * (1.0 if b > 0.0 else -1.0) - before * (1.0 if a > 0.0 else -1.0)
+        out[i, 1] = after * to_side - before * from_side
         moves = goes_on
 
 

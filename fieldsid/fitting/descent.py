@@ -15,6 +15,7 @@ from fieldsid.fitting.stream import streamed, streams
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
 
 TOLERANCE = 1e-8
 ROUNDS = 40
@@ -76,6 +77,16 @@ def cost_of(problem: Problem, x: FloatArray, noise: Noise, dynamics: Dynamics | 
     return total
 
 
+def products(record: Record, noise: Noise, damping: float, stiffness: float, result: RunResult) -> FloatArray | None:
+    """Return the products (1 + P, 1 + P) of a run's whitened residual and sensitivities, None where the motion diverges."""
+    stack = np.concatenate([result.residual[None], result.sensitivity])
+    if not np.isfinite(stack).all():
+        return None
+    white, _ = whiten(record, noise, damping, stiffness, stack)
+    flat = white.reshape(white.shape[0], -1)
+    return np.asarray(flat @ flat.T)
+
+
 def normal_equations(
     problem: Problem, x: FloatArray, noise: Noise, free: Sequence[int], dynamics: Dynamics | None = None
 ) -> tuple[float, FloatArray, FloatArray, list[RunResult]]:
@@ -86,13 +97,10 @@ def normal_equations(
     for run, record in enumerate(problem.records):
         result = problem.linearise(x, run, free)
         results.append(result)
-        stack = np.concatenate([result.residual[None], result.sensitivity])
-        if not np.isfinite(stack).all():
-            return float("inf"), normal, gradient, results
         damping, stiffness = (result.base.damping, result.base.stiffness) if dynamics is None else dynamics[run]
-        white, _ = whiten(record, noise, damping, stiffness, stack)
-        flat = white.reshape(white.shape[0], -1)
-        product = flat @ flat.T
+        product = products(record, noise, damping, stiffness, result)
+        if product is None:
+            return float("inf"), normal, gradient, results
         index = np.array([place[s] for s in result.slots], dtype=int)
         normal[np.ix_(index, index)] += product[1:, 1:]
         gradient[index] += product[1:, 0]

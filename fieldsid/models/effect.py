@@ -12,7 +12,6 @@ steady rate before it had left it; no motion within that rate leaves it further 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -128,9 +127,12 @@ class Core:
         """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none."""
         if self.cross_damping <= 0.0:
             return 0.0
-        push = -self.cross_rate * rate
-        # the root of damping x + quadratic x|x| = push, written so that a small quadratic loses no digits
-        return 2.0 * push / (self.cross_damping + math.sqrt(self.cross_damping**2 + 4.0 * self.cross_quadratic * abs(push)))
+        return float(settled_cross(np.asarray(-self.cross_rate * rate), self.cross_damping, self.cross_quadratic))
+
+
+def settled_cross(push: FloatArray, damping: FloatArray | float, quadratic: FloatArray | float) -> FloatArray:
+    """Return the root x of damping x + quadratic x|x| = push, arrays alike, damping > 0; a small quadratic loses no digits."""
+    return np.asarray(2.0 * push / (damping + np.sqrt(damping**2 + 4.0 * quadratic * np.abs(push))))
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)

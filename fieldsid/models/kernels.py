@@ -144,7 +144,8 @@ def tangents(
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
         fast = drive[i, 4]
-        damp, turn, hold, q = c[7] * fast, c[8] * fast * fast, c[9] / max(fast, SLOWEST), drive[i, 5]
+        floored = max(fast, SLOWEST)
+        damp, turn, hold, q = c[7] * fast, c[8] * fast * fast, c[9] / floored, drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -184,13 +185,11 @@ def tangents(
                     if r >= 0:
                         d0, d1 = d_drive[r, i, 2], d_drive[r, i, 3]
                         e += d0 + (d1 - d0) * part - d_drive[r, i, 0] * ps - d_drive[r, i, 1] * ys
-                        z += d_drive[r, i, 5] - d_drive[r, i, 4] * (
-                            c[7] * xs + 2.0 * fast * c[8] * ps - hold / max(fast, SLOWEST) * square
-                        )
+                        z += d_drive[r, i, 5] - d_drive[r, i, 4] * (c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square)
                     if has_c[j]:
                         e -= d_c[j, 0] * drag + d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
                         e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * (ys - sin) + d_c[j, 6] * (cos - 1.0)
-                        z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / max(fast, SLOWEST) * square
+                        z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * square
                     kt[j, 0], kt[j, 1], kt[j, 2] = dp, e, z
                     acc[j, 0] += wt * dp
                     acc[j, 1] += wt * e

@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
+from fieldsid.models.effect import settled_cross
 from fieldsid.models.simulate import command_record
 from fieldsid.turning.plant import Plant, own_moment
 from fieldsid.turning.surge import Slowing
@@ -124,7 +125,7 @@ def _bisected(
 def _held_back(core: Mapping[str, FloatArray], push: FloatArray) -> FloatArray:
     """Return the settled cross state under a push less what it would be without its quadratic drag, arrays alike."""
     damping, quadratic = core["cross_damping"], core["cross_quadratic"]
-    return np.asarray(2.0 * push / (damping + np.sqrt(damping**2 + 4.0 * quadratic * np.abs(push))) - push / damping)
+    return settled_cross(push, damping, quadratic) - push / damping
 
 
 def _moment_tables(plant: Plant) -> dict[str, FloatArray]:

@@ -41,7 +41,7 @@ def judged():
 def unseen(judged, log):
     model = bare_model(judged.trial.problem, judged.trial.x, NOISE)
     ((problem, x),) = flown_by(model, judged.trial, (log,))
-    return Unseen(problem, x, left_over(problem, x), moves_of(judged, problem, log.speed))
+    return Unseen(problem, x, left_over(problem, x), moves_of(judged, problem, log.speed), problem.linearise(x, 0))
 
 
 @pytest.mark.parametrize("speed", [1.0, 1.3])
