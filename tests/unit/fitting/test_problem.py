@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from short_way import compare_with_the_general_core
 from truth.paper import PITCH, YAW, YawRow, paper_run
 
 from fieldsid.diagnosis.hypothesis import bare_model
@@ -137,14 +138,7 @@ def test_the_short_way_has_the_normal_equations_of_the_general_core():
     ok[100:130] = False
     problem = problem_of([replace(logs[0], rate_ok=ok), logs[1]])
     x = moved_start(problem)
-    free = tuple(range(x.size))
-    short = lean(problem, NOISE, free)
-    assert short is not None
-    cost, normal, gradient = short.linear(x)
-    expected = normal_equations(problem, x, NOISE, free)
-    assert cost == pytest.approx(expected[0], rel=1e-10)
-    np.testing.assert_allclose(normal, expected[1], rtol=1e-9, atol=1e-9 * np.abs(expected[1]).max())
-    np.testing.assert_allclose(gradient, expected[2], rtol=1e-7, atol=1e-9 * np.abs(expected[2]).max())
+    compare_with_the_general_core(problem, x, NOISE, gradient_near=1e-9)
 
 
 @pytest.mark.parametrize("noise", [NOISE, Noise(0.005, 0.005, 0.02, 1.0)], ids=["white", "disturbed"])

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from short_way import compare_with_the_general_core
 from truth.paper import YAW, paper_run
 
 from fieldsid.diagnosis.search import search
-from fieldsid.fitting.descent import normal_equations
 from fieldsid.fitting.fit import fit
 from fieldsid.fitting.layout import layout_of
-from fieldsid.fitting.lean import lean
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.logs.run import Run
@@ -56,14 +55,7 @@ def test_the_short_way_has_the_same_normal_equations():
     problem = Problem(tuple(records), layout_of(records, Axis.YAW, ()))
     x = start_vector(problem.records, problem.layout)
     x[problem.layout.names.index("C0")] = -0.3
-    free, noise = tuple(range(x.size)), Noise(ANGLE, RATE)
-    short = lean(problem, noise, free)
-    assert short is not None
-    cost, normal, gradient = short.linear(x)
-    expected = normal_equations(problem, x, noise, free)
-    assert cost == pytest.approx(expected[0], rel=1e-10)
-    np.testing.assert_allclose(normal, expected[1], rtol=1e-9, atol=1e-9 * np.abs(expected[1]).max())
-    np.testing.assert_allclose(gradient, expected[2], rtol=1e-7, atol=1e-8 * np.abs(expected[2]).max())
+    compare_with_the_general_core(problem, x, Noise(ANGLE, RATE), gradient_near=1e-8)
 
 
 def test_a_joint_fit_finds_one_offset_for_all_speeds_and_keeps_it_in_its_file(tmp_path):
