@@ -1,17 +1,23 @@
 """Drag of the turning hull grows with the square of the rate: p' += -quadratic p |p|, quadratic >= 0 in 1/rad.
 
 The same at every speed, as drag by the hull's own turning has no u in it. Source: Fossen 2011, section 6.4 (N_|r|r).
+In its other form the power is free: -quadratic p |p| (|p| / 0.2 rad/s)^(rate_power - 2), so that `quadratic` keeps its unit.
 """
 
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values
+from fieldsid.models.effect import Coefficient, Core, Effect, Form, Stage, Values
+
+SQUARE = 2.0
+POWER = Coefficient(
+    "rate_power", "1", 1.2, 4.0, SQUARE, scan=(1.6, 2.6), step=1e-3, says="power of the rate it goes with; all alike at 0.2 rad/s"
+)
 
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients; speed has no part in them."""
-    return Core(quadratic=values["quadratic"])
+    return Core(quadratic=values["quadratic"], beyond_square=values.get("rate_power", SQUARE) - SQUARE)
 
 
 EFFECT = Effect(
@@ -25,5 +31,6 @@ EFFECT = Effect(
     excited_by=("zigzag", "turning_circle", "stairs", "multisine"),
     mistaken_for=("stall", "crossflow_drag", "speed_varying", "deadband", "sway_coupling", "heave_coupling"),
     source="Fossen 2011, section 6.4",
+    forms=(Form("its drag goes with another power of the rate than the square", (POWER,)),),
     core=core,
 )

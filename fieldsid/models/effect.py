@@ -2,7 +2,7 @@
 
 Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The core integrates
     angle' = p
-    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| - crossflow F(w, p)
+    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - crossflow F(w, p)
          + heading_sin sin(angle) + heading_cos cos(angle) + righting_sin (angle - sin angle)
          + righting_cos (cos angle - 1) + x
     x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p + cross_fin delta
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, float]
 Suggest = Callable[[Sequence["Record"], Sequence[FloatArray]], list[dict[str, float]]]
+
+
+ORDINARY, STILL = 0.2, 1e-9
+"""rad/s: the rate at which drag of another power equals the quadratic one, and the one below which it is nil."""
 
 
 class Stage(StrEnum):
@@ -117,6 +121,7 @@ class Core:
     cross_rate: float = 0.0
     cross_fin: float = 0.0
     cross_quadratic: float = 0.0
+    beyond_square: float = 0.0
 
     def plus(self, other: Core) -> Core:
         """Return the sum of two sets of coefficients; `length` is taken from whichever sets it."""
@@ -133,6 +138,12 @@ class Core:
 def settled_cross(push: FloatArray, damping: FloatArray | float, quadratic: FloatArray | float) -> FloatArray:
     """Return the root x of damping x + quadratic x|x| = push, arrays alike, damping > 0; a small quadratic loses no digits."""
     return np.asarray(2.0 * push / (damping + np.sqrt(damping**2 + 4.0 * quadratic * np.abs(push))))
+
+
+def power_drag(rate: FloatArray, beyond: FloatArray | float) -> FloatArray:
+    """Return p|p| (|p|/0.2 rad/s)^beyond at rates p, arrays alike, beyond > -1: the plain version of the kernel's."""
+    size = np.abs(rate)
+    return np.asarray(rate * size * np.maximum(size, STILL) ** beyond / ORDINARY**beyond)
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)

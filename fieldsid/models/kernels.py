@@ -1,7 +1,7 @@
 """The compiled core: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
 
     y' = p
-    p' = -a p - k y + m(t) - Q p|p| - X F(w/L, p) + hs sin y + hc cos y + rs (y - sin y) + rc (cos y - 1) + x
+    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) + hs sin y + hc cos y + rs (y - sin y) + rc (cos y - 1) + x
     x' = -e g x - (D/g) x|x| - f g^2 p + q
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
 a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
@@ -14,12 +14,13 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.run import FloatArray
+from fieldsid.models.effect import ORDINARY, STILL
 from fieldsid.models.jit import jit
 
 DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
 CONSTANTS = (
     "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
-    "cross_damping", "cross_rate", "cross_quadratic",
+    "cross_damping", "cross_rate", "cross_quadratic", "beyond_square",
 )  # fmt: skip
 DIVERGED = 1e4
 SLOWEST = 0.01
@@ -38,6 +39,15 @@ def crossflow(alpha: float, p: float) -> tuple[float, float, float]:
     by_alpha = s * (16.0 * alpha - 64.0 / 3.0 * alpha * ratio * ratio)
     by_p = s * (2.0 * p + 32.0 / 3.0 * alpha * ratio * ratio * ratio)
     return value, by_alpha, by_p
+
+
+@jit
+def power_drag(p: float, beyond: float) -> tuple[float, float]:
+    """Return p|p| (|p|/ORDINARY)^beyond and its logarithmic derivative by `beyond`; both are nil at rest."""
+    if abs(p) < STILL:
+        return 0.0, 0.0
+    log = np.log(abs(p) / ORDINARY)
+    return p * abs(p) * np.exp(beyond * log), log
 
 
 @jit
@@ -79,7 +89,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
-        e, f_cross, drag, q = c[7] * drive[i, 4], c[8] * drive[i, 4] ** 2, c[9] / max(drive[i, 4], SLOWEST), drive[i, 5]
+        e, f_cross, hold, q = c[7] * drive[i, 4], c[8] * drive[i, 4] ** 2, c[9] / max(drive[i, 4], SLOWEST), drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -88,14 +98,15 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
                 part = (piece + _reach(stage)) / pieces
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
-                f = -a * ps - k * ys + m - c[0] * ps * abs(ps) + xs
+                drag = ps * abs(ps) if c[10] == 0.0 else power_drag(ps, c[10])[0]
+                f = -a * ps - k * ys + m - c[0] * drag + xs
                 if c[1] != 0.0:
                     w = drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part
                     f -= c[1] * crossflow(w / c[2], ps)[0]
                 if turning:
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
-                ky, kp, kx = ps, f, -(e + drag * abs(xs)) * xs - f_cross * ps + q
+                ky, kp, kx = ps, f, -(e + hold * abs(xs)) * xs - f_cross * ps + q
                 ty += _weight(stage) * ky
                 tp += _weight(stage) * kp
                 tx += _weight(stage) * kx
@@ -125,7 +136,7 @@ def tangents(
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
     d_drive (K, n-1, 8) holds derivatives of the drives; which (P,) is the row of each parameter in it, -1 for
-    none; d_c (P, 10) those of the constants; d_start (P, 3) those of the initial state.
+    none; d_c (P, 11) those of the constants; d_start (P, 3) those of the initial state.
     """
     n = steps.shape[0] + 1
     count = d_c.shape[0]
@@ -133,11 +144,12 @@ def tangents(
     kt = np.zeros((count, 3))
     acc = np.zeros((count, 3))
     has_c = np.zeros(count, dtype=np.bool_)
-    turning, flowing = _any(c, 3, 7), c[1] != 0.0
+    turning, flowing, raised = _any(c, 3, 7), c[1] != 0.0, c[10] != 0.0
     for j in range(count):
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
         has_c[j] = _any(d_c[j], 0, d_c.shape[1])
         turning, flowing = turning or _any(d_c[j], 3, 7), flowing or d_c[j, 1] != 0.0
+        raised = raised or d_c[j, 10] != 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
     for i in range(n - 1):
@@ -158,10 +170,13 @@ def tangents(
                 wt = _weight(stage)
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
-                drag = ps * abs(ps)
+                drag, log = ps * abs(ps), 0.0
+                by_p = -a - 2.0 * c[0] * abs(ps)
+                if raised:
+                    drag, log = power_drag(ps, c[10])
+                    by_p = -a - (2.0 + c[10]) * c[0] * drag / (ps if abs(ps) > STILL else 1.0)
                 f = -a * ps - k * ys + m - c[0] * drag + xs
                 by_y = -k
-                by_p = -a - 2.0 * c[0] * abs(ps)
                 flow, flow_a, flow_p, alpha = 0.0, 0.0, 0.0, 0.0
                 if flowing:
                     alpha = (drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part) / c[2]
@@ -187,7 +202,8 @@ def tangents(
                         e += d0 + (d1 - d0) * part - d_drive[r, i, 0] * ps - d_drive[r, i, 1] * ys
                         z += d_drive[r, i, 5] - d_drive[r, i, 4] * (c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square)
                     if has_c[j]:
-                        e -= d_c[j, 0] * drag + d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
+                        e -= (d_c[j, 0] + c[0] * log * d_c[j, 10]) * drag
+                        e -= d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
                         e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * (ys - sin) + d_c[j, 6] * (cos - 1.0)
                         z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * square
                     kt[j, 0], kt[j, 1], kt[j, 2] = dp, e, z

@@ -23,8 +23,8 @@ from fieldsid.turning.source import Source, draw_values
 
 ComplexArray = npt.NDArray[np.complex128]
 PARTS = (
-    "damping", "stiffness", "authority", "offset", "quadratic", "cross_damping", "cross_rate", "cross_fin",
-    "cross_quadratic", "lag", "delay", "fin_rate",
+    "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "crossflow", "cross_damping",
+    "cross_rate", "cross_fin", "cross_quadratic", "lag", "delay", "fin_rate",
 )  # fmt: skip
 
 
@@ -32,7 +32,7 @@ PARTS = (
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `quadratic` and `cross_quadratic` act in time simulations only.
+    `quadratic`, `beyond_square`, `crossflow` and `cross_quadratic` act in time simulations only.
     `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited.
     """
 
@@ -43,6 +43,8 @@ class LinearPlant:
     authority: FloatArray
     offset: FloatArray
     quadratic: FloatArray
+    beyond_square: FloatArray
+    crossflow: FloatArray
     cross_damping: FloatArray
     cross_rate: FloatArray
     cross_fin: FloatArray
@@ -125,7 +127,7 @@ def _plant_of_points(source: Source, speed: float, limits: FinLimits, draws: int
     actuator = _actuator({}, limits, draws)
     return LinearPlant(
         source.axis, speed, _same_sign(base[names.damping]), stiffness, authority, base[names.trim] / authority,
-        zero, zero + 1.0, zero, zero, zero, *actuator,
+        zero, zero, zero, zero + 1.0, zero, zero, zero, *actuator,
     )  # fmt: skip
 
 
@@ -160,7 +162,9 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
         stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness),
         authority=authority,
         offset=column(names.trim) * model.law.trim_factor(speed) / authority,
-        quadratic=cored("quadratic") + cored("crossflow"),
+        quadratic=cored("quadratic"),
+        beyond_square=cored("beyond_square"),
+        crossflow=cored("crossflow"),
         cross_damping=np.where(coupled > 0, coupled, 1.0),
         cross_rate=cored("cross_rate"),
         cross_fin=cored("cross_fin"),

@@ -62,9 +62,10 @@ def _run(
 ) -> Steps:
     plants = np.stack(
         [
-            plant.damping, plant.stiffness, plant.authority, plant.offset + offset, plant.quadratic, plant.cross_damping,
-            plant.cross_rate, plant.cross_fin, plant.cross_quadratic, np.exp(-STEP_S / np.maximum(plant.lag, FASTEST_LAG_S)),
-            np.round(plant.delay / STEP_S), np.minimum(plant.fin_rate, 1e6) * STEP_S,
+            plant.damping, plant.stiffness, plant.authority, plant.offset + offset, plant.quadratic, plant.beyond_square,
+            plant.crossflow, plant.cross_damping, plant.cross_rate, plant.cross_fin, plant.cross_quadratic,
+            np.exp(-STEP_S / np.maximum(plant.lag, FASTEST_LAG_S)), np.round(plant.delay / STEP_S),
+            np.minimum(plant.fin_rate, 1e6) * STEP_S,
         ],
         axis=1,
     )  # fmt: skip

@@ -1,6 +1,7 @@
 """The identified yaw model as arrays over draws of its parameters, ready for steady turns at any speed.
 
-    0 = -(a(u) + a') r - q r|r| - F(v, r) + b(u) delta + m + M(r) + x,   c(u) x + c_q(u) x|x| = -c_r(u) r + c_d(u) delta
+    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - F(v, r) + b(u) delta + m + M(r) + x
+    c(u) x + c_q(u) x|x| = -c_r(u) r + c_d(u) delta
 with every coefficient at the speed u kept in the turn, by the model's own speed law and its effects' own scaling.
 The actuator's effects are taken as they leave a fin that was told to stay at its limit.
 """
@@ -24,7 +25,7 @@ SETTLE_S = 60.0
 STEP_S = 0.05
 SCALES = np.geomspace(0.2, 5.0, 9)
 EXPONENT = "damping_exponent"
-CROSS = ("cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "quadratic", "crossflow")
+CORE = ("cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "quadratic", "crossflow", "beyond_square")
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +206,7 @@ def _scaled_core(parts: Sequence[Effect], values: Sequence[Mapping[str, float]])
     double = _core(parts, values[0], 2.0)
     cores = [_core(parts, v, 1.0) for v in values]
     out = {}
-    for name in CROSS:
+    for name in CORE:
         at_one, at_two = getattr(cores[0], name), getattr(double, name)
         exponent = float(np.log2(at_two / at_one)) if at_one != 0 and at_two / at_one > 0 else 0.0
         out[name] = Scaled(np.array([getattr(c, name) for c in cores])[:, None], exponent)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import settled_cross
+from fieldsid.models.effect import power_drag, settled_cross
 from fieldsid.models.simulate import command_record
 from fieldsid.turning.plant import Plant, own_moment
 from fieldsid.turning.surge import Slowing
@@ -65,7 +65,8 @@ def balance(
     linear = plant.damping_at(surge) + core["cross_rate"] * inverse
     push = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment + core["cross_fin"] * inverse * fin
     drive = side * push
-    if not moments and not np.any(core["crossflow"]) and not np.any(core["cross_quadratic"]):
+    curved = ("crossflow", "cross_quadratic", "beyond_square")
+    if not moments and not any(np.any(core[name]) for name in curved):
         return side * _quadratic_root(linear, core["quadratic"], drive)
     return side * _bisected(plant, slowing, core, linear, drive, side * fin, side, moments)
 
@@ -107,7 +108,8 @@ def _bisected(
 
     def surplus(rate: FloatArray) -> FloatArray:
         drift = -slowing.drift_per_rate * rate / plant.length
-        left = drive - linear * rate - core["quadratic"] * rate**2 - core["crossflow"] * crossflow(drift, rate)
+        left = drive - linear * rate
+        left = left - core["quadratic"] * power_drag(rate, core["beyond_square"]) - core["crossflow"] * crossflow(drift, rate)
         if np.any(core["cross_quadratic"]):
             left = left + plant.sway_seen * _held_back(core, core["cross_fin"] * fin - core["cross_rate"] * rate)
         if moments:

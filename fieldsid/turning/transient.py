@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.logs.run import FloatArray
+from fieldsid.models.effect import power_drag
 from fieldsid.turning.plant import Plant, fin_after_step
 from fieldsid.turning.steady import crossflow
 from fieldsid.turning.surge import Slowing
@@ -67,7 +68,7 @@ def _slope(state: FloatArray, plant: Plant, slowing: Slowing, entry: FloatArray,
     scale = plant.scale(speed)[0]
     core = {n: c.at(plant.scale(speed))[0] for n, c in plant.core.items()}
     moment = plant.authority_at(speed)[0] * fin + plant.trim_at(speed)[0] + plant.moment[0]
-    moment = moment - plant.damping_at(speed)[0] * rate - core["quadratic"] * rate * np.abs(rate)
+    moment = moment - plant.damping_at(speed)[0] * rate - core["quadratic"] * power_drag(rate, core["beyond_square"])
     moment = moment + scale * state[6]
     drift = (core["cross_fin"] * fin - core["cross_rate"] * rate) / scale
     drift = drift - (core["cross_damping"] + core["cross_quadratic"] * scale * np.abs(state[6])) * state[6]

@@ -128,7 +128,7 @@ def draw_hidden(rng, kind, names, scene):
             apply, events = CAUSES[name](rng, scene.setting)
         else:
             apply, events = catalogue[name](rng, scene.setting), None
-            apply = reshaped(name, apply, scene.setting) if kind == "imperfect" else apply
+            apply = reshaped(name, apply, scene.setting, rng) if kind == "imperfect" else apply
         causes.append([name, apply, events, 0.3])
     return Hidden(causes)
 

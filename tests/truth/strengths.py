@@ -205,16 +205,20 @@ LARGEST = {
 """Largest strength that is still physical; 3 for the others."""
 
 
-def reshaped(name: str, apply: Apply, setting: Setting) -> Apply:
+def reshaped(name: str, apply: Apply, setting: Setting, rng: np.random.Generator) -> Apply:
     """The same effect in a form that is not the textbook's; raises KeyError where there is none."""
 
     def servo(values):
         return {"servo_tau": 0.0, "servo_omega": 1.4 / values["servo_tau"], "servo_zeta": 0.7}
 
+    def powered(values):
+        return {"quadratic_exponent": power, "quadratic": values["quadratic"] * setting.rate ** (2.0 - power)}
+
+    power = float(rng.choice([1.5, 1.7, 2.4, 2.8])) if name == "quadratic_damping" else 2.0
     forms = {
         "stall": lambda _: {"stall_blend": 0.04},
         "servo_lag": servo,
-        "quadratic_damping": lambda v: {"quadratic_exponent": 1.7, "quadratic": v["quadratic"] * setting.rate**0.3},
+        "quadratic_damping": powered,
         "deadband": lambda _: {"deadband_sticks": 1.0},
         "sway_coupling": lambda _: {"cross_quadratic": 1.0},
         "heave_coupling": lambda _: {"cross_quadratic": 1.0},

@@ -16,7 +16,7 @@ from fieldsid.models.simulate import command_record
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
     "deviation_sin2": 0.0, "deviation_cos2": 0.0, "cross_quadratic": 0.0, "cross_fin": 0.0, "cross_exponent": 1.0,
-    "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0, "release": 1.0,
+    "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0, "release": 1.0, "rate_power": 2.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 

@@ -12,7 +12,8 @@ from fieldsid.models.linear_core import accumulate
 from fieldsid.models.signal_path import pieces_for
 
 N, H = 80, 0.05
-C = dict(zip(kernels.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4), strict=True))
+C = dict(zip(kernels.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3), strict=True))
+LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0])
 
 
 def drive(seed=4):
@@ -36,7 +37,8 @@ def oracle(rows, c, start):
             part = t / H
             flow = (w0 + (w1 - w0) * part) / c["length"] + xi * s[1]
             drag = 32.0 * np.mean(flow * np.abs(flow) * xi)
-            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["quadratic"] * s[1] * abs(s[1]) - c["crossflow"] * drag + s[2]
+            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["crossflow"] * drag + s[2]
+            p -= c["quadratic"] * np.sign(s[1]) * 0.2**2 * (abs(s[1]) / 0.2) ** (2.0 + c["beyond_square"])
             p += c["heading_sin"] * np.sin(s[0]) + c["heading_cos"] * np.cos(s[0])
             p += c["righting_sin"] * (s[0] - np.sin(s[0])) + c["righting_cos"] * (np.cos(s[0]) - 1.0)
             held = c["cross_damping"] * g + c["cross_quadratic"] / g * abs(s[2])
@@ -64,7 +66,7 @@ def test_the_compiled_core_gives_the_numbers_of_its_python_source():
 def test_a_motion_without_bound_is_nan_from_there_on():
     rows, out = np.zeros((N - 1, 8)), np.empty((N, 3))
     rows[:, 0], rows[:, 2:4] = -40.0, 1.0
-    kernels.simulate(np.full(N - 1, H), rows, np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0]), np.zeros(3), 8, out)
+    kernels.simulate(np.full(N - 1, H), rows, LINEAR, np.zeros(3), 8, out)
     first = int(np.argmax(np.isnan(out[:, 1])))
     assert 0 < first < N
     assert np.isnan(out[first:]).all()
@@ -82,7 +84,7 @@ def test_the_linear_core_leaves_the_residual_of_the_general_one(a, k):
     accumulate(steps, fin, measured, weight, np.array([a, k, -0.8, 0.01, 0.1, 0.05]), pieces, square)
     rows, out = np.zeros((N - 1, 8)), np.empty((N, 3))
     rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = a, k, -0.8 * fin[0] + 0.01, -0.8 * fin[1] + 0.01
-    kernels.simulate(steps, rows, np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0]), np.array([0.1, 0.05, 0.0]), pieces, out)
+    kernels.simulate(steps, rows, LINEAR, np.array([0.1, 0.05, 0.0]), pieces, out)
     left = measured - out[:, :2].T
     assert square[0, 0] == pytest.approx(float(np.sum((weight * left) ** 2)), rel=1e-10)
     np.testing.assert_allclose(square[7, :2], np.sum(np.where(weight > 0, left, 0.0) ** 2, axis=1), rtol=1e-10)

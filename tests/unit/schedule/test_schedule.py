@@ -47,6 +47,8 @@ def plant(speed=1.5, count=1, **own):
         "authority": -1.6,
         "offset": 0.0,
         "quadratic": 0.0,
+        "beyond_square": 0.0,
+        "crossflow": 0.0,
         "cross_damping": 1.0,
         "cross_rate": 0.0,
         "cross_fin": 0.0,
@@ -124,8 +126,10 @@ def test_margins_of_a_known_loop_are_those_of_the_textbook():
     assert margins(own, gains).gain_db[0] == pytest.approx(20 * np.log10(gain), abs=0.02)
 
 
-def test_step_agrees_with_an_ode_solver():
-    own = plant(lag=0.25, quadratic=0.8, cross_rate=-0.4, cross_damping=0.7, cross_quadratic=3.0, offset=0.01)
+@pytest.mark.parametrize("power", [2.0, 1.6, 3.0])
+def test_step_agrees_with_an_ode_solver(power):
+    drags = {"quadratic": 0.8, "beyond_square": power - 2.0, "crossflow": 0.3}
+    own = plant(lag=0.25, **drags, cross_rate=-0.4, cross_damping=0.7, cross_quadratic=3.0, offset=0.01)
     row = replace(design_schedule_row(), gains=Gains(-0.6, 0.0, -0.2), feed_forward=-0.01, fin_limit=10.0)
     ours = step_response(own, row, reference=0.3, seconds=15.0)
 
@@ -133,7 +137,8 @@ def test_step_agrees_with_an_ode_solver():
         y, p, x, fin = s
         command = -0.6 * (0.3 - y) + 0.2 * p - 0.01
         sway = -(0.7 + 3.0 * abs(x)) * x + 0.4 * p
-        return [p, -1.2 * p - 1.6 * (fin + 0.01) - 0.8 * p * abs(p) + x, sway, (command - fin) / 0.25]
+        drag = 0.3 * p * abs(p) + 0.8 * np.sign(p) * 0.2**2 * (abs(p) / 0.2) ** power
+        return [p, -1.2 * p - 1.6 * (fin + 0.01) - drag + x, sway, (command - fin) / 0.25]
 
     theirs = solve_ivp(slope, (0.0, 15.0), [0.0, 0.0, 0.0, -0.01], t_eval=ours.time, rtol=1e-9, atol=1e-11)
     assert np.max(np.abs(ours.angle[:, 0] - theirs.y[0])) < 2e-3

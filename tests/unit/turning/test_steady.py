@@ -18,6 +18,7 @@ from fieldsid.turning.transient import turn_transient
 EFFECTS = {
     "plain": ((), {}),
     "quadratic": (("quadratic_damping",), {"quadratic": 3.0}),
+    "another power": (("quadratic_damping",), {"quadratic": 3.0, "rate_power": 1.5}),
     "sway": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4}),
     "sway squared": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4, "cross_quadratic": 4.0, "cross_fin": 0.1}),
     "fins": (("servo_lag", "rate_limit", "asymmetric_fin"), {"lag": 0.2, "max_rate": 0.5, "asymmetry": 0.1}),
