@@ -104,11 +104,13 @@ def _moved(gain: FloatArray, last: FloatArray, low: int, high: int) -> float:
 
 
 @jit
-def _settled_until(steps: FloatArray, full: npt.NDArray[np.bool_], first: int, h: float) -> int:
+def _settled_until(
+    steps: FloatArray, angle_ok: npt.NDArray[np.bool_], rate_ok: npt.NDArray[np.bool_], first: int, h: float
+) -> int:
     """Return the first sample from `first` on that is not measured in full or not followed by a step of h."""
     n = steps.shape[0] + 1
     i = first
-    while i < n and full[i] and (i == n - 1 or abs(steps[i] - h) <= 1e-7 * h):
+    while i < n and angle_ok[i] and rate_ok[i] and (i == n - 1 or abs(steps[i] - h) <= 1e-7 * h):
         i += 1
     return i
 
@@ -117,12 +119,11 @@ def _settled_until(steps: FloatArray, full: npt.NDArray[np.bool_], first: int, h
 def _combined(gain: FloatArray, f: FloatArray, low: int, m: FloatArray) -> None:
     """Fill m (3, 5) with one settled step of the three states of `_short_stretch`: by themselves and by both samples."""
     i, j = low, low + 1
-    unit = np.eye(5)
     for c in range(5):
-        y, p, w = unit[c, 0], unit[c, 1], unit[c, 2]
-        e = unit[c, 3] - y
+        y, p, w = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2)
+        e = 1.0 * (c == 3) - y
         y, p, w = y + gain[0, i] * e, p + gain[0, j] * e, w + gain[0, 2] * e
-        e = unit[c, 4] - p
+        e = 1.0 * (c == 4) - p
         y, p, w = y + gain[1, i] * e, p + gain[1, j] * e, w + gain[1, 2] * e
         m[0, c] = f[i, i] * y + f[i, j] * p + f[i, 2] * w
         m[1, c] = f[j, i] * y + f[j, j] * p + f[j, 2] * w
@@ -139,9 +140,9 @@ def _short_stretch(
     The states are (y, p, w) or (n_y, n_p, 0); m (3, 5) is their combined step, push the gain of the rate's by the angle.
     """
     y, p, w = state[low], state[low + 1], state[2]
-    yy, yp, yw, ya, yr = m[0]
-    py, pp, pw, pa, pr = m[1]
-    wy, wp, ww, wa, wr = m[2]
+    yy, yp, yw, ya, yr = m[0, 0], m[0, 1], m[0, 2], m[0, 3], m[0, 4]
+    py, pp, pw, pa, pr = m[1, 0], m[1, 1], m[1, 2], m[1, 3], m[1, 4]
+    wy, wp, ww, wa, wr = m[2, 0], m[2, 1], m[2, 2], m[2, 3], m[2, 4]
     of_angle, of_rate = 1.0 / spread[0], 1.0 / spread[1]
     for i in range(first, stop):
         angle, rate = series[0, i], series[1, i]
@@ -162,9 +163,9 @@ def _stretch(
     gain: FloatArray, f: FloatArray, spread: FloatArray, state: FloatArray,
 ) -> None:  # fmt: skip
     """Filter one series (2, n) over samples first..stop - 1 with gains that stay; state (5,) is left before `stop`."""
-    y, p, w, m, q = state
-    a0, a1, a2, a3, a4 = gain[0]
-    b0, b1, b2, b3, b4 = gain[1]
+    y, p, w, m, q = state[0], state[1], state[2], state[3], state[4]
+    a0, a1, a2, a3, a4 = gain[0, 0], gain[0, 1], gain[0, 2], gain[0, 3], gain[0, 4]
+    b0, b1, b2, b3, b4 = gain[1, 0], gain[1, 1], gain[1, 2], gain[1, 3], gain[1, 4]
     yy, yp, yw, py, pp, pw = f[0, 0], f[0, 1], f[0, 2], f[1, 0], f[1, 1], f[1, 2]
     ww, mm, qq = f[2, 2], f[3, 3], f[4, 4]
     of_angle, of_rate = 1.0 / spread[0], 1.0 / spread[1]
@@ -231,23 +232,26 @@ def filtered(
     """Do what `innovations` does, and fill spreads (2, n) with their standard deviations, one where not measured."""
     n, ok = steps.shape[0] + 1, (angle_ok, rate_ok)
     cov, f, fp = np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 5))
-    gain, last_gain, spread, row = np.zeros((2, 5)), np.zeros((2, 5)), np.ones(2), np.zeros(5)
-    state, full = np.zeros((series.shape[0], 5)), angle_ok & rate_ok
+    gain, last_gain, spread, row = np.zeros((2, 5)), np.zeros((2, 5)), np.empty(2), np.zeros(5)
+    state = np.zeros((series.shape[0], 5))
     cov[2, 2], cov[3, 3], cov[4, 4] = noise[2] ** 2, noise[4] ** 2, noise[5] ** 2
     low, high = _moving(noise)
-    log_sum, last_h, settled, i = 0.0, -1.0, 0, 0
+    log_sum, last_h, settled = 0.0, -1.0, 0
+    i = min(0, n)  # no literal: everything called with one is compiled once more
     while i < n:
         if settled >= SETTLED:
-            stop = _settled_until(steps, full, i, last_h)
+            stop = _settled_until(steps, angle_ok, rate_ok, i, last_h)
             _settled(series, out, i, stop, gain, f, spread, state, low, high)
             for ch in range(2):
-                spreads[ch, i:stop] = spread[ch]
+                for l in range(i, stop):
+                    spreads[ch, l] = spread[ch]
                 log_sum += 2.0 * (stop - i) * np.log(spread[ch])
             i, settled = stop, 0
             continue
         for ch in range(2):
             spreads[ch, i] = 1.0
-            out[:, ch, i] = 0.0
+            for j in range(series.shape[0]):
+                out[j, ch, i] = 0.0
             if ok[ch][i]:
                 spreads[ch, i] = spread[ch] = _correct(cov, ch, noise[ch] ** 2, gain, row, low, high)
                 log_sum += 2.0 * np.log(spread[ch])
@@ -258,7 +262,7 @@ def filtered(
                 settled, last_h = 0, h
                 _set_transition(a, k, h, noise, f)
             _advance(cov, f, fp, noise, low, high)
-            settled = settled + 1 if full[i] and _moved(gain, last_gain, low, high) < 1e-7 else 0
+            settled = settled + 1 if angle_ok[i] and rate_ok[i] and _moved(gain, last_gain, low, high) < 1e-7 else 0
             _carry(f, state)
         i += 1
     return log_sum
@@ -296,7 +300,7 @@ def information(
     score: FloatArray,
     fisher: FloatArray,
 ) -> float:
-    """Return the log likelihood of a residual (2, n); add its score (P,) and Fisher information (P, P).
+    """Return the log likelihood of a residual (1, 2, n); add its score (P,) and Fisher information (P, P).
 
     Both are by the logarithms x of the noise's numbers at `place` (P,), from forward differences of the innovations e
     and the logarithms of their spreads s:
@@ -304,22 +308,30 @@ def information(
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
     count, n = place.shape[0], steps.shape[0] + 1
-    series, e, spreads = residual.reshape(1, 2, n), np.empty((1, 2, n)), np.empty((2, n))
-    log_sum = filtered(steps, angle_ok, rate_ok, a, k, noise, series, e, spreads)
-    wide, raw = np.zeros((count, 2 * n)), np.zeros((count, 2 * n))
+    e, spreads = np.empty((1, 2, n)), np.empty((2, n))
+    log_sum = filtered(steps, angle_ok, rate_ok, a, k, noise, residual, e, spreads)
+    wide, raw = np.empty((count, 2, n)), np.empty((count, 2, n))
     moved_e, moved_spreads, moved = np.empty((1, 2, n)), np.empty((2, n)), noise.copy()
-    known, sizes = e.reshape(2 * n), spreads.reshape(2 * n)
     for c in range(count):
         moved[place[c]] = noise[place[c]] * np.exp(LOG_STEP)
-        filtered(steps, angle_ok, rate_ok, a, k, moved, series, moved_e, moved_spreads)
+        filtered(steps, angle_ok, rate_ok, a, k, moved, residual, moved_e, moved_spreads)
         moved[place[c]] = noise[place[c]]
-        wide[c] = (moved_spreads.reshape(2 * n) / sizes - 1.0) / LOG_STEP
-        slope = (moved_e.reshape(2 * n) - known) / LOG_STEP
-        score[c] -= np.sum(wide[c] + known * slope)
-        raw[c] = slope + known * wide[c]
+        for ch in range(2):
+            for i in range(n):
+                known = e[0, ch, i]
+                wider = (moved_spreads[ch, i] / spreads[ch, i] - 1.0) / LOG_STEP
+                slope = (moved_e[0, ch, i] - known) / LOG_STEP
+                score[c] -= wider + known * slope
+                wide[c, ch, i], raw[c, ch, i] = wider, slope + known * wider
         for d in range(c + 1):
-            value = np.sum(2.0 * wide[c] * wide[d] + raw[c] * raw[d])
+            value = 0.0
+            for ch in range(2):
+                for i in range(n):
+                    value += 2.0 * wide[c, ch, i] * wide[d, ch, i] + raw[c, ch, i] * raw[d, ch, i]
             fisher[c, d] += value
             if d < c:
                 fisher[d, c] += value
-    return float(-0.5 * (log_sum + np.sum(known**2)))
+    for ch in range(2):
+        for i in range(n):
+            log_sum += e[0, ch, i] ** 2
+    return -0.5 * log_sum

@@ -175,7 +175,7 @@ class _Slope:
                 max(k, 0.0),
                 noise,
                 self.place,
-                np.ascontiguousarray(e),
+                np.ascontiguousarray(e[None]),
                 score,
                 fisher,
             )

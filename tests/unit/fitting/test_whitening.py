@@ -95,7 +95,7 @@ def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
 
 def informed(log: Record, noise: np.ndarray, place: np.ndarray, residual: np.ndarray):
     score, fisher = np.zeros(place.size), np.zeros((place.size, place.size))
-    total = information(log.steps, log.angle_ok, log.rate_ok, A, K, noise, place, residual, score, fisher)
+    total = information(log.steps, log.angle_ok, log.rate_ok, A, K, noise, place, residual[None], score, fisher)
     return total, score, fisher
 
 
