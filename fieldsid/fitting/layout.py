@@ -12,7 +12,7 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
-from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.models.speed_law import SENSOR_WIDTH, TRIM_OF_FIN, SpeedLaw
 
 START_NAMES = ("angle0", "rate0", "rate_before")
 """What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
@@ -21,8 +21,6 @@ BEFORE, FASTEST = 1.5, 2.0
 
 GROUP_WIDTH = 0.08
 """Runs whose speeds differ by less than this share form one speed group."""
-SENSOR_WIDTH = 0.01
-"""Speeds nearer than this are the same: a speed sensor tells no more, and twice the share would go into the authority."""
 SNAP_WIDTH = 0.12
 """A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}

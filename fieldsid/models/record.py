@@ -14,10 +14,11 @@ from fieldsid.logs.run import FloatArray, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import FinPath
+from fieldsid.models.smoothing import smoothed
 
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
-SMOOTHING_S = 1.0
-"""Width of the zero-phase mean taken over helper signals, so that their noise does not enter the simulation."""
+FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
+"""What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +26,7 @@ class Record:
     """Samples (n,) of one run on one axis.
 
     `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held`
-    tells which). `angle_ok` and `rate_ok` mark samples that were measured. `signals` holds gap-free helpers by
+    tells which). `angle_ok` and `rate_ok` mark samples that were measured. `signals` holds helpers without gaps and noise by
     role (surge, thrust, roll, depth, cross). `speed` is the median surge in m/s, NaN when not measured.
     """
 
@@ -114,7 +115,9 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         angle = angle.copy()
         angle[angle_ok] = np.unwrap(angle[angle_ok])
     roles = {**ROLES, "cross": names.cross}
-    signals = {role: _helper(run.time, run.signals[c]) for role, c in roles.items() if run.has(c)}
+    signals = {
+        role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0)) for role, c in roles.items() if run.has(c)
+    }
     surge = run.signals.get("surge_m_s")
     speed = float(np.nanmedian(surge)) if surge is not None and np.isfinite(surge).any() else float("nan")
     return Record(
@@ -147,18 +150,3 @@ def _held_fin(values: FloatArray) -> FloatArray:
     index = np.maximum.accumulate(np.where(ok, np.arange(values.size), -1))
     first = int(np.argmax(ok))
     return np.asarray(values[np.where(index < 0, first, index)])
-
-
-def _helper(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Interpolate gaps and take a centred mean over about a second."""
-    ok = np.isfinite(values)
-    full = np.interp(time, time[ok], values[ok])
-    if full.size < 3:
-        return full
-    half = max(0, round(0.5 * SMOOTHING_S / float(np.median(np.diff(time)))))
-    if half == 0 or full.size <= 2 * half + 1:
-        return full
-    total = np.cumsum(np.concatenate([[0.0], full]))
-    index = np.arange(full.size)
-    reach = np.minimum(np.minimum(index, full.size - 1 - index), half)
-    return np.asarray((total[index + reach + 1] - total[index - reach]) / (2 * reach + 1))

@@ -1,0 +1,85 @@
+"""A measured helper signal without its noise: a penalised least-squares smoother that finds its own bandwidth.
+
+    min_z  sum_i w_i (v_i - z_i)^2 + (T/h)^4 sum_i (z_(i-1) - 2 z_i + z_(i+1))^2
+which passes what is slower than T and leaves out what is faster, without phase. T is the one of least generalised
+cross-validation error; the trace of the smoother comes from one random vector of fixed seed.
+Sources: Whittaker 1923, On a new method of graduation; Craven and Wahba 1979; Girard 1989, Numer. Math. 56 (the trace).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import solveh_banded
+
+from fieldsid.logs.run import FloatArray
+
+SLOWEST_S = 10.0
+"""Largest T; what changes more slowly than that over a run is no noise of a sensor."""
+FEWEST = 8
+"""Measured samples below which a signal is left as it is."""
+HELD_S = 1.0
+"""A value repeated for no longer than this was held by the log until the sensor's next one."""
+ENOUGH = 20_000
+"""Samples from whose first part a longer signal's T is found."""
+
+
+def smoothed(time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0) -> FloatArray:
+    """Return a signal (n,) without its noise and its gaps (NaN), at times (n,) s; T is at least `fastest_s` s.
+
+    Values that a log repeats until the sensor's next one count once.
+    """
+    ok = np.isfinite(values)
+    full = np.interp(time, time[ok], values[ok])
+    step = float(np.median(np.diff(time))) if full.size > 1 else 0.0
+    seen = _fresh(full, ok, step)
+    if seen.sum() < FEWEST or not step > 0.0:
+        return full
+    line = np.polynomial.Polynomial.fit(time[seen], full[seen], 1)(time)
+    rest, weight = full - line, seen.astype(np.float64)
+    if not np.any(rest[seen] != 0.0):
+        return full
+    part = slice(0, ENOUGH)
+    stiffness = _best_stiffness(rest[part], weight[part], _stiffnesses(step, fastest_s))
+    return np.asarray(line + _solved(weight, stiffness, (weight * rest)[:, None])[:, 0])
+
+
+def _fresh(values: FloatArray, ok: npt.NDArray[np.bool_], step: float) -> npt.NDArray[np.bool_]:
+    """Return the samples that bring something new: all that were measured, or the first of each where values are held."""
+    first = np.concatenate([[True], values[1:] != values[:-1]])
+    lengths = np.diff(np.append(np.flatnonzero(first), values.size))
+    held = lengths.size > 1 and float(np.mean(lengths)) > 1.5 and float(np.percentile(lengths, 90)) * step <= HELD_S
+    return ok & first if held else ok
+
+
+def _stiffnesses(step: float, fastest_s: float) -> FloatArray:
+    """Return (T/h)^4 for T from next to nothing, or the fastest allowed, to the slowest."""
+    shortest = max(0.3 * step, fastest_s)
+    count = max(1, int(np.ceil(np.log2(SLOWEST_S / shortest) * 1.5)) + 1)
+    return np.asarray((np.geomspace(shortest, max(SLOWEST_S, shortest), count) / step) ** 4)
+
+
+def _best_stiffness(values: FloatArray, weight: FloatArray, stiffnesses: FloatArray) -> float:
+    """Return the stiffness of least generalised cross-validation error."""
+    probe = np.random.default_rng(0).choice([-1.0, 1.0], values.size)
+    sides = np.column_stack([weight * values, weight * probe])
+    count, errors = float(weight.sum()), []
+    for stiffness in stiffnesses:
+        z = _solved(weight, float(stiffness), sides)
+        free = count - float(probe @ (weight * z[:, 1]))
+        errors.append(float(np.sum(weight * (values - z[:, 0]) ** 2)) / max(free, 1e-9 * count) ** 2)
+    return float(stiffnesses[int(np.argmin(errors))])
+
+
+def _solved(weight: FloatArray, stiffness: float, sides: FloatArray) -> FloatArray:
+    """Return the solution (n, m) of (W + stiffness D'D) z = sides, D the second differences."""
+    n = weight.size
+    bands = np.zeros((3, n))
+    bands[0, 2:] = 1.0
+    bands[1, 1:] = -4.0
+    bands[1, [1, -1]] = -2.0
+    bands[2] = 6.0
+    bands[2, [1, -2]], bands[2, [0, -1]] = 5.0, 1.0
+    bands *= stiffness
+    bands[2] += weight
+    return np.asarray(solveh_banded(bands, sides, check_finite=False))
