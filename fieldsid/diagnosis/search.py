@@ -34,6 +34,8 @@ the base, of a hypothesis with effects, and of one that is only tried in another
 TOLD = 0.01
 """Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
 and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
+ALIKE_SPEEDS = 1.1
+"""What the product of both channels' errors must fall by for runs of a group to count as flown at one speed."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST, PAIR = 4, 2
@@ -93,9 +95,10 @@ class Search:
         return self.tried[self.root]
 
     def _by_law(self, trial: Trial) -> float:
-        """Return the product of both channels' errors, more where the trim is not what it is as a rule on the axis."""
-        usual = trial.problem.layout.groups.trim_of_fin == TRIM_OF_FIN[self.axis]
-        return trial.weights.angle * trial.weights.rate * (1.0 if usual else UNUSUAL)
+        """Return the product of both channels' errors, more where trim or speeds are not what they are as a rule."""
+        groups = trial.problem.layout.groups
+        usual = (1.0 if groups.trim_of_fin == TRIM_OF_FIN[self.axis] else UNUSUAL) * (ALIKE_SPEEDS if groups.snapped else 1.0)
+        return trial.weights.angle * trial.weights.rate * usual
 
     def _laws(self) -> tuple[Groups, ...]:
         """Return the ways speed may enter: runs of one group alike or scaled, the trim by one law or another."""

@@ -1,7 +1,6 @@
 """Speed changes within the run: authority goes as f^2, damping and cross state as f, f = (u/u_run)^speed_share.
 
-u is the smoothed surge, u_run the speed at which the run's parameters hold: its median, or that of the runs it counts
-with where they differ by no more than a speed sensor is good for. 1 is lift theory (fin
+u is the smoothed surge, u_run its median over the run, where the run's parameters hold; 1 is lift theory (fin
 force ~ u^2, linear damping ~ u), 0 no dependence. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
 """
 
@@ -27,7 +26,7 @@ def terms(values: Values, record: Record) -> Terms:
             found=f"median surge {record.speed:.3g} m/s",
             hint="leave `speed_varying` out, or check the sign of the surge speed on import",
         )
-    factor = np.maximum(surge / values.get("run_speed", record.speed), SLOWEST) ** values["speed_share"]
+    factor = np.maximum(surge / record.speed, SLOWEST) ** values["speed_share"]
     return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
 
 

@@ -12,7 +12,7 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
-from fieldsid.models.speed_law import SENSOR_WIDTH, TRIM_OF_FIN, SpeedLaw
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 
 START_NAMES = ("angle0", "rate0", "rate_before")
 """What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
@@ -76,7 +76,7 @@ def speed_groups(records: Sequence[Record], *, snapped: bool = False, trim_of_fi
 
 def _run_speeds(own: Sequence[float], means: Sequence[float], of_run: Sequence[int], *, snapped: bool) -> tuple[float, ...]:
     """Return the speed each run counts as flown at."""
-    near = SNAP_WIDTH if snapped else SENSOR_WIDTH
+    near = SNAP_WIDTH if snapped else 0.0
     return tuple(means[g] if abs(np.log(u / means[g])) <= near else u for u, g in zip(own, of_run, strict=True))
 
 
@@ -115,7 +115,7 @@ class Layout:
         """Return the speed law of a vector of shared values."""
         names = NAMES[self.axis]
         g = self.groups
-        reference, snap = g.speeds[g.reference], SNAP_WIDTH if g.snapped else SENSOR_WIDTH
+        reference, snap = g.speeds[g.reference], SNAP_WIDTH if g.snapped else 0.0
         if len(g.speeds) == 1:
             return SpeedLaw(reference, snap=snap, trim_of_fin=g.trim_of_fin)
         points = tuple((u, values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))

@@ -23,7 +23,7 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import fin_path
 from fieldsid.models.simulate import effects_of
-from fieldsid.models.speed_law import SENSOR_WIDTH, SpeedLaw
+from fieldsid.models.speed_law import SpeedLaw
 
 OWN_ROUNDS, OWN = 15, 1e-6
 """Rounds for a run's own slots, and the share of the sum of squares a round must gain."""
@@ -76,8 +76,7 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start."""
     layout = layout_of([record], model.axis, effects)
     of_fin = model.law.trim_of_fin
-    counted, snapped = model.law.effective(record.speed), model.law.snap > SENSOR_WIDTH
-    groups = Groups((model.law.reference,), (0,), 0, (counted,), snapped, of_fin)
+    groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),), trim_of_fin=of_fin)
     layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared, model.law.damping_exponent)
     values = values_held(model.law, model.values, model.axis, record.speed)
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])

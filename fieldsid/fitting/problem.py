@@ -84,8 +84,7 @@ class Problem:
         """Return the effects' coefficients as a run sees them."""
         layout = self.layout
         own = {layout.slots[i].name: float(x[i]) for i in layout.of_run(run)}
-        within = self.records[run].speed if layout.groups.snapped else layout.groups.run_speeds[run]
-        law = {"damping_exponent": layout.exponent, "run_speed": within}
+        law = {"damping_exponent": layout.exponent}
         return law | dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
 
     def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:

@@ -27,7 +27,7 @@ class Record:
 
     `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held`
     tells which). `angle_ok` and `rate_ok` mark samples that were measured. `signals` holds helpers without gaps and noise by
-    role (surge, thrust, roll, depth, cross). `speed` is the median surge in m/s, NaN when not measured.
+    role (surge, thrust, roll, depth, cross). `speed` is the median of that surge in m/s, NaN when not measured.
     """
 
     name: str
@@ -118,8 +118,6 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     signals = {
         role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0)) for role, c in roles.items() if run.has(c)
     }
-    surge = run.signals.get("surge_m_s")
-    speed = float(np.nanmedian(surge)) if surge is not None and np.isfinite(surge).any() else float("nan")
     return Record(
         name=run.name,
         axis=axis,
@@ -132,7 +130,8 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         angle_ok=angle_ok,
         rate_ok=rate_ok,
         signals=MappingProxyType(signals),
-        speed=speed,
+        # of the smoothed speed: where it swings between two levels, noise would throw the median from one to the other
+        speed=float(np.median(signals["surge"])) if "surge" in signals else float("nan"),
     )
 
 

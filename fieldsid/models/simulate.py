@@ -59,7 +59,6 @@ def simulate(
     parts = effects_of(model) if effects is None else effects
     values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
     values["damping_exponent"] = model.law.damping_exponent
-    values["run_speed"] = model.law.within(record.speed)
     if state is None:
         state = (
             float(record.angle[np.argmax(record.angle_ok)]),

@@ -19,10 +19,6 @@ TRIM_OF_FIN = {Axis.YAW: True, Axis.PITCH: False}
 """Whether the trim moment goes with the authority where runs at several speeds do not say otherwise."""
 
 
-SENSOR_WIDTH = 0.01
-"""Speeds nearer than this are the same: a speed sensor tells no more, and twice the share would go into the authority."""
-
-
 def over_reference(authority: float, at_reference: float) -> float:
     """Return an authority over that at the reference speed, one where there is none: what a bent fin's trim goes with."""
     return authority / at_reference if at_reference != 0.0 else 1.0
@@ -50,10 +46,6 @@ class SpeedLaw:
         known = np.array([p[0] for p in self.points] or [self.reference])
         nearest = float(known[np.argmin(np.abs(np.log(known / speed)))])
         return nearest if abs(np.log(nearest / speed)) <= self.snap else speed
-
-    def within(self, speed: float) -> float:
-        """Return the speed that changes within a run refer to: the run's own where it does not follow the law."""
-        return speed if self.snap > SENSOR_WIDTH else self.effective(speed)
 
     def scale(self, speed: float) -> float:
         """Return u/u0, 1 where either speed is not known."""
