@@ -29,7 +29,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class BaseFit:
-    """Damping, stiffness, trim at the reference speed, authority per group, exponent of damping over speed."""
+    """Damping, stiffness, trim at the reference speed, authority per group over the speed squared, exponent of damping over speed."""
 
     damping: float
     stiffness: float
@@ -81,7 +81,7 @@ def _system(samples, groups, x, exponent, weights):
         every = max(1, round(FITTED_S / s.interval))
         for channel, measured in enumerate((s.angle[::every], s.rate[::every])):
             block, part = np.zeros((measured.size, p)), unit[::every, channel]
-            block[:, s.group], block[:, groups] = part[:, 0], part[:, 1] * s.trim_factor
+            block[:, s.group], block[:, groups] = part[:, 0] * s.ratio**2, part[:, 1] * s.trim_factor
             block[:, groups + 1 + 2 * i : groups + 3 + 2 * i] = part[:, 2:]
             rows.append(block / weights[channel])
             targets.append(measured / weights[channel])
@@ -183,7 +183,7 @@ def fit_base(samples, start, weights, *, exponent=0.0):
 def left_over(fit, sample, weights):
     """Residuals (n, 2) of angle and rate on a run with nothing but the start refitted."""
     unit = responses(fit.damping * sample.ratio**fit.exponent, fit.stiffness, sample.fin, sample.interval)
-    model = unit[:, :, 0] * fit.authority[sample.group] + unit[:, :, 1] * fit.trim * sample.trim_factor
+    model = unit[:, :, 0] * fit.authority[sample.group] * sample.ratio**2 + unit[:, :, 1] * fit.trim * sample.trim_factor
     return start_removed(np.stack([sample.angle, sample.rate], axis=1) - model, unit[:, :, 2:], weights)
 
 

@@ -16,6 +16,8 @@ from truth.strengths import Setting
 RUN_S = 60.0
 TRAINING, VALIDATION = 3, 2
 DEG = np.pi / 180.0
+SCATTER = 0.02
+"""Share by which runs of a group miss its speed, in half of the scenes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +85,13 @@ def draw_scene(rng, pitching, wants=()):
     kinds = pick_maneuvers(rng, pitching, wants)
     weather = {"colour": str(rng.choice(["white", "disturbance", "ar1"], p=[0.5, 0.38, 0.12])), "gust": rng.uniform(0.3, 1.5)}
     weather |= {"gust_s": rng.uniform(0.3, 2.0), "swing": rng.uniform(0.1, 0.3) if rng.random() < 0.35 else 0.0}
-    legs = []
+    legs, own = [], rng.spawn(1)[0]
+    spread = SCATTER * float(own.integers(0, 2))
     for kind, group in zip(kinds, groups, strict=True):
         maneuver = draw_maneuver(rng, kind, clock.time, pitching=pitching)
         angle = 0.0 if pitching else rng.uniform(-np.pi, np.pi)
-        legs.append(Leg(speeds[group], int(group), maneuver, angle, 6.0 + rng.uniform(-1, 1), unit_weather(rng, clock, weather)))
+        speed = speeds[group] * (1.0 + own.uniform(-spread, spread))
+        legs.append(Leg(speed, int(group), maneuver, angle, 6.0 + rng.uniform(-1, 1), unit_weather(rng, clock, weather)))
     law = float(rng.choice([0.0, 1.0]))
     notes = {"kinds": kinds, **weather}
     return Scene(pitching, clock, base, setting, law, scatter, tuple(legs), sigma, notes)

@@ -40,5 +40,9 @@ def test_several_groups_have_an_authority_each_and_share_the_exponent():
     assert law.damping_exponent == 0.9
 
 
+def test_runs_of_a_group_keep_speeds_of_their_own_however_near():
+    assert speed_groups(runs(1.0, 1.004)).run_speeds == (1.0, 1.004)
+
+
 def test_snapped_runs_count_as_flown_at_their_groups_speed():
     assert speed_groups(runs(1.0, 1.05), snapped=True).run_speeds == pytest.approx((1.025, 1.025))

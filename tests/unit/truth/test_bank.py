@@ -28,7 +28,7 @@ def test_base_fit_gives_a_clean_base_model_back():
     ]
     fit = fit_base(runs, (1.0, 1.0), (0.005, 0.005), exponent=1.0)
     assert [fit.damping, fit.stiffness, fit.trim] == pytest.approx([0.8, 0.5, 0.02], rel=1e-4)
-    assert fit.authority == pytest.approx([1.1, 2.3], rel=1e-4)
+    assert fit.authority == pytest.approx([1.1, 2.3 / 1.5**2], rel=1e-4)
     check = sample(numbers, zigzag(CLOCK.time), 1.0, 0, pitching=True)
     assert np.abs(left_over(fit, check, (0.005, 0.005))).max() < 1e-5
 

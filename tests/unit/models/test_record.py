@@ -1,0 +1,28 @@
+"""A run becomes a record: its speed, and what of its helper signals is taken."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+
+
+def run_of(surge):
+    time = 0.05 * np.arange(surge.size)
+    zero = np.zeros(surge.size)
+    return Run("a", time, {"yaw_rad": zero, "yaw_rate_rad_s": zero, "rudder_rad": zero, "surge_m_s": surge})
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_speed_of_a_run_between_two_levels_is_that_of_the_speed_without_its_noise(seed):
+    time = 0.05 * np.arange(1200)
+    truth = 1.4 + 0.06 * np.tanh(3.0 * np.sin(2.0 * np.pi * time / 43.0))
+    noisy = truth + 0.03 * np.random.default_rng(seed).standard_normal(time.size)
+    assert record_of(run_of(noisy), Axis.YAW).speed == pytest.approx(float(np.median(truth)), rel=0.006)
+
+
+def test_a_run_without_a_speed_sensor_has_none():
+    assert np.isnan(record_of(run_of(np.full(400, np.nan)), Axis.YAW).speed)
