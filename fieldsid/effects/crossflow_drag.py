@@ -23,7 +23,7 @@ EFFECT = Effect(
     axes=(Axis.YAW, Axis.PITCH),
     equation="p' += -crossflow * 32 * integral of (v/length + x p)|v/length + x p| x dx over x = -1/2 .. 1/2",
     coefficients=(
-        Coefficient("crossflow", "1/rad", 0.0, 50.0, 0.1, scan=(0.1, 1.0, 5.0), says="damping per rad/s of rate without drift"),
+        Coefficient("crossflow", "1/rad", 0.0, 500.0, 0.1, scan=(0.1, 1.0, 5.0), says="damping per rad/s of rate without drift"),
         Coefficient("length", "m", 0.3, 10.0, 2.0, scan=(0.8, 2.0, 5.0), step=1e-3, says="length of hull in the cross flow"),
     ),
     telltale="too much rate is simulated in hard turns, the more so the more the vehicle drifts sideways",

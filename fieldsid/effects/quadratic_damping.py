@@ -26,7 +26,7 @@ EFFECT = Effect(
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW, Axis.PITCH),
     equation="p' += -quadratic * p * |p| (p: the rate)",
-    coefficients=(Coefficient("quadratic", "1/rad", 0.0, 50.0, 0.1, scan=(0.1, 1.0, 5.0), says="damping per rad/s of rate"),),
+    coefficients=(Coefficient("quadratic", "1/rad", 0.0, 500.0, 0.1, scan=(0.1, 1.0, 5.0), says="damping per rad/s of rate"),),
     telltale="the simulated rate is too high in hard turns and too low in gentle ones",
     excited_by=("zigzag", "turning_circle", "stairs", "multisine"),
     mistaken_for=("stall", "crossflow_drag", "speed_varying", "deadband", "sway_coupling", "heave_coupling"),

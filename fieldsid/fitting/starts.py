@@ -142,12 +142,21 @@ def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
     if effect.suggest is not None and (suggested := effect.suggest(ground.problem.records, ground.residuals)):
         return suggested
     pace = pace_of(ground.problem, ground.x)
-    grids = [tuple(dict.fromkeys(np.clip(v * pace**c.pace, c.low, c.high) for v in c.scan)) or (c.start,) for c in effect.shared]
+    scans = [[np.clip(v * pace**c.pace, c.low, c.high) for v in c.scan] or [_begun(c)] for c in effect.shared]
+    grids = [tuple(dict.fromkeys(scan)) for scan in scans]
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MOST_POINTS)
     points = points[::step]
     signed = {c.name for c in effect.shared if c.low < 0.0 < c.high and c.scan}
     return points + [{n: GENTLE * v if n in signed else v for n, v in point.items()} for point in points if signed]
+
+
+def _begun(c: Coefficient) -> float:
+    """Return where the screen takes a coefficient without a grid: of either sign at none of it, where its slope is exact.
+
+    A typical size is a small vehicle's, and on a slow ship as far from the truth as a heading's worth of moment.
+    """
+    return 0.0 if c.low < 0.0 < c.high else c.start
 
 
 def pace_of(problem: Problem, x: FloatArray) -> float:

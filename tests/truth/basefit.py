@@ -29,7 +29,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class BaseFit:
-    """Damping, stiffness, trim at the reference speed, authority per group over the speed squared, exponent of damping over speed."""
+    """Damping, stiffness, trim at the reference speed, a group's authority over speed squared, exponent of damping over speed."""
 
     damping: float
     stiffness: float
