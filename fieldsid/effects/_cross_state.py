@@ -48,7 +48,9 @@ SQUARE = Coefficient(
     "cross_quadratic", "s", 0.0, 1e5, 3.0, scan=(1.0, 10.0, 100.0), step=1e-3, says="drag with the square of the cross speed"
 )
 OF_FIN = Coefficient("cross_fin", "1/s^3", -50.0, 50.0, 0.0, says="what the fin's own lift does to it")
+MUNK_POWER = Coefficient("munk_exponent", "1", -1.0, 6.0, 2.0, step=1e-3, says="power of the speed its moment goes with")
 FORMS = (
+    Form("its moment has a power of the speed of its own", (MUNK_POWER,)),
     Form("it has a power of the speed of its own", (OWN_POWER,)),
     Form("its drag grows with the square of its speed", (SQUARE, OF_FIN)),
     Form("its drag grows with the square of its speed, and it has a power of the speed of its own", (SQUARE, OF_FIN, OWN_POWER)),
@@ -58,9 +60,10 @@ FORMS = (
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients at `scale` times the reference speed; p is the damping's where it has none of its own."""
     lift = scale ** values.get("cross_exponent", values.get("damping_exponent", 1.0))
+    coupling = scale ** values["munk_exponent"] if "munk_exponent" in values else lift**2
     return Core(
         cross_damping=values["cross_damping"] * lift,
-        cross_rate=values["cross_rate"] * lift**2,
+        cross_rate=values["cross_rate"] * coupling,
         cross_fin=values.get("cross_fin", 0.0) * lift**3,
         cross_quadratic=values.get("cross_quadratic", 0.0) / lift,
     )

@@ -1,6 +1,7 @@
 """The fin works better to one side: delta = command (1 + asymmetry) for command > 0, command (1 - asymmetry) below.
 
-A bent stock, a damaged blade or a neighbour's wake does this; the sign says which side is the stronger.
+A bent stock, a damaged blade or a neighbour's wake does this; the sign says which side is the stronger. In its other
+form the two sides part gradually: lift_bend command^2 is added.
 Source: Bertram 2012, Practical Ship Hydrodynamics, chapter 6.
 """
 
@@ -10,19 +11,19 @@ import numpy as np
 
 from fieldsid.effects._paths import through_map
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
 from fieldsid.models.record import Record
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path with the two sides scaled apart, (n-1,) rad."""
-    more = values["asymmetry"]
-    if more == 0.0:
+    more, bend = values["asymmetry"], values.get("lift_bend", 0.0)
+    if more == 0.0 and bend == 0.0:
         return path
     return through_map(
         path,
-        lambda d: d + more * np.abs(d),
-        lambda d: 0.5 * d * d * (1.0 + more * np.sign(d)),
+        lambda d: d + more * np.abs(d) + bend * d * d,
+        lambda d: 0.5 * d * d * (1.0 + more * np.sign(d)) + bend / 3.0 * d**3,
     )
 
 
@@ -39,4 +40,10 @@ EFFECT = Effect(
     source="Bertram 2012, Practical Ship Hydrodynamics, chapter 6",
     order=60,
     fin=fin,
+    forms=(
+        Form(
+            "the two sides part gradually",
+            (Coefficient("lift_bend", "1/rad", -5.0, 5.0, 0.0, says="gain of the one side over the other, per rad of fin"),),
+        ),
+    ),
 )

@@ -1,7 +1,8 @@
 """The sensors' clock is off against the command's: measured(t) = motion(t - offset), offset of either sign in s.
 
 Positive: the sensors are logged late. The motion is straight between samples and held beyond the ends of the run.
-Unlike a delay it shifts whatever moves the hull, not only the fin's part, and it can be negative.
+Unlike a delay it shifts whatever moves the hull, not only the fin's part, and it can be negative. In its other form the
+clock runs fast or slow as well: the offset changes by clock_drift a second, about the middle of the run.
 Source: Ljung 1999, System Identification, chapter 14 (preprocessing of data).
 """
 
@@ -11,23 +12,26 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
 from fieldsid.models.record import Record
+
+
+def _then(values: Values, record: Record) -> FloatArray:
+    """Return the times (n,) s at which the hull was what the samples show."""
+    time = record.time
+    return np.asarray(time - values["offset"] - values.get("clock_drift", 0.0) * (time - 0.5 * (time[0] + time[-1])))
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion `offset` seconds later; angle (n,) rad, rate (n,) rad/s."""
-    offset = values["offset"]
-    if offset == 0.0:
-        return motion
-    then = record.time - offset
+    then = _then(values, record)
     return Motion(np.interp(then, record.time, motion.angle), np.interp(then, record.time, motion.rate))
 
 
 def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as they are logged, `offset` seconds later."""
     time = record.time
-    then = np.clip(time - values["offset"], time[0], time[-1])
+    then = np.clip(_then(values, record), time[0], time[-1])
     before = np.clip(np.searchsorted(time, then, side="right") - 1, 0, time.size - 2)
     share = (then - time[before]) / (time[before + 1] - time[before])
     return np.asarray(moves[:, :, before] * (1.0 - share) + moves[:, :, before + 1] * share)
@@ -50,5 +54,11 @@ EFFECT = Effect(
     source="Ljung 1999, System Identification, chapter 14",
     measure=measure,
     carry=carry,
+    forms=(
+        Form(
+            "the clock runs fast or slow",
+            (Coefficient("clock_drift", "1", -0.05, 0.05, 0.0, step=1e-4, says="what the sensors fall behind in a second"),),
+        ),
+    ),
     handicap=15.0,
 )

@@ -1,7 +1,8 @@
 """Small fin angles do nothing: delta = 0 inside +/-width, command - width sign(command) outside (width >= 0, rad).
 
 Subtractive, so the fin moves off smoothly at the edge. In its other forms the edge is rounded over deadband_blend, or the
-fin jumps at it by the share deadband_jump of the width, and may hold on until |command| < release * width.
+fin jumps at it by the share deadband_jump of the width, and may hold on until |command| < release * width; or the zone
+lies about off_middle * width.
 Source: Tao and Kokotovic 1996, Adaptive Control of Systems
 with Actuator and Sensor Nonlinearities.
 """
@@ -67,6 +68,9 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
         out = np.empty((path.start.size, 2))
         held_on(path.start, path.end, width, (1.0 - kept) * width, values["release"] * width, out)
         return FinPath(out[:, 0] - 0.5 * out[:, 1], out[:, 0] + 0.5 * out[:, 1])
+    if "off_middle" in values:
+        middle = values["off_middle"] * width
+        path = FinPath(path.start - middle, path.end - middle)
     beyond = Beyond(width, values.get("deadband_blend", 0.0))
 
     def value(d: FloatArray) -> FloatArray:
@@ -129,6 +133,21 @@ EFFECT = Effect(
                     scan=(0.2, 0.4, 0.6, 0.8),
                     step=1e-2,
                     says="share of the width inside which the fin goes back",
+                ),
+            ),
+        ),
+        Form(
+            "its middle is off zero",
+            (
+                Coefficient(
+                    "off_middle",
+                    "1",
+                    -1.0,
+                    1.0,
+                    0.0,
+                    scan=(-0.5, 0.5),
+                    step=1e-3,
+                    says="where its middle lies, in half widths",
                 ),
             ),
         ),

@@ -1,19 +1,21 @@
 """Buoyancy and its centre shift with depth: q' += depth_moment z, z in m positive down, depth_moment in 1/(m s^2).
 
-A hull that compresses, foam that soaks and a free surface nearby do this; the trim Cb is then that at zero depth.
+A hull that compresses, foam that soaks and a free surface nearby do this; the trim Cb is then that at zero depth. In its other
+form a part goes with the square of the depth.
 Source: Fossen 2011, section 4.1 (restoring moment), with a buoyancy linear in depth.
 """
 
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
 from fieldsid.models.record import Record
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the moment that goes with depth, (n,) rad/s^2."""
-    return Terms(moment=values["depth_moment"] * record["depth"])
+    depth = record["depth"]
+    return Terms(moment=values["depth_moment"] * depth + values.get("depth_square", 0.0) * depth * depth)
 
 
 EFFECT = Effect(
@@ -29,4 +31,10 @@ EFFECT = Effect(
     source="Fossen 2011, section 4.1",
     needs=("depth",),
     terms=terms,
+    forms=(
+        Form(
+            "a part goes with the square of the depth",
+            (Coefficient("depth_square", "1/(m^2 s^2)", -2.0, 2.0, 0.0, says="pitch moment per square metre of depth"),),
+        ),
+    ),
 )

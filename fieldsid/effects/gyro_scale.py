@@ -1,5 +1,6 @@
 """The rate gyro has a wrong scale: rate_measured = (1 + scale_error) rate; the angle is right.
 
+In its other form the error grows with the rate: rate_measured = (1 + scale_error + scale_cubic rate^2) rate.
 Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, chapter 4.
 """
 
@@ -9,18 +10,20 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
 from fieldsid.models.record import Record
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
-    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"]))
+    bent = values.get("scale_cubic", 0.0) * motion.rate**2
+    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"] + bent))
 
 
 def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as the gyro shows them."""
-    return np.asarray(moves * np.array([[1.0], [1.0 + values["scale_error"]]]))
+    slope = 1.0 + values["scale_error"] + 3.0 * values.get("scale_cubic", 0.0) * motion.rate**2
+    return np.asarray(moves * np.stack([np.ones(slope.size), slope]))
 
 
 EFFECT = Effect(
@@ -36,4 +39,10 @@ EFFECT = Effect(
     source="Groves 2013, chapter 4",
     measure=measure,
     carry=carry,
+    forms=(
+        Form(
+            "the error grows with the rate",
+            (Coefficient("scale_cubic", "s^2/rad^2", -1e4, 1e4, 0.0, says="share of error per square of the rate"),),
+        ),
+    ),
 )

@@ -1,19 +1,43 @@
 """The propeller turns the hull: moment = prop_moment thrust, in rad/s^2 per unit of the logged thrust.
 
 Swirl over the fins and a thrust line beside the centre of gravity both do this; the trim is then that at zero
-thrust. Positive turns toward positive angle. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
+thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust, or builds up
+behind it with a first-order lag, as swirl and inflow do. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.jit import jit
 from fieldsid.models.record import Record
+
+FASTEST_S = 1e-6
+"""A lag below this changes nothing."""
+
+
+@jit
+def behind(steps: FloatArray, values: FloatArray, lag: float, out: FloatArray) -> None:
+    """Fill out (n,) with a signal (n,) seen through a first-order lag in s, straight between samples, from rest on it."""
+    out[0] = values[0]
+    for i in range(steps.shape[0]):
+        h = steps[i]
+        slope = (values[i + 1] - values[i]) / h
+        line = values[i] - slope * lag
+        out[i + 1] = line + slope * h + (out[i] - line) * np.exp(-h / lag)
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the moment of the propeller, (n,) rad/s^2."""
-    return Terms(moment=values["prop_moment"] * record["thrust"])
+    thrust, lag = record["thrust"], float(values.get("build_up", 0.0))
+    if lag > FASTEST_S:
+        late = np.empty(thrust.size)
+        behind(record.steps, thrust, lag, late)
+        thrust = late
+    return Terms(moment=values["prop_moment"] * thrust + values.get("prop_square", 0.0) * thrust * thrust)
 
 
 EFFECT = Effect(
@@ -31,4 +55,18 @@ EFFECT = Effect(
     source="Carlton 2018, Marine Propellers and Propulsion, chapter 6",
     needs=("thrust",),
     terms=terms,
+    forms=(
+        Form(
+            "a part goes with the square of the thrust",
+            (
+                Coefficient(
+                    "prop_square", "rad/s^2 per unit squared", -1e3, 1e3, 0.0, says="moment per square of the logged thrust"
+                ),
+            ),
+        ),
+        Form(
+            "it builds up behind the thrust",
+            (Coefficient("build_up", "s", 0.0, 20.0, 1.0, scan=(0.5, 2.0, 6.0), step=1e-3, says="time it builds up in"),),
+        ),
+    ),
 )

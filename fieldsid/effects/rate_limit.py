@@ -1,7 +1,8 @@
 """The fin turns no faster than its motor: |d delta/dt| <= max_rate (rad/s).
 
 The fin runs toward the command at max_rate until it meets it and then follows it as far as it can; it starts on the
-command. Source: Van Amerongen 1982 (the steering machine).
+command. In its other form it runs to the negative side at falling_share max_rate.
+Source: Van Amerongen 1982 (the steering machine).
 """
 
 from __future__ import annotations
@@ -11,21 +12,21 @@ import numpy as np
 from fieldsid.effects._paths import line_of_two_pieces
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
 from fieldsid.models.jit import jit
 from fieldsid.models.record import Record
 
 
 @jit
-def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, max_rate: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with start and end of the rate-limited path."""
+def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, up: float, down: float, out: FloatArray) -> None:
+    """Fill out (n-1, 2) with start and end of the path of a fin that turns at `up` and `down` rad/s at most."""
     fin = start[0]
     for i in range(start.shape[0]):
         h = steps[i]
         slope = (end[i] - start[i]) / h
         behind = start[i] - fin
-        toward = max_rate if behind > 0.0 else -max_rate
-        closing = max_rate - slope if behind > 0.0 else max_rate + slope
+        toward = up if behind > 0.0 else -down
+        closing = up - slope if behind > 0.0 else down + slope
         meets = h
         if behind == 0.0:
             meets = 0.0
@@ -34,7 +35,7 @@ def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, max_rate
         at_meeting = fin + toward * meets if meets > 0.0 else fin
         if meets < h:
             at_meeting = start[i] + slope * meets
-        after = min(max(slope, -max_rate), max_rate)
+        after = min(max(slope, -down), up)
         last = at_meeting + after * (h - meets)
         out[i, 0], out[i, 1] = line_of_two_pieces(meets / h, fin, at_meeting, last)
         fin = last
@@ -43,9 +44,14 @@ def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, max_rate
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of a fin that turns at `max_rate` at most, (n-1,) rad."""
     out = np.empty((path.start.size, 2))
-    rate_limited(record.steps, path.start, path.end, float(values["max_rate"]), out)
+    rate = float(values["max_rate"])
+    rate_limited(record.steps, path.start, path.end, rate, rate * float(values.get("falling_share", 1.0)), out)
     return FinPath(out[:, 0].copy(), out[:, 1].copy())
 
+
+FALLING = Coefficient(
+    "falling_share", "1", 0.1, 10.0, 1.0, scan=(0.6, 1.6), step=1e-3, says="fastest rate to the negative side over the other"
+)
 
 EFFECT = Effect(
     name="rate_limit",
@@ -64,4 +70,5 @@ EFFECT = Effect(
     source="Van Amerongen 1982, Adaptive Steering of Ships (steering machine)",
     order=20,
     fin=fin,
+    forms=(Form("it turns faster to one side than to the other", (FALLING,)),),
 )

@@ -1,19 +1,25 @@
 """A rolled hull yaws: r' += roll_moment phi, roll angle phi in rad (positive starboard down), roll_moment in 1/s^2.
 
-Rolled, the elevators and the weight beside the buoyancy have a part in the yaw plane.
+Rolled, the elevators and the weight beside the buoyancy have a part in the yaw plane. In its other form the roll rate has
+a part of its own, roll_rate_moment phi'.
 Source: Fossen 2011, section 7.5 (6-DOF underwater vehicle, coupled terms linearised in phi).
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
 from fieldsid.models.record import Record
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the moment of the roll angle, (n,) rad/s^2."""
-    return Terms(moment=values["roll_moment"] * record["roll"])
+    moment = values["roll_moment"] * record["roll"]
+    if "roll_rate_moment" in values:
+        moment = moment + values["roll_rate_moment"] * np.gradient(record["roll"], record.time)
+    return Terms(moment=moment)
 
 
 EFFECT = Effect(
@@ -29,4 +35,10 @@ EFFECT = Effect(
     source="Fossen 2011, section 7.5",
     needs=("roll",),
     terms=terms,
+    forms=(
+        Form(
+            "the roll rate has a part of its own",
+            (Coefficient("roll_rate_moment", "1/s", -20.0, 20.0, 0.0, says="yaw moment per rad/s of roll rate"),),
+        ),
+    ),
 )

@@ -2,7 +2,8 @@
 
 The response to a straight-line command is exact, and so is its mean over the interval; the servo starts at rest on
 the command. In its form of second order the servo has inertia: inertia_share lag^2 d2(delta)/dt2 is added on the left, which
-is damped by 1 / (2 sqrt(inertia_share)). Source: Van Amerongen 1982 (the steering machine, linear part).
+is damped by 1 / (2 sqrt(inertia_share)). In another it follows
+with slackening times the lag while it falls. Source: Van Amerongen 1982 (the steering machine, linear part).
 """
 
 from __future__ import annotations
@@ -20,11 +21,15 @@ FASTEST_S = 1e-6
 
 
 @jit
-def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with start and end of the lagged path: fin = line - lag slope + c exp(-t / lag)."""
+def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float, falling: float, out: FloatArray) -> None:
+    """Fill out (n-1, 2) with start and end of the lagged path: fin = line - lag slope + c exp(-t / lag).
+
+    The lag is that of the side the fin moves to at the start of an interval; a held command lets it turn nowhere else.
+    """
     fin = start[0]
     for i in range(start.shape[0]):
         h = steps[i]
+        lag = rising if start[i] >= fin else falling
         x = h / lag
         slope = (end[i] - start[i]) / h
         c = fin - start[i] + slope * lag
@@ -81,7 +86,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     if "inertia_share" in values:
         swung(record.steps, path.start, path.end, lag, float(values["inertia_share"]) * lag * lag, out)
     else:
-        lagged(record.steps, path.start, path.end, lag, out)
+        lagged(record.steps, path.start, path.end, lag, lag * float(values.get("slackening", 1.0)), out)
     return FinPath(out[:, 0].copy(), out[:, 1].copy())
 
 
@@ -96,6 +101,10 @@ def twin(values: Values, axis: Axis) -> dict[str, float] | None:
         NAMES[axis].authority: values[NAMES[axis].authority] / (lag * damping),
     }
 
+
+SLACKENING = Coefficient(
+    "slackening", "1", 0.1, 10.0, 1.0, scan=(0.6, 1.6), step=1e-3, says="lag to the negative side over that to the other"
+)
 
 EFFECT = Effect(
     name="servo_lag",
@@ -120,5 +129,6 @@ EFFECT = Effect(
                 ),
             ),
         ),
+        Form("it follows faster to one side than to the other", (SLACKENING,)),
     ),
 )

@@ -2,11 +2,13 @@
 
     delta = sign(d) (stall_angle + slope_after (|d| - stall_angle))   for |d| > stall_angle, else d
 slope_after = 1 is no stall, 0 a lift that stays, negative one that drops. In its smooth form the corner is rounded over
-stall_blend to either side. Source: Whicker and Fehlner 1958, DTMB
+stall_blend to either side; or the lift drops by the share stall_drop at the angle. Source: Whicker and Fehlner 1958, DTMB
 report 933 (lift of low-aspect-ratio control surfaces).
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from fieldsid.effects._paths import Beyond, through_map
 from fieldsid.effects._reach import shares_of_reach
@@ -18,11 +20,11 @@ from fieldsid.models.record import Record
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of the effective angle, (n-1,) rad."""
     angle, lost, blend = values["stall_angle"], 1.0 - values["slope_after"], values.get("stall_blend", 0.0)
-    beyond = Beyond(angle, blend)
+    beyond, drop = Beyond(angle, blend), values.get("stall_drop", 0.0) * angle
     return through_map(
         path,
-        lambda d: d - lost * beyond.value(d),
-        lambda d: 0.5 * d * d - lost * beyond.area(d),
+        lambda d: d - lost * beyond.value(d) - drop * np.sign(d) * (np.abs(d) > angle),
+        lambda d: 0.5 * d * d - lost * beyond.area(d) - drop * np.maximum(np.abs(d) - angle, 0.0),
     )
 
 
@@ -58,6 +60,10 @@ EFFECT = Effect(
                     says="angle over which the corner is rounded",
                 ),
             ),
+        ),
+        Form(
+            "the lift drops at the angle",
+            (Coefficient("stall_drop", "1", 0.0, 1.0, 0.2, scan=(0.1, 0.3, 0.6), step=1e-3, says="share of lift lost at once"),),
         ),
     ),
     fin=fin,

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Values = Mapping[str, float]
 Suggest = Callable[[Sequence["Record"], Sequence[FloatArray]], list[dict[str, float]]]
+MomentHook = Callable[["Motion", Values, "Record"], FloatArray]
 
 
 ORDINARY, STILL = 0.2, 1e-9
@@ -69,12 +70,14 @@ class Form:
     """A shape of an effect that is not the textbook's, in a few words, and the coefficients it takes besides.
 
     The effect's hooks take the textbook's shape where the values lack them. suggest gives the start values of the shared
-    ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids.
+    ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids. moment is
+    a hook the effect has in this form only: the core is slower with one.
     """
 
     says: str
     coefficients: tuple[Coefficient, ...]
     suggest: Suggest | None = None
+    moment: MomentHook | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +195,7 @@ class Effect:
     fin: Callable[[FinPath, Values, Record], FinPath] | None = None
     terms: Callable[[Values, Record], Terms] | None = None
     core: Callable[[Values, float], Core] | None = None
-    moment: Callable[[Motion, Values, Record], FloatArray] | None = None
+    moment: MomentHook | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None
     carry: Callable[[FloatArray, Motion, Values, Record], FloatArray] | None = None
     suggest: Suggest | None = None
@@ -227,8 +230,9 @@ class Effect:
 
 
 def in_form(effect: Effect, form: Form) -> Effect:
-    """Return an effect with the coefficients of one of its forms among its own."""
-    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=())
+    """Return an effect with the coefficients of one of its forms among its own, and its hook."""
+    coefficients = (*effect.coefficients, *form.coefficients)
+    return replace(effect, coefficients=coefficients, forms=(), moment=form.moment or effect.moment)
 
 
 def form_of(effect: Effect, known: Collection[str]) -> Form | None:

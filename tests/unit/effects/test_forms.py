@@ -10,36 +10,37 @@ import pytest
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.effects._paths import Beyond
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import CORE_FIELDS, FinPath, Motion, as_fitted, in_form
+from fieldsid.models.effect import FinPath, Motion, as_fitted, in_form
+from fieldsid.models.signal_path import Base, assemble, measured, run_core, with_moments
 from fieldsid.models.simulate import command_record
 
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
     "deviation_sin2": 0.0, "deviation_cos2": 0.0, "cross_quadratic": 0.0, "cross_fin": 0.0, "cross_exponent": 1.0,
     "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0, "release": 1.0, "rate_power": 2.0,
+    "falling_share": 1.0, "slackening": 1.0, "off_middle": 0.0, "lift_bend": 0.0, "prop_square": 0.0, "build_up": 0.0,
+    "roll_rate_moment": 0.0, "scale_cubic": 0.0, "clock_drift": 0.0, "depth_square": 0.0, "current_sin2": 0.0,
+    "current_cos2": 0.0, "current_turn": 0.0, "stall_drop": 0.0, "munk_exponent": 2.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
+GENTLE = {"cross_quadratic": 4.0, "cross_fin": 0.5}
+"""Other numbers of those whose bounds are far wider than any hull's."""
 
 
 def record():
     time = np.arange(0.0, 20.0, 0.05)
     fin = np.interp(time, [0.0, 4.0, 9.0, 15.0, 20.0], [0.0, 0.3, -0.25, 0.1, 0.0])
-    return command_record(Axis.YAW, time, fin, speed=1.4)
+    signals = {"thrust": 2.0 + np.sin(time), "roll": 0.2 * np.sin(1.3 * time), "depth": 3.0 + np.cos(0.4 * time)}
+    return command_record(Axis.YAW, time, fin, speed=1.4, signals=signals)
 
 
 def shown(effect, values, log):
-    """Everything an effect gives, as one array."""
-    if effect.fin is not None:
-        path = effect.fin(log.commanded, values, log)
-        return np.concatenate([path.start, path.end])
-    if effect.measure is not None:
-        motion = effect.measure(Motion(np.linspace(-3.0, 3.0, len(log)), np.ones(len(log))), values, log)
-        return np.concatenate([motion.angle, motion.rate])
-    if effect.core is not None:
-        core = effect.core(values, 1.7)
-        return np.array([getattr(core, name) for name in CORE_FIELDS])
-    terms = effect.terms(values, log)
-    return np.concatenate([part for part in (terms.moment, terms.authority_factor) if part is not None])
+    """What the sensors show of a hull with the effect at 1.7 times its reference speed, (2, n)."""
+    start = np.array([0.1, -0.05, 0.01])
+    arrays = assemble(log, [effect], Base(1.2, 0.3, -1.5, 0.01), values, 1.7)
+    out = run_core(log, with_moments(log, arrays, [effect], values, start), start)
+    motion = measured(Motion(out[:, 0], out[:, 1]), log, [effect], values)
+    return np.stack([motion.angle, motion.rate])
 
 
 FORMS = [(n, i) for n, e in sorted(all_effects().items()) for i in range(len(e.forms))]
@@ -59,10 +60,11 @@ def test_a_form_is_fitted_under_the_effects_own_name(name, which):
 def test_a_form_is_the_textbooks_at_its_neutral_numbers_and_not_elsewhere(name, which):
     effect, log = pick_effect(name), record()
     form = effect.forms[which]
+    shaped = in_form(effect, form)
     values = effect.starts() | {c.name: NEUTRAL[c.name] for c in form.coefficients}
-    np.testing.assert_allclose(shown(effect, values, log), shown(effect, effect.starts(), log), atol=1e-12)
-    other = effect.starts() | {c.name: c.low + 0.4 * (c.high - c.low) for c in form.coefficients}
-    assert np.abs(shown(effect, other, log) - shown(effect, effect.starts(), log)).max() > 1e-4
+    np.testing.assert_allclose(shown(shaped, values, log), shown(effect, effect.starts(), log), atol=1e-6)
+    other = effect.starts() | {c.name: GENTLE.get(c.name, c.low + 0.45 * (c.high - c.low)) for c in form.coefficients}
+    assert np.abs(shown(shaped, other, log) - shown(effect, effect.starts(), log)).max() > 1e-4
 
 
 @pytest.mark.parametrize("blend", [0.0, 0.02, 0.1])
