@@ -103,7 +103,7 @@ def hypothesis_of(judged: Judged, validation: Sequence[Record]) -> Hypothesis:
         judged,
         likelihood_by_run(problem, x, judged.noise),
         unseen_likelihood(judged, validation, flown),
-        _price(judged, validation),
+        price(judged, validation),
         tuple(validation),
         flown,
     )
@@ -173,19 +173,19 @@ def training_errors(trial: Trial) -> Errors:
     return errors_of(problem.records, left)
 
 
-def _price(judged: Judged, validation: Sequence[Record]) -> float:
-    """Return 1/2 k log N: shared coefficients once, nuisances once for every run they are fitted to.
+def price(judged: Judged, validation: Sequence[Record]) -> float:
+    """Return 1/2 k log N: shared coefficients and authorities beyond the first once, nuisances once for every run they fit.
 
     The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
     """
     layout, records = judged.trial.problem.layout, judged.trial.problem.records
     own = sum(len(e.nuisance) for e in layout.effects)
     hidden = sum(1 for e in layout.effects if e.extra_states)
-    count = sum(len(e.shared) for e in layout.effects)
-    price = sum(e.handicap for e in layout.effects) + 0.5 * count * np.log(samples(records))
+    count = sum(len(e.shared) for e in layout.effects) + (0 if layout.groups.by_law else len(layout.groups.speeds) - 1)
+    total = sum(e.handicap for e in layout.effects) + 0.5 * count * np.log(samples(records))
     for record in (*records, *validation):
-        price += 0.5 * own * np.log(max(samples([record]), 2)) + hidden
-    return float(price)
+        total += 0.5 * own * np.log(max(samples([record]), 2)) + hidden
+    return float(total)
 
 
 def errors_of(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:

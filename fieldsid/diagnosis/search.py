@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fieldsid.diagnosis.forms import in_other_forms
-from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
 from fieldsid.diagnosis.worth import ALIKE, WORTH, likelier, pays
@@ -17,7 +17,7 @@ from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import carried, ground_of, overlaid, promise_of, shortened, twin_of
+from fieldsid.fitting.starts import by_other_law, carried, ground_of, overlaid, promise_of, shortened, twin_of
 from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -91,6 +91,7 @@ class Search:
             self.family = judged.family
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
+            self._other_law(self.root)
             self._reshape(self.root)
         return self.tried[self.root]
 
@@ -118,8 +119,8 @@ class Search:
 
     def _keep(self, judged: Judged) -> Hypothesis:
         key = frozenset(judged.trial.names)
-        known = self.tried.get(key)
-        if known is None or judged.likelihood > known.judged.likelihood + 1e-3:
+        known, cost = self.tried.get(key), price(judged, self.validation)
+        if known is None or judged.likelihood - cost > known.judged.likelihood - known.cost + 1e-3:
             self.tried[key] = hypothesis_of(judged, self.validation)
         return self.tried[key]
 
@@ -142,6 +143,7 @@ class Search:
             self._free_runs(key)
             for child in self._children(key)[:FREE_RUNS]:
                 if likelier(self.tried[key], child):
+                    self._other_law(frozenset(child.names))
                     self._reshape(frozenset(child.names))
         return self._children(key)
 
@@ -223,6 +225,20 @@ class Search:
             if child.score > self.tried[key].score:
                 name = frozenset(child.names)
                 self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
+
+    def _other_law(self, key: frozenset[str]) -> None:
+        """Let all speeds share one authority by the law of its square, or each have its own, where that has more evidence.
+
+        Speeds that share one pin it down far better; a group that is off the law shows once what hid it is in the model.
+        """
+        known = self.tried[key]
+        trial, groups = known.judged.trial, known.judged.trial.problem.layout.groups
+        if len(groups.speeds) == 1 or (groups.by_law and not self.asks_for_more(known)):
+            return
+        problem, x = by_other_law(trial.problem, trial.x)
+        other = hypothesis_of(judge(problem, x, known.judged.noise, self.told, self.family), self.validation)
+        if other.score > known.score:
+            self.tried[key] = with_free_run(other, self.floor)
 
     def _reshape(self, key: frozenset[str]) -> None:
         """Put a hypothesis's effects into other forms than the textbook's, the best one first, as long as that pays."""

@@ -42,7 +42,8 @@ class Slot:
 class Groups:
     """Speed groups: mean speed of each, group and speed of each run; `reference` is the group the law refers to.
 
-    `snapped` runs count as being at their group's speed; trim_of_fin: the trim moment goes with the authority.
+    `snapped` runs count as being at their group's speed; trim_of_fin: the trim moment goes with the authority; by_law: all
+    groups share one authority that goes with the square of the speed, else each has its own.
     """
 
     speeds: tuple[float, ...]
@@ -51,6 +52,15 @@ class Groups:
     run_speeds: tuple[float, ...]
     snapped: bool = False
     trim_of_fin: bool = False
+    by_law: bool = False
+
+    def over_group(self, run: int) -> float:
+        """Return a run's speed over the one its authority slot belongs to."""
+        return self.run_speeds[run] / self.speeds[self.reference if self.by_law else self.of_run[run]]
+
+    def over_reference(self, group: int) -> float:
+        """Return a group's speed over the reference's."""
+        return self.speeds[group] / self.speeds[self.reference]
 
 
 def speed_groups(records: Sequence[Record], *, snapped: bool = False, trim_of_fin: bool | None = None) -> Groups:
@@ -118,13 +128,14 @@ class Layout:
         reference, snap = g.speeds[g.reference], SNAP_WIDTH if g.snapped else 0.0
         if len(g.speeds) == 1:
             return SpeedLaw(reference, snap=snap, trim_of_fin=g.trim_of_fin)
-        points = tuple((u, values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
+        lifts = [g.over_reference(i) ** 2 if g.by_law else 1.0 for i in range(len(g.speeds))]
+        points = tuple((u, lifts[i] * values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
         return SpeedLaw(reference, values["damping_exponent"], 2.0, points, snap, g.trim_of_fin)
 
 
 def group_name(authority: str, groups: Groups, index: int) -> str:
-    """Return the name of a group's authority; the reference group's is the plain name."""
-    return authority if index == groups.reference else f"{authority}@{groups.speeds[index]:.3g}"
+    """Return the name of a group's authority; the reference group's, or the one all share, is the plain name."""
+    return authority if groups.by_law or index == groups.reference else f"{authority}@{groups.speeds[index]:.3g}"
 
 
 def layout_of(records: Sequence[Record], axis: Axis, effects: Sequence[Effect], groups: Groups | None = None) -> Layout:
@@ -133,9 +144,8 @@ def layout_of(records: Sequence[Record], axis: Axis, effects: Sequence[Effect], 
     slots = [Slot(names.damping, "1/s", *BASE_BOUNDS["damping"], 1.0)]
     if names.stiffness is not None:
         slots.append(Slot(names.stiffness, "1/s^2", *BASE_BOUNDS["stiffness"], 0.1))
-    slots += [
-        Slot(group_name(names.authority, groups, i), "1/s^2", *BASE_BOUNDS["authority"], 0.0) for i in range(len(groups.speeds))
-    ]
+    authorities = dict.fromkeys(group_name(names.authority, groups, i) for i in range(len(groups.speeds)))
+    slots += [Slot(name, "1/s^2", *BASE_BOUNDS["authority"], 0.0) for name in authorities]
     slots.append(Slot(names.trim, "rad/s^2", *BASE_BOUNDS["trim"], 0.0))
     if len(groups.speeds) > 1:
         slots.append(Slot("damping_exponent", "1", -1.0, 3.0, 1.0))

@@ -73,12 +73,12 @@ class Problem:
         )
 
     def scales(self, run: int) -> tuple[float, float]:
-        """Return speed over reference speed, and speed over the speed of the run's own group."""
+        """Return speed over reference speed, and speed over the one that the run's authority slot belongs to."""
         g = self.layout.groups
         speed = g.run_speeds[run]
         if not np.isfinite(speed) or not np.isfinite(g.speeds[g.reference]):
             return 1.0, 1.0
-        return speed / g.speeds[g.reference], speed / g.speeds[g.of_run[run]]
+        return speed / g.speeds[g.reference], g.over_group(run)
 
     def values_of(self, x: FloatArray, run: int) -> dict[str, float]:
         """Return the effects' coefficients as a run sees them."""

@@ -26,7 +26,7 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
     names, groups = NAMES[layout.axis], layout.groups
     columns = [s.name for s in layout.slots[: layout.shared]]
     base = [names.damping, *([] if names.stiffness is None else [names.stiffness])]
-    base += [group_name(names.authority, groups, i) for i in range(len(groups.speeds))] + [names.trim]
+    base += [*dict.fromkeys(group_name(names.authority, groups, i) for i in range(len(groups.speeds))), names.trim]
     rows, targets = [], []
     for run, record in enumerate(records):
         block, target = _windows(record, stiff=names.stiffness is not None)
@@ -35,7 +35,8 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
         full[:, 0] = block[:, 0] * share
         if names.stiffness is not None:
             full[:, 1] = block[:, 1]
-        full[:, base.index(group_name(names.authority, groups, groups.of_run[run]))] = block[:, 2]
+        lift = share**2 if groups.by_law else 1.0
+        full[:, base.index(group_name(names.authority, groups, groups.of_run[run]))] = block[:, 2] * lift
         full[:, -1] = block[:, 3] * (share**2 if groups.trim_of_fin else 1.0)
         rows.append(full)
         targets.append(target)

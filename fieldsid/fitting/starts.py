@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.fitting.descent import cost_of
-from fieldsid.fitting.layout import Layout
+from fieldsid.fitting.layout import Layout, group_name, layout_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
@@ -73,6 +73,17 @@ def carried(old: Layout, x: FloatArray, new: Layout, values: Mapping[str, float]
     """Return x of one layout in another's order; slots the first lacks take the given values, else their own start."""
     known = {(s.name, s.run): v for s, v in zip(old.slots, x, strict=True)}
     return np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in new.slots])
+
+
+def by_other_law(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a problem at several speeds with one authority for all by the law, or one for each group, and x carried over."""
+    old = problem.layout
+    groups = replace(old.groups, by_law=not old.groups.by_law)
+    new = layout_of(problem.records, old.axis, old.effects, groups)
+    authority = NAMES[old.axis].authority
+    shared = float(x[old.names.index(authority)])
+    lifted = {group_name(authority, groups, g): shared * groups.over_reference(g) ** 2 for g in range(len(groups.speeds))}
+    return Problem(problem.records, new), carried(old, x, new, lifted)
 
 
 def overlaid(old: Layout, x: FloatArray, new: Layout, own: FloatArray) -> FloatArray:
