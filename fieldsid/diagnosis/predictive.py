@@ -90,7 +90,7 @@ def moves_of(judged: Judged, frozen: Problem, speed: float) -> FloatArray:
     def at(values: dict[str, float]) -> FloatArray:
         law = layout.law(values)
         here = values_held(law, values, layout.axis, speed)
-        here[damping] *= law.scale(speed) ** (law.damping_exponent - frozen.layout.exponent)
+        here[damping] *= law.scale(speed) ** (law.damping_exponent - frozen.layout.groups.exponent)
         return np.array([here[n] for n in frozen.layout.names])
 
     values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))

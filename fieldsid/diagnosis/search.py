@@ -40,9 +40,8 @@ LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST, PAIR = 4, 2
 """Effects a hypothesis has at most, and those whose parts were all tried on the way to it."""
-CLEAN = 1.02
-TWINS = 1.0
-"""Log likelihood within which two starts of one hypothesis are alike."""
+CLEAN, TWINS = 1.02, 1.0
+"""Error over the floor up to which nothing is left, and log likelihood within which two starts of one hypothesis are alike."""
 
 
 @dataclass(slots=True)
@@ -227,17 +226,18 @@ class Search:
                 self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
 
     def _other_law(self, key: frozenset[str]) -> None:
-        """Let all speeds share one authority by the law of its square, or each have its own, where that has more evidence.
+        """Put a hypothesis under the other law of the speed, see `by_other_law`, where that has more evidence.
 
-        Speeds that share one pin it down far better; a group that is off the law shows once what hid it is in the model.
+        Speeds that share an authority pin it down far better; a group that is off the law shows once what hid it is found.
         """
         known = self.tried[key]
-        trial, groups = known.judged.trial, known.judged.trial.problem.layout.groups
-        if len(groups.speeds) == 1 or (groups.by_law and not self.asks_for_more(known)):
+        trial = known.judged.trial
+        groups, one_speed = trial.problem.layout.groups, len(trial.problem.layout.groups.speeds) == 1
+        if (one_speed or groups.by_law) and not (self.asks_for_more(known) and np.ptp(groups.run_speeds) > 0.0):
             return
         problem, x = by_other_law(trial.problem, trial.x)
         other = hypothesis_of(judge(problem, x, known.judged.noise, self.told, self.family), self.validation)
-        if other.score > known.score:
+        if other.score > known.score + (WORTH if one_speed else 0.0):
             self.tried[key] = with_free_run(other, self.floor)
 
     def _reshape(self, key: frozenset[str]) -> None:

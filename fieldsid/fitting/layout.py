@@ -43,7 +43,8 @@ class Groups:
     """Speed groups: mean speed of each, group and speed of each run; `reference` is the group the law refers to.
 
     `snapped` runs count as being at their group's speed; trim_of_fin: the trim moment goes with the authority; by_law: all
-    groups share one authority that goes with the square of the speed, else each has its own.
+    groups share one authority that goes with the square of the speed, else each has its own; exponent: the damping's power of
+    the speed where it is not one of the slots.
     """
 
     speeds: tuple[float, ...]
@@ -53,6 +54,7 @@ class Groups:
     snapped: bool = False
     trim_of_fin: bool = False
     by_law: bool = False
+    exponent: float = 1.0
 
     def over_group(self, run: int) -> float:
         """Return a run's speed over the one its authority slot belongs to."""
@@ -99,8 +101,6 @@ class Layout:
     groups: Groups
     slots: tuple[Slot, ...]
     shared: int
-    exponent: float = 1.0
-    """Exponent of the damping's speed law where it is not one of the slots."""
 
     @property
     def names(self) -> list[str]:
@@ -127,7 +127,7 @@ class Layout:
         g = self.groups
         reference, snap = g.speeds[g.reference], SNAP_WIDTH if g.snapped else 0.0
         if len(g.speeds) == 1:
-            return SpeedLaw(reference, snap=snap, trim_of_fin=g.trim_of_fin)
+            return SpeedLaw(reference, g.exponent, snap=snap, trim_of_fin=g.trim_of_fin)
         lifts = [g.over_reference(i) ** 2 if g.by_law else 1.0 for i in range(len(g.speeds))]
         points = tuple((u, lifts[i] * values[group_name(names.authority, g, i)]) for i, u in enumerate(g.speeds))
         return SpeedLaw(reference, values["damping_exponent"], 2.0, points, snap, g.trim_of_fin)

@@ -76,8 +76,9 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     """Return a problem of one record whose shared slots hold the model's values at the record's speed, and its start."""
     layout = layout_of([record], model.axis, effects)
     of_fin = model.law.trim_of_fin
-    groups = Groups((model.law.reference,), (0,), 0, (model.law.effective(record.speed),), trim_of_fin=of_fin)
-    layout = Layout(layout.axis, layout.effects, groups, layout.slots, layout.shared, model.law.damping_exponent)
+    exponent, speed = model.law.damping_exponent, model.law.effective(record.speed)
+    groups = Groups((model.law.reference,), (0,), 0, (speed,), trim_of_fin=of_fin, exponent=exponent)
+    layout = replace(layout, groups=groups)
     values = values_held(model.law, model.values, model.axis, record.speed)
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.slots)])
     return Problem((record,), layout), x

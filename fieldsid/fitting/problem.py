@@ -65,7 +65,7 @@ class Problem:
         share, ratio = self.scales(run)
         authority = v[self.authority_of(run)] * ratio**2
         return Base(
-            v[names.damping] * share ** v.get("damping_exponent", layout.exponent),
+            v[names.damping] * share ** v.get("damping_exponent", layout.groups.exponent),
             0.0 if names.stiffness is None else v[names.stiffness],
             authority,
             v[names.trim] * (over_reference(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
@@ -84,7 +84,7 @@ class Problem:
         """Return the effects' coefficients as a run sees them."""
         layout = self.layout
         own = {layout.slots[i].name: float(x[i]) for i in layout.of_run(run)}
-        law = {"damping_exponent": layout.exponent}
+        law = {"damping_exponent": layout.groups.exponent}
         return law | dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
 
     def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:

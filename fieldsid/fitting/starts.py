@@ -76,9 +76,15 @@ def carried(old: Layout, x: FloatArray, new: Layout, values: Mapping[str, float]
 
 
 def by_other_law(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
-    """Return a problem at several speeds with one authority for all by the law, or one for each group, and x carried over."""
+    """Return a problem under the other law of the speed, and x carried over.
+
+    At several speeds the groups share one authority, or have one each. At one, of which the runs are a little off, the
+    damping goes with it or stays.
+    """
     old = problem.layout
-    groups = replace(old.groups, by_law=not old.groups.by_law)
+    several = len(old.groups.speeds) > 1
+    other = {"by_law": not old.groups.by_law} if several else {"exponent": 1.0 - old.groups.exponent}
+    groups = replace(old.groups, **other)
     new = layout_of(problem.records, old.axis, old.effects, groups)
     authority = NAMES[old.axis].authority
     shared = float(x[old.names.index(authority)])
