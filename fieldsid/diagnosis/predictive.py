@@ -29,6 +29,8 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 STEP = 1e-4
+SINGULAR = 1e-10
+"""What is added to the precision of every combination of parameters, in units of their own."""
 ALIKE = 4.0
 """Sum of squares over the noise floor within which residuals ask for the same noise."""
 
@@ -106,21 +108,24 @@ def _under(
     """Return each run's log predictive likelihood under a noise, and its residual where the runs have led the parameters."""
     vector, values, parts = noise_vector(noise), list[float](), list[FloatArray | None]()
     middle: FloatArray = np.zeros(known.shape[0])
-    doubt = known
+    # in units of each parameter's own doubt: their sizes differ by ten powers of ten, and some move as one
+    unit = 1.0 / np.sqrt(np.diag(known))
+    doubt = known * np.outer(unit, unit) + SINGULAR * np.eye(unit.size)
     for run, d in zip(runs, dynamics, strict=True):
         likelihood = log_likelihood(run.problem.records, [d], [run.residual], vector)
         product = products(run.problem.records[0], noise, *d, run.line)
         parts.append(product)
         if product is not None:
             a, b = _without_own(product[1:, 1:], product[1:, 0], run.problem.layout.shared)
-            a, b = run.moves.T @ a @ run.moves, run.moves.T @ b
+            moves = run.moves * unit
+            a, b = moves.T @ a @ moves, moves.T @ b
             pull = doubt @ middle
             moved = np.linalg.solve(doubt + a, pull + b)
             gain = 0.5 * float((pull + b) @ moved - middle @ pull)
             likelihood += gain - 0.5 * (_log_det(doubt + a) - _log_det(doubt))
             middle, doubt = np.asarray(moved), doubt + a
         values.append(likelihood)
-    led = [run.residual if p is None else _led(run, p[1:, 1:], middle) for run, p in zip(runs, parts, strict=True)]
+    led = [run.residual if p is None else _led(run, p[1:, 1:], unit * middle) for run, p in zip(runs, parts, strict=True)]
     return np.array(values), led
 
 
