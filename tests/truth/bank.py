@@ -109,7 +109,8 @@ def draw_names(rng, kind, pitching):
     if kind == "single":
         return (str(rng.choice(catalogue)),)
     if kind == "imperfect":
-        own = ["heave_coupling"] if pitching else ["sway_coupling", "compass_deviation"]
+        yaw = ["sway_coupling", "compass_deviation", "roll_coupling", "current"]
+        own = ["heave_coupling", "depth_buoyancy"] if pitching else yaw
         return (str(rng.choice([*RESHAPED, *own])),)
     if kind == "uncatalogued":
         return (str(rng.choice(sorted(CAUSES))),)

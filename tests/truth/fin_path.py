@@ -31,8 +31,9 @@ def lagged(memory, target, step, physics):
             memory[2] += small * (w * w * (target - memory[1]) - 2.0 * z * w * memory[2])
             memory[1] += small * memory[2]
     elif physics.servo_tau > 0.0:
-        memory[1] = target + (before - target) * math.exp(-step / physics.servo_tau)
-        return target + (before - target) * physics.servo_tau / step * (1.0 - math.exp(-step / physics.servo_tau))
+        tau = physics.servo_tau * (physics.falling_tau if target < before else 1.0)
+        memory[1] = target + (before - target) * math.exp(-step / tau)
+        return target + (before - target) * tau / step * (1.0 - math.exp(-step / tau))
     else:
         memory[1] = target
         return target
@@ -45,6 +46,7 @@ def dead_zone(memory, d, physics):
     w = physics.deadband_width
     if w <= 0.0:
         return d
+    d -= physics.deadband_middle
     if physics.deadband_sticks > 0.0:
         if abs(d) > w:
             memory[4] = 1.0
@@ -57,7 +59,7 @@ def dead_zone(memory, d, physics):
 @nb.njit(cache=True)
 def lift(d, physics):
     """Asymmetric effect, then the lift's fall beyond the stall angle, sharp or blended over `stall_blend`."""
-    d *= 1.0 + physics.asymmetry if d > 0.0 else 1.0 - physics.asymmetry
+    d = d * (1.0 + physics.asymmetry if d > 0.0 else 1.0 - physics.asymmetry) + physics.lift_bend * d * d
     if physics.stall_angle <= 0.0:
         return d
     over = abs(d) - physics.stall_angle
@@ -68,7 +70,7 @@ def lift(d, physics):
         return math.copysign(1.0, d) * (abs(d) - (1.0 - physics.stall_slope) * (soft - rest))
     if over <= 0.0:
         return d
-    return math.copysign(1.0, d) * (physics.stall_angle + physics.stall_slope * over)
+    return math.copysign(1.0, d) * (physics.stall_angle * (1.0 - physics.stall_drop) + physics.stall_slope * over)
 
 
 @nb.njit(cache=True)
@@ -78,7 +80,7 @@ def fin_step(memory, target, step, physics):
     `memory` (5,) moves on: angle after the rate limit, after the lag, its speed, after the play, dead zone engaged.
     """
     if physics.max_rate > 0.0:
-        reach = physics.max_rate * step
+        reach = physics.max_rate * step * (physics.falling_rate if target < memory[0] else 1.0)
         moved = min(max(target - memory[0], -reach), reach)
         target = memory[0] + 0.5 * moved if abs(moved) >= reach else target
         memory[0] += moved

@@ -32,7 +32,9 @@ def crossflow(s, p):
 @nb.njit(cache=True)
 def moments(y, q, t, event, thrust):
     """Sum of the moments that are neither damping, stiffness nor fin, in rad/s^2."""
-    m = event + q.thrust_moment * thrust + q.roll_moment * y[ROLL] + q.depth_moment * (y[DEPTH] - q.depth_reference)
+    deep = y[DEPTH] - q.depth_reference
+    m = event + q.thrust_moment * thrust + q.roll_moment * y[ROLL] + q.depth_moment * deep
+    m += q.thrust_square * (thrust - q.nominal_thrust) ** 2 + q.roll_rate_moment * y[ROLL_RATE] + q.depth_square * deep**2
     m += q.speed_moment * (y[SURGE] ** 2 - q.speed_reference**2) - q.cross_moment * y[CROSS]
     if q.drift != 0.0:
         m += q.drift * t if q.drift_tau <= 0.0 else q.drift * q.drift_tau * (1.0 - math.exp(-max(t, 0.0) / q.drift_tau))
@@ -40,7 +42,8 @@ def moments(y, q, t, event, thrust):
         a = 2.0 * math.pi * t / q.wave_period + q.wave_phase
         m += q.wave_amplitude * (math.sin(a) + q.wave_second * math.sin(1.31 * a))
     if q.current_sin != 0.0 or q.current_cos != 0.0:
-        m += q.current_sin * math.sin(y[ANGLE]) + q.current_cos * math.cos(y[ANGLE])
+        seen = y[ANGLE] - q.current_turn * (t - 30.0)
+        m += q.current_sin * math.sin(seen) + q.current_cos * math.cos(seen) + q.current_twice * math.sin(2.0 * seen)
     if q.quadratic != 0.0:
         m -= q.quadratic * math.copysign(abs(y[RATE]) ** q.quadratic_exponent, y[RATE])
     if q.crossflow != 0.0:

@@ -21,16 +21,21 @@ class Physics(NamedTuple):
     # actuator, in the order of the path
     delay: float = 0.0
     max_rate: float = 0.0
+    falling_rate: float = 1.0
     servo_tau: float = 0.0
+    falling_tau: float = 1.0
     servo_omega: float = 0.0
     servo_zeta: float = 0.7
     backlash_gap: float = 0.0
     deadband_width: float = 0.0
     deadband_sticks: float = 0.0
+    deadband_middle: float = 0.0
     asymmetry: float = 0.0
+    lift_bend: float = 0.0
     stall_angle: float = 0.0
     stall_slope: float = 1.0
     stall_blend: float = 0.0
+    stall_drop: float = 0.0
     # hydrodynamics
     quadratic: float = 0.0
     quadratic_exponent: float = 2.0
@@ -45,6 +50,7 @@ class Physics(NamedTuple):
     step_moment: float = 0.0
     step_ramp: float = 0.0
     thrust_moment: float = 0.0
+    thrust_square: float = 0.0
     wave_amplitude: float = 0.0
     wave_period: float = 5.0
     wave_phase: float = 0.0
@@ -55,10 +61,14 @@ class Physics(NamedTuple):
     cross_quadratic: float = 0.0
     cross_moment: float = 0.0
     roll_moment: float = 0.0
+    roll_rate_moment: float = 0.0
     current_sin: float = 0.0
     current_cos: float = 0.0
+    current_twice: float = 0.0
+    current_turn: float = 0.0
     righting: float = 0.0
     depth_moment: float = 0.0
+    depth_square: float = 0.0
     depth_reference: float = 0.0
     speed_moment: float = 0.0
     speed_reference: float = 1.5
@@ -68,7 +78,9 @@ class Physics(NamedTuple):
     compass_second: float = 0.0
     gyro_bias: float = 0.0
     gyro_scale: float = 0.0
+    gyro_cubic: float = 0.0
     clock_offset: float = 0.0
+    clock_drift: float = 0.0
     # in no catalogue
     memory_moment: float = 0.0
     memory_tau: float = 5.0

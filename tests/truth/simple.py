@@ -72,7 +72,7 @@ def _run(physics, clock, start, plan, mode, inputs, known, pitching, step):
         physics, start, plan, mode, inputs, known, clock.sample, steps, -clock.pre * clock.sample, pitching
     )
     fine_time = np.arange(fine.shape[0]) * (clock.sample / steps) - clock.pre * clock.sample
-    at = clock.time + physics.clock_offset
+    at = clock.time + physics.clock_offset + physics.clock_drift * (clock.time - 0.5 * clock.time[-1])
     angle, rate = np.interp(at, fine_time, fine[:, 0]), np.interp(at, fine_time, fine[:, 1])
     bent = physics.compass_sin * np.sin(angle) + physics.compass_cos * np.cos(angle) + physics.compass_second * np.sin(2 * angle)
     part = {name: clock.logged(states[:, i]) for name, i in _STATES.items()}
@@ -81,7 +81,7 @@ def _run(physics, clock, start, plan, mode, inputs, known, pitching, step):
         command=clock.logged(command),
         fin=clock.logged(fine[::steps, 2]),
         angle=angle + bent,
-        rate=rate * (1.0 + physics.gyro_scale) + physics.gyro_bias,
+        rate=rate * (1.0 + physics.gyro_scale + physics.gyro_cubic * rate**2) + physics.gyro_bias,
         whole_command=command,
         known=states[:, [kernel.ROLL, kernel.DEPTH, kernel.SURGE]].T.copy(),
         **part,

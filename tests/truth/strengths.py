@@ -214,12 +214,25 @@ def reshaped(name: str, apply: Apply, setting: Setting, rng: np.random.Generator
     def powered(values):
         return {"quadratic_exponent": power, "quadratic": values["quadratic"] * setting.rate ** (2.0 - power)}
 
+    def current(values):
+        size = np.hypot(values["current_sin"], values["current_cos"])
+        return {"current_turn": 0.02} if second else {"current_twice": 0.5 * size}
+
     power = float(rng.choice([1.5, 1.7, 2.4, 2.8])) if name == "quadratic_damping" else 2.0
+    second = bool(rng.random() < 0.5)
     forms = {
-        "stall": lambda _: {"stall_blend": 0.04},
-        "servo_lag": servo,
+        "stall": lambda _: {"stall_drop": 0.2} if second else {"stall_blend": 0.04},
+        "servo_lag": lambda v: {"falling_tau": 0.5} if second else servo(v),
+        "rate_limit": lambda _: {"falling_rate": 1.8},
+        "asymmetric_fin": lambda v: {"asymmetry": 0.3 * v["asymmetry"], "lift_bend": 3.0 * v["asymmetry"]},
+        "prop_moment": lambda v: {"thrust_square": 2.0 * v["thrust_moment"] / setting.thrust},
+        "roll_coupling": lambda v: {"roll_rate_moment": 0.8 * v["roll_moment"]},
+        "depth_buoyancy": lambda v: {"depth_square": 0.4 * v["depth_moment"]},
+        "gyro_scale": lambda v: {"gyro_cubic": 0.8 * v["gyro_scale"] / setting.rate**2},
+        "clock_offset": lambda v: {"clock_drift": 0.01 * v["clock_offset"]},
+        "current": current,
         "quadratic_damping": powered,
-        "deadband": lambda _: {"deadband_sticks": 1.0},
+        "deadband": lambda v: {"deadband_middle": 0.5 * v["deadband_width"]} if second else {"deadband_sticks": 1.0},
         "sway_coupling": lambda _: {"cross_quadratic": 1.0},
         "heave_coupling": lambda _: {"cross_quadratic": 1.0},
         "trim_drift": lambda v: {"drift_tau": 30.0, "drift": 1.5 * v["drift"]},
@@ -236,4 +249,7 @@ def reshaped(name: str, apply: Apply, setting: Setting, rng: np.random.Generator
     return bent
 
 
-RESHAPED = ("stall", "servo_lag", "quadratic_damping", "deadband", "trim_drift", "step_change", "wave")
+RESHAPED = (
+    "stall", "servo_lag", "quadratic_damping", "deadband", "trim_drift", "step_change", "wave", "rate_limit", "asymmetric_fin",
+    "prop_moment", "gyro_scale", "clock_offset",
+)  # fmt: skip
