@@ -7,10 +7,10 @@ from itertools import product
 
 import numpy as np
 
-from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import judge
 from fieldsid.fitting.colour import residuals_of
-from fieldsid.fitting.descent import descend
+from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.layout import Layout
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried
@@ -19,19 +19,19 @@ from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Suggest, in
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
-GLIMPSE, KEPT, ROUNDS, COARSE = 2, 3, 6, 1e-3
-"""Rounds every start of a form is followed for, how many go on, for how many more before the best is judged; and the share
-of the cost a round must gain."""
+LIKELY, GLIMPSE, KEPT, ROUNDS, COARSE = 6, 2, 3, 6, 1e-3
+"""Starts of a form that are followed, for how many rounds, how many of them go on, for how many more before the best is
+judged; and the share of the cost a round must gain."""
 
 
-def in_other_forms(h: Hypothesis, floor: Noise, told: Noise, family: str) -> Iterator[Hypothesis]:
+def in_other_forms(h: Hypothesis, told: Noise, family: str) -> Iterator[Hypothesis]:
     """Yield a hypothesis with every form that one of its effects has besides its own, judged as in the search."""
     left = residuals_of(h.judged.trial.problem, h.judged.trial.x) if any(e.forms for e in h.effects) else []
     for effect in h.effects:
         for form in effect.forms:
             problem, start = _begun(h, effect, form, left)
             judged = judge(problem, start, h.judged.noise, told, family, rival=h.judged.likelihood)
-            yield with_free_run(hypothesis_of(judged, h.validation), floor)
+            yield hypothesis_of(judged, h.validation)
 
 
 def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:
@@ -46,7 +46,8 @@ def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]
     again = [{}, *_points(records, left, effect.suggest, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
     points = [(point, edges) for point in _points(records, left, form.suggest, form.coefficients) for edges in again]
     starts = [_moved(problem.layout, carried(old, trial.x, problem.layout, point), edges) for point, edges in points]
-    found = [descend(problem, x, noise, rounds=GLIMPSE, tolerance=COARSE) for x in starts]
+    likely = sorted(starts, key=lambda x: cost_of(problem, x, noise))[:LIKELY]
+    found = [descend(problem, x, noise, rounds=GLIMPSE, tolerance=COARSE) for x in likely]
     best = sorted(found, key=lambda d: d.cost)[:KEPT]
     return problem, min((descend(problem, d.x, noise, rounds=ROUNDS, tolerance=COARSE) for d in best), key=lambda d: d.cost).x
 

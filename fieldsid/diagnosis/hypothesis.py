@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fieldsid.diagnosis.predictive import Unseen, moves_of, predictive
+from fieldsid.diagnosis.predictive import Unseen, moves_of, predictive, speed_doubt
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
 from fieldsid.fitting.descent import cost_of
@@ -119,7 +119,7 @@ def unseen_likelihood(judged: Judged, validation: Sequence[Record], flown: Flown
     if not validation:
         return np.zeros(0)
     runs = [
-        Unseen(p, x, left_over(p, x), moves_of(judged, p, r.speed), p.linearise(x, 0))
+        Unseen(p, x, left_over(p, x), moves_of(judged, p, r.speed), speed_doubt(p, x, r.speed), p.linearise(x, 0))
         for (p, x), r in zip(flown, validation, strict=True)
     ]
     return predictive(judged, runs, validation)

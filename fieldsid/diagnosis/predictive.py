@@ -7,6 +7,8 @@ of an unseen run, both whitened, |e - S d|^2 = e'e - 2 b'd + d'A d, and to first
     log p(run) = -e'e/2 + (Lambda m + b)' (Lambda + A)^-1 (Lambda m + b) / 2 - m' Lambda m / 2 - log det(I + Lambda^-1 A) / 2
 
 after which Lambda <- Lambda + A and m is where the two together lead. A run's own slots are projected out of A and b.
+A run's own speed is measured only so well: its error e ~ N(0, 1) along c in the shared slots is averaged over first,
+    A <- A - A c c'A / (1 + s),  b <- b - A c t / (1 + s),  log p <- log p + t^2 / (2 + 2 s) - log(1 + s) / 2,  s = c'A c, t = c'b
 Source: MacKay 1992, Neural Computation 4(3), Bayesian interpolation; Kass and Raftery 1995, section 4.
 """
 
@@ -31,6 +33,8 @@ from fieldsid.models.record import Record
 STEP = 1e-4
 SINGULAR = 1e-10
 """What is added to the precision of every combination of parameters, in units of their own."""
+MEASURED, GUESSED = 0.003, 0.01
+"""Share by which the speed of a run is off, where it was measured and where it was not: twice that goes into the authority."""
 ALIKE = 4.0
 """Sum of squares over the noise floor within which residuals ask for the same noise."""
 
@@ -39,13 +43,15 @@ ALIKE = 4.0
 class Unseen:
     """An unseen run: its one-run problem and x, residual (2, n), and how its shared slots move with the training ones (F, S).
 
-    `line` is the problem linearised at x in all its slots: no noise enters it.
+    `speed` (F,) is what they move by with the error of the run's own speed. `line` is the problem linearised at x in all
+    its slots: no noise enters it.
     """
 
     problem: Problem
     x: FloatArray
     residual: FloatArray
     moves: FloatArray
+    speed: FloatArray
     line: RunResult
 
 
@@ -102,10 +108,18 @@ def moves_of(judged: Judged, frozen: Problem, speed: float) -> FloatArray:
     return out
 
 
+def speed_doubt(frozen: Problem, x: FloatArray, speed: float) -> FloatArray:
+    """Return what a one-run problem's shared slots (F,) move by where the run's speed is off by as much as it may be."""
+    layout, names = frozen.layout, NAMES[frozen.layout.axis]
+    share = MEASURED if np.isfinite(speed) else GUESSED
+    powers = {names.damping: layout.groups.exponent, names.authority: 2.0, names.trim: 2.0 * layout.groups.trim_of_fin}
+    return np.array([share * powers.get(n, 0.0) * x[i] for i, n in enumerate(layout.names)])
+
+
 def _under(
     noise: Noise, runs: Sequence[Unseen], dynamics: Sequence[tuple[float, float]], known: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Return each run's log predictive likelihood under a noise, and its residual where the runs have led the parameters."""
+    """Return each run's log predictive likelihood under a noise, and its residual where all that is in doubt is led."""
     vector, values, parts = noise_vector(noise), list[float](), list[FloatArray | None]()
     middle: FloatArray = np.zeros(known.shape[0])
     # in units of each parameter's own doubt: their sizes differ by ten powers of ten, and some move as one
@@ -117,6 +131,8 @@ def _under(
         parts.append(product)
         if product is not None:
             a, b = _without_own(product[1:, 1:], product[1:, 0], run.problem.layout.shared)
+            a, b, averaged = _without_speed(a, b, run.speed)
+            likelihood += averaged
             moves = run.moves * unit
             a, b = moves.T @ a @ moves, moves.T @ b
             pull = doubt @ middle
@@ -125,14 +141,16 @@ def _under(
             likelihood += gain - 0.5 * (_log_det(doubt + a) - _log_det(doubt))
             middle, doubt = np.asarray(moved), doubt + a
         values.append(likelihood)
-    led = [run.residual if p is None else _led(run, p[1:, 1:], unit * middle) for run, p in zip(runs, parts, strict=True)]
+    led = [run.residual if p is None else _led(run, p, unit * middle) for run, p in zip(runs, parts, strict=True)]
     return np.array(values), led
 
 
-def _led(run: Unseen, normal: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return a run's residual (2, n) with the shared slots moved, its own slots following."""
-    shared = run.problem.layout.shared
+def _led(run: Unseen, product: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return a run's residual (2, n) with the shared slots moved, the run's speed and its own slots following."""
+    shared, normal = run.problem.layout.shared, product[1:, 1:]
     step = run.moves @ middle
+    a, b = _without_own(normal, product[1:, 0], shared)
+    step = step + run.speed * float(run.speed @ (b - a @ step)) / (1.0 + float(run.speed @ a @ run.speed))
     own = -np.linalg.lstsq(normal[shared:, shared:], normal[shared:, :shared] @ step, rcond=1e-12)[0]
     return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), run.line.sensitivity, axes=1))
 
@@ -143,6 +161,14 @@ def _without_own(normal: FloatArray, gradient: FloatArray, shared: int) -> tuple
     inverse = np.linalg.pinv(normal[shared:, shared:], rcond=1e-12, hermitian=True)
     a = normal[:shared, :shared] - cross.T @ inverse @ cross
     return 0.5 * (a + a.T), gradient[:shared] - cross.T @ inverse @ gradient[shared:]
+
+
+def _without_speed(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return normal matrix and gradient with the error of a run's speed averaged over, and what that adds to its likelihood."""
+    along, t = a @ c, float(c @ b)
+    room = 1.0 + float(c @ along)
+    gain = 0.5 * (t * t / room - np.log(room))
+    return a - np.outer(along, along) / room, b - along * t / room, gain
 
 
 def _log_det(matrix: FloatArray) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldsid.diagnosis.forms import in_other_forms
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
+from fieldsid.diagnosis.laws import error_by_law, speed_laws, under_other_law
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
 from fieldsid.diagnosis.worth import ALIKE, WORTH, likelier, pays
@@ -17,8 +18,8 @@ from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import by_other_law, carried, ground_of, overlaid, promise_of, shortened, twin_of
-from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
+from fieldsid.fitting.starts import carried, ground_of, overlaid, promise_of, shortened, twin_of
+from fieldsid.fitting.trim_law import possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -34,8 +35,6 @@ the base, of a hypothesis with effects, and of one that is only tried in another
 TOLD = 0.01
 """Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
 and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
-ALIKE_SPEEDS = 1.1
-"""What the product of both channels' errors must fall by for runs of a group to count as flown at one speed."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST, PAIR = 4, 2
@@ -83,7 +82,8 @@ class Search:
         """Return the hypothesis of the known effects alone."""
         if self.root not in self.tried:
             self.report("base model")
-            trial = min((self._base_trial(groups) for groups in self._laws()), key=self._by_law)
+            laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
+            trial = min((self._base_trial(groups) for groups in laws), key=lambda t: error_by_law(t, self.axis))
             families = (self.family,) if self.family else NOISES
             self.told = _at_least(self.floor, TOLD, trial.weights)
             judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
@@ -93,19 +93,6 @@ class Search:
             self._other_law(self.root)
             self._reshape(self.root)
         return self.tried[self.root]
-
-    def _by_law(self, trial: Trial) -> float:
-        """Return the product of both channels' errors, more where trim or speeds are not what they are as a rule."""
-        groups = trial.problem.layout.groups
-        usual = (1.0 if groups.trim_of_fin == TRIM_OF_FIN[self.axis] else UNUSUAL) * (ALIKE_SPEEDS if groups.snapped else 1.0)
-        return trial.weights.angle * trial.weights.rate * usual
-
-    def _laws(self) -> tuple[Groups, ...]:
-        """Return the ways speed may enter: runs of one group alike or scaled, the trim by one law or another."""
-        groups = speed_groups(self.records)
-        snapped = (False, True) if len(groups.speeds) < len(self.records) else (False,)
-        trims = possible_trims(groups) if self.trim_of_fin is None else (self.trim_of_fin,)
-        return tuple(speed_groups(self.records, snapped=s, trim_of_fin=t) for t in trims for s in snapped)
 
     def _base_trial(self, groups: Groups) -> Trial:
         layout = layout_of(self.records, self.axis, (), groups)
@@ -140,16 +127,27 @@ class Search:
                     self._go(parent, way)
             self._back_from_child(key)
             self._free_runs(key)
-            for child in self._children(key)[:FREE_RUNS]:
-                if likelier(self.tried[key], child):
-                    self._other_law(frozenset(child.names))
-                    self._reshape(frozenset(child.names))
+            for name in self._leading(key)[: None if key == self.root else 1]:
+                if self._fits(self.tried[key], self.tried[name]):
+                    self._other_law(name)
+                if likelier(self.tried[key], self.tried[name]):
+                    self._reshape(name)
         return self._children(key)
 
     def _children(self, key: frozenset[str]) -> list[Hypothesis]:
         """Return the hypotheses of one effect more that were tried, best first."""
         children = [h for k, h in self.tried.items() if len(k) == len(key) + 1 and key < k]
         return sorted(children, key=lambda h: -h.score)
+
+    def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
+        """Return the best children, and the one that fits the training runs best: a wrong law of speed may hide it elsewhere."""
+        children = self._children(key)
+        best = sorted(children, key=lambda h: h.cost - h.by_run.sum())[:1]
+        return list(dict.fromkeys(frozenset(h.names) for h in (*children[:FREE_RUNS], *best)))
+
+    def _fits(self, parent: Hypothesis, child: Hypothesis) -> bool:
+        """Whether a child has evidence on the training runs alone."""
+        return bool(child.by_run.sum() - child.cost > parent.by_run.sum() - parent.cost + WORTH)
 
     def _flown_before(self, parent: Hypothesis) -> None:
         """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""
@@ -226,26 +224,20 @@ class Search:
                 self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
 
     def _other_law(self, key: frozenset[str]) -> None:
-        """Put a hypothesis under the other law of the speed, see `by_other_law`, where that has more evidence.
-
-        Speeds that share an authority pin it down far better; a group that is off the law shows once what hid it is found.
-        """
+        """Put a hypothesis under the other law of the speed where that has more evidence."""
         known = self.tried[key]
-        trial = known.judged.trial
-        groups, one_speed = trial.problem.layout.groups, len(trial.problem.layout.groups.speeds) == 1
-        if (one_speed or groups.by_law) and not (self.asks_for_more(known) and np.ptp(groups.run_speeds) > 0.0):
-            return
-        problem, x = by_other_law(trial.problem, trial.x)
-        other = hypothesis_of(judge(problem, x, known.judged.noise, self.told, self.family), self.validation)
-        if other.score > known.score + (WORTH if one_speed else 0.0):
+        other = under_other_law(known, self.told, self.family, asks_for_more=self.asks_for_more(known))
+        if other is not None:
             self.tried[key] = with_free_run(other, self.floor)
 
     def _reshape(self, key: frozenset[str]) -> None:
         """Put a hypothesis's effects into other forms than the textbook's, the best one first, as long as that pays."""
         while self.asks_for_more(self.tried[key]):
             known = self.tried[key]
-            others = in_other_forms(known, self.floor, self.told, self.family)
-            best = max(others, key=lambda h: h.score, default=known)
+            best = max(in_other_forms(known, self.told, self.family), key=lambda h: h.score, default=known)
+            if not likelier(known, best):
+                break
+            best = with_free_run(best, self.floor)
             if not pays(known, best):
                 break
             self.tried[key] = best

@@ -94,7 +94,7 @@ def log_likelihood(
     total = 0.0
     for record, (a, k), e in zip(records, dynamics, residuals, strict=True):
         out = np.empty((1, *e.shape))
-        logs = innovations(record.steps, record.angle_ok, record.rate_ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
+        logs = innovations(record.even, record.angle_ok, record.rate_ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
         total -= 0.5 * (logs + float(np.vdot(out, out)))
     return total
 
@@ -168,7 +168,7 @@ class _Slope:
         noise = self.vector(x)
         for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True):
             total += information(
-                r.steps,
+                r.even,
                 r.angle_ok,
                 r.rate_ok,
                 max(a, 1e-3),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from fieldsid.fitting.descent import descend
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_of
@@ -12,6 +14,8 @@ from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.weights import white_weights
 from fieldsid.models.record import Record
 
+SCATTER = 0.003
+"""Share by which runs of one speed differ as measured, without that meaning anything."""
 UNUSUAL = 2.0
 """What the product of both channels' errors must fall by for a trim that does not go with the speed as it does as a rule."""
 
@@ -19,10 +23,11 @@ UNUSUAL = 2.0
 def possible_trims(groups: Groups, *, varying: bool = False) -> tuple[bool, ...]:
     """Return whether the trim may go with the authority, what it does as a rule first: in yaw it does and need not.
 
-    In pitch a moment that goes with the speed is an effect of its own. At one speed nothing tells, unless an effect lets
-    the authority vary within a run.
+    In pitch a moment that goes with the speed is an effect of its own. At one speed nothing tells, unless the runs miss it by
+    more than a speed sensor does, or an effect lets the authority vary within a run.
     """
-    return (True, False) if groups.trim_of_fin and (varying or len(groups.speeds) > 1) else (groups.trim_of_fin,)
+    missed = float(np.ptp(groups.run_speeds)) > SCATTER * groups.speeds[groups.reference]
+    return (True, False) if groups.trim_of_fin and (varying or missed) else (groups.trim_of_fin,)
 
 
 def groups_by_trim(records: Sequence[Record]) -> Groups:

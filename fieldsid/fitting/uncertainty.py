@@ -78,7 +78,7 @@ def middle(record: Record, noise: FloatArray, damping: float, stiffness: float, 
     """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise vector (7,)."""
     out = np.zeros((weighted.shape[0], weighted.shape[0]))
     _middle(
-        record.steps, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
+        record.even, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
         np.ascontiguousarray(weighted), out,
     )  # fmt: skip
     return np.asarray(out + np.tril(out, -1).T)

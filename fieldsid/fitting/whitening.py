@@ -43,6 +43,6 @@ def whiten(record: Record, noise: Noise, damping: float, stiffness: float, serie
         return np.where(ok, series / sigma[:, None], 0.0), log_sum
     out = np.empty_like(series)
     log_sum = innovations(
-        record.steps, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise), series, out
+        record.even, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise), series, out
     )
     return out, float(log_sum)

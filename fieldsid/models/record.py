@@ -17,6 +17,8 @@ from fieldsid.models.effect import FinPath
 from fieldsid.models.smoothing import smoothed
 
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
+JITTER = 0.35
+"""Share of the usual step within which steps differ by the clock's jitter, not by a sample that is missing."""
 FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 """What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
 
@@ -46,9 +48,15 @@ class Record:
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
+    even: FloatArray = field(init=False)
+    """The same, (n-1,) s, but for a clock's jitter: steps near the median are taken as that. For filters that are fast where
+    nothing changes and only say how noise is coloured."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "steps", np.diff(self.time))
+        steps = np.diff(self.time)
+        usual = float(np.median(steps)) if steps.size else 0.0
+        object.__setattr__(self, "steps", steps)
+        object.__setattr__(self, "even", np.where(np.abs(steps - usual) < JITTER * usual, usual, steps))
 
     def __len__(self) -> int:
         return int(self.time.size)

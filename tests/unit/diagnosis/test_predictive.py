@@ -9,7 +9,7 @@ import pytest
 from truth.paper import YAW, paper_run
 
 from fieldsid.diagnosis.hypothesis import bare_model, flown_by, left_over
-from fieldsid.diagnosis.predictive import Unseen, _under, moves_of, precision
+from fieldsid.diagnosis.predictive import Unseen, _under, moves_of, precision, speed_doubt
 from fieldsid.diagnosis.trial import Judged, refine
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.layout import layout_of
@@ -41,7 +41,8 @@ def judged():
 def unseen(judged, log):
     model = bare_model(judged.trial.problem, judged.trial.x, NOISE)
     ((problem, x),) = flown_by(model, judged.trial, (log,))
-    return Unseen(problem, x, left_over(problem, x), moves_of(judged, problem, log.speed), problem.linearise(x, 0))
+    doubt = speed_doubt(problem, x, log.speed)
+    return Unseen(problem, x, left_over(problem, x), moves_of(judged, problem, log.speed), doubt, problem.linearise(x, 0))
 
 
 @pytest.mark.parametrize("speed", [1.0, 1.3])
@@ -51,15 +52,16 @@ def test_it_is_the_likelihood_averaged_over_what_the_training_runs_leave_open(ju
     known = precision(judged)
     value, led = _under(NOISE, [run], dynamics, known)
     shared = run.problem.layout.shared
-    drawn = np.random.default_rng(3).multivariate_normal(np.zeros(known.shape[0]), np.linalg.inv(known), 600)
+    rng = np.random.default_rng(3)
+    drawn = rng.multivariate_normal(np.zeros(known.shape[0]), np.linalg.inv(known), 600)
     costs = []
     for d in drawn:
         x = run.x.copy()
-        x[:shared] += run.moves @ d
+        x[:shared] += run.moves @ d + run.speed * rng.standard_normal()
         costs.append(descend(run.problem, x, NOISE, free=range(shared, x.size), rounds=4).cost)
     plain = cost_of(run.problem, run.x, NOISE)
     averaged = np.log(np.mean(np.exp(-0.5 * (np.array(costs) - plain))))
-    at_estimate = _under(NOISE, [run], dynamics, 1e12 * known)[0]
+    at_estimate = _under(NOISE, [replace(run, speed=0.0 * run.speed)], dynamics, 1e12 * known)[0]
     assert value[0] - at_estimate[0] == pytest.approx(averaged, abs=0.3)
     assert abs(averaged) > 0.5
     assert np.sum((led[0] / 0.01) ** 2) < plain

@@ -49,7 +49,7 @@ def dense(log: Record, noise: Noise) -> np.ndarray:
         rows.append(np.stack([states[0] + states[3], states[1] + states[4]]))
         if i == n - 1:
             break
-        h = log.steps[i]
+        h = log.even[i]
         f = np.zeros((5, 5))
         f[:3, :3] = expm(np.array([[0, 1, 0], [-K, -A, 1], [0, 0, 0]]) * h)
         f[2, 2], f[3, 3] = np.exp(-h / vector[3]), np.exp(-h / vector[6])
@@ -95,7 +95,7 @@ def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
 
 def informed(log: Record, noise: np.ndarray, place: np.ndarray, residual: np.ndarray):
     score, fisher = np.zeros(place.size), np.zeros((place.size, place.size))
-    total = information(log.steps, log.angle_ok, log.rate_ok, A, K, noise, place, residual[None], score, fisher)
+    total = information(log.even, log.angle_ok, log.rate_ok, A, K, noise, place, residual[None], score, fisher)
     return total, score, fisher
 
 

@@ -1,0 +1,51 @@
+"""How speed enters a hypothesis: runs of a group alike or scaled, one authority for all or each its own, which trim."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
+from fieldsid.diagnosis.trial import Trial, judge
+from fieldsid.diagnosis.worth import WORTH
+from fieldsid.fitting.layout import Groups, speed_groups
+from fieldsid.fitting.starts import by_other_law
+from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.models.speed_law import TRIM_OF_FIN
+
+ALIKE_SPEEDS = 1.1
+"""What the product of both channels' errors must fall by for runs of a group to count as flown at one speed."""
+
+
+def speed_laws(records: Sequence[Record], *, trim_of_fin: bool | None) -> tuple[Groups, ...]:
+    """Return the ways speed may enter: runs of one group alike or scaled, the trim by one law or another, or by the one given."""
+    groups = speed_groups(records)
+    snapped = (False, True) if len(groups.speeds) < len(records) else (False,)
+    trims = possible_trims(groups) if trim_of_fin is None else (trim_of_fin,)
+    return tuple(speed_groups(records, snapped=s, trim_of_fin=t) for t in trims for s in snapped)
+
+
+def error_by_law(trial: Trial, axis: Axis) -> float:
+    """Return the product of both channels' errors, more where trim or speeds are not what they are as a rule."""
+    groups = trial.problem.layout.groups
+    usual = (1.0 if groups.trim_of_fin == TRIM_OF_FIN[axis] else UNUSUAL) * (ALIKE_SPEEDS if groups.snapped else 1.0)
+    return trial.weights.angle * trial.weights.rate * usual
+
+
+def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: bool) -> Hypothesis | None:
+    """Return a hypothesis under the other law of the speed, see `by_other_law`, where that has more evidence.
+
+    Speeds that share an authority pin it down far better; a group that is off the law shows once what hid it is found.
+    """
+    trial = h.judged.trial
+    groups = trial.problem.layout.groups
+    one_speed = len(groups.speeds) == 1
+    if (one_speed or groups.by_law) and not (asks_for_more and np.ptp(groups.run_speeds) > 0.0):
+        return None
+    problem, x = by_other_law(trial.problem, trial.x)
+    other = hypothesis_of(judge(problem, x, h.judged.noise, told, family), h.validation)
+    return other if other.score > h.score + (WORTH if one_speed else 0.0) else None
