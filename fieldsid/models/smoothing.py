@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solveh_banded
+from scipy.ndimage import median_filter
 
 from fieldsid.logs.run import FloatArray
 
@@ -20,6 +21,8 @@ FEWEST = 8
 """Measured samples below which a signal is left as it is."""
 HELD_S = 1.0
 """A value repeated for no longer than this was held by the log until the sensor's next one."""
+NEIGHBOURS, WILD, LARGE = 9, 8.0, 0.1
+"""Values a running median is taken over; spreads, and share of the signal's own range, beyond which one is wild."""
 ENOUGH = 20_000
 """Samples from whose first part a longer signal's T is found."""
 
@@ -27,12 +30,13 @@ ENOUGH = 20_000
 def smoothed(time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0) -> FloatArray:
     """Return a signal (n,) without its noise and its gaps (NaN), at times (n,) s; T is at least `fastest_s` s.
 
-    Values that a log repeats until the sensor's next one count once.
+    Values that a log repeats until the sensor's next one count once, and wild ones not at all.
     """
     ok = np.isfinite(values)
     full = np.interp(time, time[ok], values[ok])
     step = float(np.median(np.diff(time))) if full.size > 1 else 0.0
     seen = _fresh(full, ok, step)
+    seen[np.flatnonzero(seen)[_wild(full[seen])]] = False
     if seen.sum() < FEWEST or not step > 0.0:
         return full
     line = np.polynomial.Polynomial.fit(time[seen], full[seen], 1)(time)
@@ -50,6 +54,16 @@ def _fresh(values: FloatArray, ok: npt.NDArray[np.bool_], step: float) -> npt.ND
     lengths = np.diff(np.append(np.flatnonzero(first), values.size))
     held = lengths.size > 1 and float(np.mean(lengths)) > 1.5 and float(np.percentile(lengths, 90)) * step <= HELD_S
     return ok & first if held else ok
+
+
+def _wild(values: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return the values far from the running median, for their own noise and for all that the signal does.
+
+    A step or a slow swing is its own median.
+    """
+    off = np.abs(values - median_filter(values, size=NEIGHBOURS, mode="nearest"))
+    usual = 1.4826 * float(np.median(off))
+    return np.asarray((off > WILD * usual) & (off > LARGE * float(np.ptp(values))))
 
 
 def _stiffnesses(step: float, fastest_s: float) -> FloatArray:

@@ -66,6 +66,15 @@ def test_gaps_are_bridged_and_nothing_is_shifted():
     assert abs(int(np.argmin(lags)) - 10) <= 2
 
 
+@pytest.mark.parametrize("wild", [0.0, 3.0])
+def test_wild_values_are_passed_over(wild):
+    rng, time = np.random.default_rng(11), np.arange(0.0, 60.0, 0.05)
+    truth = slow(time, rng)
+    noisy = truth + NOISE * rng.standard_normal(time.size)
+    noisy[rng.integers(0, time.size, 12)] = wild
+    assert off(smoothed(time, noisy, fastest_s=0.35), truth) < 0.25 * NOISE
+
+
 @given(st.integers(1, 30), st.floats(-1e3, 1e3), st.floats(-10.0, 10.0))
 def test_a_straight_line_stays_itself(count, level, slope):
     time = 0.05 * np.arange(count)
