@@ -14,6 +14,9 @@ from fieldsid.logs.run import FloatArray, Note
 MAX_GAP_S = 2.0
 """A main signal missing for longer than this inside a run is refused unless the user raises the limit."""
 
+ROUNDING = 1.01
+"""What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
+
 MAIN = (
     "yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s",
     "rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad",
@@ -31,8 +34,8 @@ class Gap:
 
     @property
     def length_s(self) -> float:
-        """Time between the samples on both sides."""
-        return self.end_s - self.start_s
+        """Time the missing samples would have stood for: between those on both sides, less a step."""
+        return (self.end_s - self.start_s) * self.count / (self.count + 1)
 
 
 def in_order(time: FloatArray, label: str, *, salvage: bool = False, log: str = "LOG") -> tuple[npt.NDArray[np.intp], list[Note]]:
@@ -85,7 +88,7 @@ def refuse_long_gaps(
     worst = max(
         ((g.length_s, s, g) for s in MAIN if s in signals for g in gaps_in(time, signals[s])), default=None, key=lambda w: w[0]
     )
-    if worst is None or worst[0] <= limit_s:
+    if worst is None or worst[0] <= ROUNDING * limit_s:
         return
     length, signal, gap = worst
     raise LogError(

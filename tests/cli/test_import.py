@@ -156,7 +156,7 @@ BAD = {
     "no time in a row": (with_column("time_s", lambda i, v: "" if i == 9 else v), "rows without a time", "--salvage"),
     "NaN run": (
         with_column("yaw_rad", lambda i, v: "nan" if 100 <= i < 180 else v),
-        "`yaw_rad` is missing for 4.05 s",
+        "`yaw_rad` is missing for 4.00 s",
         "--max-gap",
     ),
     "words": (with_column("yaw_rad", lambda i, v: "ERR" if i == 9 else v), "cells that are no numbers", "--salvage"),
