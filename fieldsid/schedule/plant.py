@@ -15,10 +15,11 @@ import numpy.typing as npt
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core
+from fieldsid.models.effect import Core, Effect
 from fieldsid.models.model import Model
+from fieldsid.models.signal_path import combined_terms
 from fieldsid.models.simulate import effects_of
-from fieldsid.turning.plant import EXPONENT
+from fieldsid.turning.plant import EXPONENT, as_trained
 from fieldsid.turning.source import Source, draw_values
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -161,7 +162,7 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
         damping=column(names.damping) * scale**exponents,
         stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness),
         authority=authority,
-        offset=column(names.trim) * model.law.trim_factor(speed) / authority,
+        offset=(column(names.trim) * model.law.trim_factor(speed) + _helpers_moment(model, parts, values, speed)) / authority,
         quadratic=cored("quadratic"),
         beyond_square=cored("beyond_square"),
         crossflow=cored("crossflow"),
@@ -171,6 +172,14 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
         cross_quadratic=cored("cross_quadratic"),
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
     )
+
+
+def _helpers_moment(model: Model, parts: Sequence[Effect], values: Sequence[Mapping[str, float]], speed: float) -> FloatArray:
+    """Return the moment (d,) rad/s^2 of thrust, depth and speed on a straight run as the model's own were."""
+    record = as_trained(model, speed)
+    own = [e for e in parts if e.terms is not None and {"thrust", "depth", "surge"} & set(e.needs)]
+    moments = [combined_terms(record, own, v).moment for v in values]
+    return np.array([0.0 if m is None else float(np.mean(m)) for m in moments])
 
 
 def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -> Sequence[FloatArray]:

@@ -110,7 +110,7 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
     starts = {c.name: c.start for e in parts for c in e.nuisance}
     values = [starts | {EXPONENT: float(e)} | dict(d) for d, e in zip(draws, exponents, strict=True)]
     sign = float(np.sign(model.base[names.authority])) or 1.0
-    steady = command_record(Axis.YAW, *_step(0.0), speed=_known(model.law.reference))
+    steady = as_trained(model, _known(model.law.reference))
     terms = [combined_terms(steady, parts, v) for v in values]
 
     def column(numbers: Sequence[float]) -> FloatArray:
@@ -135,6 +135,14 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
         law=_law_table(model),
         sway_seen=column([_seen_share(model, v) for v in values]),
     )
+
+
+def as_trained(model: Model, speed: float) -> Record:
+    """Return a straight run at a speed with the fin at zero, thrust and depth as they were on average where the model is from."""
+    time, fin = _step(0.0)
+    means = {role: model.trained.get(f"{role}_mean", 0.0) for role in ("thrust", "depth")}
+    signals = {role: np.full(time.size, mean) for role, mean in means.items() if np.isfinite(mean)}
+    return command_record(model.axis, time, fin, speed=speed, signals=signals)
 
 
 def settled_fins(parts: Sequence[Effect], values: Sequence[Mapping[str, float]], command: float, speed: float) -> list[float]:
