@@ -59,7 +59,7 @@ def compare_one(model: Model, run: Run) -> Comparison:
     shown = predict(model, record)
     floor = floor_of([record])
     channel = judged(shown, floor)
-    ok = (record.angle_ok, record.rate_ok)[channel]
+    ok = record.ok[channel]
     square = shown.residual[channel] ** 2
     base = base_at(model, record.speed)
     trim = -base.trim / base.authority if base.authority != 0.0 else 0.0

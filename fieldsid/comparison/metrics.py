@@ -28,7 +28,7 @@ class Metrics:
 def metrics(shown: Prediction, channel: int) -> Metrics:
     """Return the metrics of one channel of a prediction: 0 the angle, 1 the rate; NaN where it was not measured."""
     record = shown.record
-    ok = (record.angle_ok, record.rate_ok)[channel]
+    ok = record.ok[channel]
     measured = (record.angle, record.rate)[channel][ok]
     simulated = (shown.angle, shown.rate)[channel][ok]
     if measured.size < 2:

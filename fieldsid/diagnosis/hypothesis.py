@@ -192,7 +192,7 @@ def errors_of(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Err
     """Return the pooled rms of residuals (2, n) over the measured samples of all runs."""
     values = []
     for channel in range(2):
-        ok = [(r.angle_ok, r.rate_ok)[channel] for r in records]
+        ok = [r.ok[channel] for r in records]
         squares = sum(float(np.sum(e[channel][m] ** 2)) for e, m in zip(residuals, ok, strict=True))
         count = sum(int(m.sum()) for m in ok)
         values.append(float(np.sqrt(squares / count)) if count else float("nan"))

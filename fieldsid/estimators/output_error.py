@@ -95,8 +95,7 @@ def _sandwich(
     place = {slot: i for i, slot in enumerate(found.free)}
     centre = np.zeros_like(normal)
     for record, result in zip(problem.records, results, strict=True):
-        ok = np.stack([record.angle_ok, record.rate_ok])
-        weighted = np.where(ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
+        weighted = np.where(record.ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
         index = np.array([place[s] for s in result.slots])
         centre[np.ix_(index, index)] += middle(record, noise, result.base.damping, result.base.stiffness, weighted)
     inverse = covariance(normal)

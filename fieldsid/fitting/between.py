@@ -52,7 +52,7 @@ def timed(problem: Problem, x: FloatArray, floor: Noise) -> Record | None:
     if jumps.size < 2 or not _in_question(record, problem.residual(x, 0)[0], floor):
         return None
     slots = [i for i in problem.layout.of_run(0) if problem.layout.slots[i].name in START_NAMES]
-    run = _TimedRun(problem, x, jumps, floor, -problem.linearise(x, 0, slots).sensitivity * np.stack(_masks(record)))
+    run = _TimedRun(problem, x, jumps, floor, -problem.linearise(x, 0, slots).sensitivity * record.ok)
     slopes = run.slopes()
     if not np.isfinite(slopes).all():
         return None
@@ -186,16 +186,12 @@ class _TimedRun:
         return np.asarray(residual - np.tensordot(move, self.starts, axes=(0, 0)))
 
 
-def _masks(record: Record) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    return record.angle_ok, record.rate_ok
-
-
 def _rms(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
     """Return what is left of each channel (2,), at least its noise."""
     return np.array(
         [
             max(float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else 0.0, sigma)
-            for e, ok, sigma in zip(residual, _masks(record), (floor.angle, floor.rate), strict=True)
+            for e, ok, sigma in zip(residual, record.ok, (floor.angle, floor.rate), strict=True)
         ]
     )
 
@@ -208,7 +204,7 @@ def _in_question(record: Record, residual: FloatArray, floor: Noise) -> bool:
 def _rough_gain(record: Record, shift: FloatArray, own: FloatArray) -> float:
     """Return the log likelihood gained if what is left were white, correlated samples counted once: cheap."""
     total, lags = 0.0, round(LAGS_S / float(np.median(record.steps)))
-    for before, after, ok in zip(shift, own, _masks(record), strict=True):
+    for before, after, ok in zip(shift, own, record.ok, strict=True):
         if ok.any():
             size = float(ok.sum()) / correlation_length(after[ok], lags)
             total += 0.5 * size * float(np.log(np.mean(before[ok] ** 2) / np.mean(after[ok] ** 2)))

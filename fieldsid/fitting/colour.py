@@ -24,7 +24,7 @@ def whiteness(problem: Problem, x: FloatArray, noise: Noise) -> float:
     for channel in range(2):
         statistic, freedom = 0.0, 0
         for run, record in enumerate(problem.records):
-            ok = (record.angle_ok, record.rate_ok)[channel]
+            ok = record.ok[channel]
             if ok.sum() < 4 * LAGS:
                 continue
             residual, base = problem.residual(x, run)

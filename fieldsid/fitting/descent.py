@@ -79,10 +79,9 @@ def cost_of(problem: Problem, x: FloatArray, noise: Noise, dynamics: Dynamics | 
 
 def products(record: Record, noise: Noise, damping: float, stiffness: float, result: RunResult) -> FloatArray | None:
     """Return the products (1 + P, 1 + P) of a run's whitened residual and sensitivities, None where the motion diverges."""
-    stack = np.concatenate([result.residual[None], result.sensitivity])
-    if not np.isfinite(stack).all():
+    if not np.isfinite(result.stack).all():
         return None
-    white, _ = whiten(record, noise, damping, stiffness, stack)
+    white, _ = whiten(record, noise, damping, stiffness, result.stack)
     flat = white.reshape(white.shape[0], -1)
     return np.asarray(flat @ flat.T)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 
@@ -101,25 +102,27 @@ class Layout:
     groups: Groups
     slots: tuple[Slot, ...]
     shared: int
+    names: tuple[str, ...] = field(init=False)
+    """Names of the shared slots."""
+    low: FloatArray = field(init=False, compare=False)
+    """Lower bounds, (N,)."""
+    high: FloatArray = field(init=False, compare=False)
+    """Upper bounds, (N,)."""
+    own: Mapping[int, tuple[int, ...]] = field(init=False, compare=False)
+    """The positions of each run's own slots."""
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the shared slots."""
-        return [s.name for s in self.slots[: self.shared]]
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "names", tuple(s.name for s in self.slots[: self.shared]))
+        object.__setattr__(self, "low", np.array([s.low for s in self.slots]))
+        object.__setattr__(self, "high", np.array([s.high for s in self.slots]))
+        own: dict[int, list[int]] = {}
+        for i, slot in enumerate(self.slots[self.shared :], self.shared):
+            own.setdefault(slot.run, []).append(i)
+        object.__setattr__(self, "own", MappingProxyType({run: tuple(places) for run, places in own.items()}))
 
-    @property
-    def low(self) -> FloatArray:
-        """Lower bounds, (N,)."""
-        return np.array([s.low for s in self.slots])
-
-    @property
-    def high(self) -> FloatArray:
-        """Upper bounds, (N,)."""
-        return np.array([s.high for s in self.slots])
-
-    def of_run(self, run: int) -> list[int]:
+    def of_run(self, run: int) -> tuple[int, ...]:
         """Return the positions of a run's own slots."""
-        return [i for i, s in enumerate(self.slots) if s.run == run]
+        return self.own.get(run, ())
 
     def law(self, values: dict[str, float]) -> SpeedLaw:
         """Return the speed law of a vector of shared values."""

@@ -116,7 +116,6 @@ def lean(problem: Problem, noise: Noise, free: Sequence[int]) -> Lean | None:
     runs = []
     for index, r in enumerate(problem.records):
         path = r.commanded
-        weight = np.stack([r.angle_ok / noise.angle, r.rate_ok / noise.rate])
-        fin, measured = np.stack([path.start, path.end]), np.stack([r.angle, r.rate])
-        runs.append(_Run(index, r.steps, float(r.steps.max()), fin, measured, weight))
+        weight = r.ok / np.array([[noise.angle], [noise.rate]])
+        runs.append(_Run(index, r.steps, float(r.steps.max()), np.stack([path.start, path.end]), r.both, weight))
     return Lean(problem, tuple(runs), tuple(free))

@@ -48,8 +48,7 @@ class Prediction:
     @property
     def residual(self) -> FloatArray:
         """Measured minus simulated, (2, n), zero where nothing was measured."""
-        r = self.record
-        return np.stack([np.where(r.angle_ok, r.angle - self.angle, 0.0), np.where(r.rate_ok, r.rate - self.rate, 0.0)])
+        return np.where(self.record.ok, self.record.both - np.stack([self.angle, self.rate]), 0.0)
 
 
 def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
@@ -98,8 +97,7 @@ def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
     """Return the rms residual of a one-run problem, angle (rad) and rate (rad/s), NaN for a channel not measured."""
     record = problem.records[0]
     residual, _ = problem.residual(refit_own(problem, x, 0, floor_of([record])), 0)
-    masks = (record.angle_ok, record.rate_ok)
-    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else float("nan") for e, ok in zip(residual, masks, strict=True)]
+    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else float("nan") for e, ok in zip(residual, record.ok, strict=True)]
     return rms[0], rms[1]
 
 
@@ -145,8 +143,7 @@ def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
     """Return the residual standard deviations of one run, at least those of its noise."""
     residual, _ = problem.residual(x, 0)
     record = problem.records[0]
-    masks = (record.angle_ok, record.rate_ok)
-    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else 0.0 for e, ok in zip(residual, masks, strict=True)]
+    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else 0.0 for e, ok in zip(residual, record.ok, strict=True)]
     return Noise(max(rms[0], noise.angle), max(rms[1], noise.rate))
 
 

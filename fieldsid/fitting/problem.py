@@ -30,14 +30,23 @@ REMEMBERED = 20_000
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """One run's free run: measured-like angle and rate (n,), residual (2, n), sensitivities (P, 2, n) of `slots`."""
+    """One run's free run: measured-like angle and rate (n,); stack (1 + P, 2, n) of its residual and sensitivities of `slots`."""
 
     angle: FloatArray
     rate: FloatArray
-    residual: FloatArray
     slots: tuple[int, ...]
-    sensitivity: FloatArray
+    stack: FloatArray
     base: Base
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus simulated, (2, n), zero where nothing was measured."""
+        return np.asarray(self.stack[0])
+
+    @property
+    def sensitivity(self) -> FloatArray:
+        """Derivatives of what the sensors show by the slots, (P, 2, n)."""
+        return np.asarray(self.stack[1:])
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +69,10 @@ class Problem:
 
     def base_of(self, x: FloatArray, run: int) -> Base:
         """Return a run's base parameters."""
+        return self._base(dict(zip(self.layout.names, x[: self.layout.shared].tolist(), strict=True)), run)
+
+    def _base(self, v: Values, run: int) -> Base:
         names, layout = NAMES[self.layout.axis], self.layout
-        v = dict(zip(layout.names, x[: layout.shared], strict=True))
         share, ratio = self.scales(run)
         authority = v[self.authority_of(run)] * ratio**2
         return Base(
@@ -111,8 +122,8 @@ class Problem:
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
         record, effects = self.records[run], self.layout.effects
-        base, values = self.base_of(x, run), self.values_of(x, run)
-        start = self._start_of(values, run)
+        values = self.values_of(x, run)
+        base, start = self._base(values, run), self._start_of(values, run)
         arrays = with_moments(record, self._arrays(base, values, run), effects, values, start)
         out = run_core(record, arrays, start)
         return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
@@ -120,15 +131,15 @@ class Problem:
     def residual(self, x: FloatArray, run: int) -> tuple[FloatArray, Base]:
         """Return measured minus simulated, (2, n), zero where nothing was measured; and the run's base."""
         motion, base = self.simulate(x, run)
-        return _difference(self.records[run], motion), base
+        return _difference(self.records[run], motion, np.empty((2, len(self.records[run])))), base
 
     def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
         """Return one run's free run with its sensitivities to the free slots that touch it."""
         slots, pushes = self._pushes(x, run, free)
-        out, sens = pushes.integrate(slots)
-        motion = Motion(out[:, 0], out[:, 1])
-        shown, sens = pushes.through_sensors(motion, slots, sens)
-        return RunResult(shown.angle, shown.rate, _difference(self.records[run], shown), slots, sens, pushes.base)
+        out, stack = pushes.integrate(slots)
+        shown = pushes.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])
+        _difference(self.records[run], shown, stack[0])
+        return RunResult(shown.angle, shown.rate, slots, stack, pushes.base)
 
     def pieces(
         self, x: FloatArray, run: int, free: Sequence[int], length: int
@@ -142,8 +153,8 @@ class Problem:
 
     def _pushes(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], Pushes]:
         record, layout = self.records[run], self.layout
-        values, base = self.values_of(x, run), self.base_of(x, run)
-        start = self._start_of(values, run)
+        values = self.values_of(x, run)
+        base, start = self._base(values, run), self._start_of(values, run)
         wanted = set(range(len(x)) if free is None else free)
         slots = tuple(i for i in (*range(layout.shared), *layout.of_run(run)) if i in wanted and self._touches(i, run))
         arrays = with_moments(record, self._arrays(base, values, run), layout.effects, values, start)
@@ -168,10 +179,10 @@ class Problem:
         return np.array([s.start for s in self.layout.slots])
 
 
-def _difference(record: Record, motion: Motion) -> FloatArray:
-    return np.stack(
-        [
-            np.where(record.angle_ok, record.angle - motion.angle, 0.0),
-            np.where(record.rate_ok, record.rate - motion.rate, 0.0),
-        ]
-    )
+def _difference(record: Record, motion: Motion, out: FloatArray) -> FloatArray:
+    """Fill out (2, n) with measured minus shown, zero where nothing was measured, and return it."""
+    np.subtract(record.angle, motion.angle, out=out[0])
+    np.subtract(record.rate, motion.rate, out=out[1])
+    if not record.is_whole:
+        out[~record.ok] = 0.0
+    return out

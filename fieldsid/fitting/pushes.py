@@ -63,9 +63,11 @@ class Pushes:
     arrays: Assembled
 
     def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-        """Return motion (n, 3) and sensitivities (P, 2, n) before the sensor."""
+        """Return motion (n, 3) before the sensor, and a stack (1 + P, 2, n): room for a residual, and the sensitivities."""
         rows, which, d_c, d_start = self._directions(slots)
-        return self._march(slice(0, len(self.record) - 1), rows, which, d_c, self.start, d_start)
+        stack = np.empty((1 + len(slots), 2, len(self.record)))
+        out = self._march(slice(0, len(self.record) - 1), rows, which, d_c, self.start, d_start, stack[1:])
+        return out, stack
 
     def integrate_pieces(self, slots: tuple[int, ...], length: int) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
         """Yield the same in pieces of `length` intervals, without the cross state's sensitivity from piece to piece."""
@@ -73,7 +75,8 @@ class Pushes:
         start, last = self.start, len(self.record) - 1
         for first in range(0, last, length):
             part = slice(first, min(first + length, last))
-            out, sens = self._march(part, rows, which, d_c, start, d_start)
+            sens = np.empty((len(slots), 2, part.stop - part.start + 1))
+            out = self._march(part, rows, which, d_c, start, d_start, sens)
             start, d_start = out[-1].copy(), np.column_stack([sens[:, :, -1], np.zeros(len(slots))])
             end = part.stop + 1 if part.stop == last else part.stop
             yield slice(first, end), out[: end - first], sens[:, :, : end - first]
@@ -111,16 +114,17 @@ class Pushes:
         return -float(push) / float(stiff) if damping > 0.0 else 0.0
 
     def _march(
-        self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return motion (m + 1, 3) and sensitivities (P, 2, m + 1) over the m intervals of a part."""
+        self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray,
+        sens: FloatArray,
+    ) -> FloatArray:  # fmt: skip
+        """Return motion (m + 1, 3) over the m intervals of a part, and fill sens (P, 2, m + 1)."""
         a, steps = self.arrays, self.record.steps[part]
         drives = np.zeros((len(rows), steps.size, len(kernels.DRIVES)))
         for row, push in zip(drives, rows, strict=True):
             push(part, row)
-        out, sens = np.empty((steps.size + 1, 3)), np.empty((which.size, 2, steps.size + 1))
+        out = np.empty((steps.size + 1, 3))
         kernels.tangents(steps, a.drive[part], a.constants, start, a.pieces, drives, which, d_c, d_start, out, sens)
-        return out, sens
+        return out
 
     def _push(self, name: str) -> tuple[Push | None, FloatArray]:
         names = NAMES[self.layout.axis]
@@ -234,13 +238,13 @@ class Pushes:
     def _coefficient(self, name: str) -> Coefficient:
         return next(c for e in self.layout.effects for c in e.coefficients if c.name == name)
 
-    def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> tuple[Motion, FloatArray]:
-        """Return what the sensors show, with the sensitivities carried through them."""
+    def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
+        """Return what the sensors show, and carry the sensitivities (P, 2, n) through them in place."""
         sensors = [e for e in self.layout.effects if e.measure is not None]
         if not sensors:
-            return motion, sens
+            return motion
         shown = measured(motion, self.record, sensors, self.values)
-        out = self._carried(motion, shown, sensors, sens)
+        sens[:] = self._carried(motion, shown, sensors, sens)
         own = {c.name: c for e in sensors for c in e.coefficients}
         for j, slot in enumerate(slots):
             name = self.layout.slots[slot].name
@@ -248,8 +252,8 @@ class Pushes:
                 step = own[name].step
                 ends = (self.values | {name: self.values[name] + s} for s in (step, -step))
                 plus, minus = (measured(motion, self.record, sensors, values) for values in ends)
-                out[j] = _between(plus, minus, 2.0 * step)
-        return shown, out
+                sens[j] = _between(plus, minus, 2.0 * step)
+        return shown
 
     def _carried(self, motion: Motion, shown: Motion, sensors: Sequence[Effect], sens: FloatArray) -> FloatArray:
         """Return sensitivities (P, 2, n) seen through the sensors, by differences along each where one has no slope of its own.

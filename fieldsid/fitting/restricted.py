@@ -51,8 +51,7 @@ def lines_of(problem: Problem, x: FloatArray) -> list[Line]:
     lines = []
     for run, record in enumerate(problem.records):
         r = problem.linearise(x, run)
-        stack = np.concatenate([r.residual[None], r.sensitivity])
-        lines.append(Line(record, max(r.base.damping, 1e-3), max(r.base.stiffness, 0.0), stack, np.array(r.slots, dtype=int)))
+        lines.append(Line(record, max(r.base.damping, 1e-3), max(r.base.stiffness, 0.0), r.stack, np.array(r.slots, dtype=int)))
     return lines
 
 
@@ -139,7 +138,7 @@ def whitened(lines: list[Line], family: str, found: Mapping[str, tuple[Noise, fl
         statistic, count = 0.0, 0
         for line in lines:
             r = line.record
-            ok = (r.angle_ok, r.rate_ok)[channel]
+            ok = r.ok[channel]
             if ok.sum() < 4 * LAGS:
                 continue
             white = np.empty((1, *line.residual.shape))

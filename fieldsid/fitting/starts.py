@@ -120,8 +120,7 @@ def ground_of(problem: Problem, x: FloatArray, noise: Noise) -> Ground:
     for run, record in enumerate(problem.records):
         result = problem.linearise(x, run)
         residuals.append(result.residual)
-        stack = np.concatenate([result.residual[None], result.sensitivity])
-        white, _ = whiten(record, noise, result.base.damping, result.base.stiffness, stack)
+        white, _ = whiten(record, noise, result.base.damping, result.base.stiffness, result.stack)
         flat = white.reshape(white.shape[0], -1)
         total += float(flat[0] @ flat[0])
         block = np.zeros((flat.shape[1], len(problem.layout.slots)))
@@ -200,11 +199,10 @@ def run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new: 
     """Return one run's whitened residual (m,) and its columns of the new slots (m, k)."""
     record = problem.records[run]
     result = problem.linearise(x, run, new)
-    stack = np.concatenate([result.residual[None], result.sensitivity])
-    if not np.isfinite(stack).all():
+    if not np.isfinite(result.stack).all():
         size = 2 * len(record)
         return np.full(size, 1e6), np.zeros((size, len(new)))
-    white, _ = whiten(record, ground.noise, result.base.damping, result.base.stiffness, stack)
+    white, _ = whiten(record, ground.noise, result.base.damping, result.base.stiffness, result.stack)
     flat = white.reshape(white.shape[0], -1)
     columns = np.zeros((flat.shape[1], len(new)))
     columns[:, [list(new).index(s) for s in result.slots]] = flat[1:].T

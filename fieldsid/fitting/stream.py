@@ -29,8 +29,7 @@ def streamed(problem: Problem, x: FloatArray, noise: Noise, free: Sequence[int])
         slots, pieces = problem.pieces(x, run, free, CHUNK)
         index = np.array([place[s] for s in slots], dtype=int)
         for part, out, sens in pieces:
-            ok = np.stack([record.angle_ok[part], record.rate_ok[part]])
-            measured = np.stack([record.angle[part], record.rate[part]])
+            ok, measured = record.ok[:, part], record.both[:, part]
             flat = (np.where(ok, sens, 0.0) / sigma).reshape(len(slots), -1)
             left = (np.where(ok, measured - out[:, :2].T, 0.0) / sigma).ravel()
             if not np.isfinite(left).all():

@@ -37,10 +37,10 @@ def whiten(record: Record, noise: Noise, damping: float, stiffness: float, serie
     marginal, since a residual does not grow where nonlinear damping holds the vehicle.
     """
     if is_white(noise):
-        ok = np.stack([record.angle_ok, record.rate_ok])
-        sigma = np.array([noise.angle, noise.rate])
-        log_sum = 2.0 * float(ok.sum(axis=1) @ np.log(sigma))
-        return np.where(ok, series / sigma[:, None], 0.0), log_sum
+        weight = np.array([1.0 / noise.angle, 1.0 / noise.rate])
+        log_sum = -2.0 * float(record.ok.sum(axis=1) @ np.log(weight))
+        white = series * weight[:, None]
+        return white if record.is_whole else np.where(record.ok, white, 0.0), log_sum
     out = np.empty_like(series)
     log_sum = innovations(
         record.even, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise), series, out

@@ -51,12 +51,21 @@ class Record:
     even: FloatArray = field(init=False)
     """The same, (n-1,) s, but for a clock's jitter: steps near the median are taken as that. For filters that are fast where
     nothing changes and only say how noise is coloured."""
+    both: FloatArray = field(init=False)
+    """Angle and rate, (2, n)."""
+    ok: npt.NDArray[np.bool_] = field(init=False)
+    """Where they were measured, (2, n)."""
+    is_whole: bool = field(init=False)
+    """Whether both were measured throughout."""
 
     def __post_init__(self) -> None:
         steps = np.diff(self.time)
         usual = float(np.median(steps)) if steps.size else 0.0
         object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "even", np.where(np.abs(steps - usual) < JITTER * usual, usual, steps))
+        object.__setattr__(self, "both", np.stack([self.angle, self.rate]))
+        object.__setattr__(self, "ok", np.stack([self.angle_ok, self.rate_ok]))
+        object.__setattr__(self, "is_whole", bool(self.ok.all()))
 
     def __len__(self) -> int:
         return int(self.time.size)

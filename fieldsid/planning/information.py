@@ -94,7 +94,7 @@ def information_of(scene: Scene, response: Response) -> Information:
     unit[layout.names.index(names.damping)] = ratio
     unit[layout.names.index(names.authority)] = ratio**2
     unit[layout.names.index(names.trim)] = ratio**2 if layout.groups.trim_of_fin else 1.0
-    return Information(tuple(layout.names), matrix / np.outer(unit, unit))
+    return Information(layout.names, matrix / np.outer(unit, unit))
 
 
 def _without_nuisances(normal: FloatArray, shared: int) -> FloatArray:
