@@ -1,4 +1,4 @@
-"""The compiled Kalman filter of the motion that disturbances and coloured sensor noise cause, and its information.
+"""The compiled Kalman filter of the motion that disturbances and coloured sensor noise cause.
 
 State (y, p, w, n_y, n_p), see fitting/whitening.py; a noise is a vector (7,) in the order of whitening.NOISE_FIELDS.
 """
@@ -12,8 +12,6 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import jit
 
 SETTLED = 4
-LOG_STEP = 3e-4
-"""Relative change of a noise's number whose effect is taken for a derivative."""
 
 
 @jit
@@ -93,14 +91,20 @@ def _advance(cov: FloatArray, f: FloatArray, fp: FloatArray, noise: FloatArray, 
 
 
 @jit
-def _moved(gain: FloatArray, last: FloatArray, low: int, high: int) -> float:
-    """Return the largest relative change of the gains (2, 5) since `last`, which becomes them."""
-    moved = 0.0
+def _stays(gain: float, last: float) -> bool:
+    """Whether a gain is what it was at the sample before."""
+    return abs(gain - last) < 1e-7 * (abs(gain) + 1e-6)
+
+
+@jit
+def _all_stay(gain: FloatArray, last: FloatArray, low: int, high: int) -> bool:
+    """Whether the gains (2, 5) are what `last` says, which becomes them."""
+    still = True
     for ch in range(2):
         for l in range(low, high):
-            moved = max(moved, abs(gain[ch, l] - last[ch, l]) / (abs(gain[ch, l]) + 1e-6))
+            still = still and _stays(gain[ch, l], last[ch, l])
             last[ch, l] = gain[ch, l]
-    return moved
+    return still
 
 
 @jit
@@ -218,6 +222,74 @@ def _carry(f: FloatArray, state: FloatArray) -> None:
 
 
 @jit
+def _waking(
+    steps: FloatArray, angle_ok: npt.NDArray[np.bool_], rate_ok: npt.NDArray[np.bool_], first: int, last_h: float,
+    a: float, k: float, noise: FloatArray, series: FloatArray, out: FloatArray, spreads: FloatArray,
+    cov: FloatArray, f: FloatArray, gain: FloatArray, spread: FloatArray, state: FloatArray,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Filter from sample `first` until the gains have settled, where a disturbance and white sensors are all there is.
+
+    The same as the general way, written out for the symmetric covariance of (y, p, w): most of a filter's time is spent
+    here. Returns the sample it stops before, the sum of log variances, and the step f is of.
+    """
+    n, log_sum, settled, i = steps.shape[0] + 1, 0.0, 0, first
+    c00, c01, c02, c11, c12, c22 = cov[0, 0], cov[0, 1], cov[0, 2], cov[1, 1], cov[1, 2], cov[2, 2]
+    a0, a1, a2, b0, b1, b2 = gain[0, 0], gain[0, 1], gain[0, 2], gain[1, 0], gain[1, 1], gain[1, 2]
+    angle_white, rate_white = noise[0] ** 2, noise[1] ** 2
+    while i < n and settled < SETTLED:
+        still = angle_ok[i] and rate_ok[i]
+        spreads[0, i] = spreads[1, i] = 1.0
+        if angle_ok[i]:
+            var = c00 + angle_white
+            spreads[0, i] = spread[0] = np.sqrt(var)
+            g0, g1, g2 = c00 / var, c01 / var, c02 / var
+            c11, c12, c22 = c11 - g1 * c01, c12 - g1 * c02, c22 - g2 * c02
+            c00, c01, c02 = c00 - g0 * c00, c01 - g0 * c01, c02 - g0 * c02
+            still = still and _stays(g0, a0) and _stays(g1, a1) and _stays(g2, a2)
+            a0, a1, a2 = g0, g1, g2
+            log_sum += np.log(var)
+        if rate_ok[i]:
+            var = c11 + rate_white
+            spreads[1, i] = spread[1] = np.sqrt(var)
+            g0, g1, g2 = c01 / var, c11 / var, c12 / var
+            c00, c02, c22 = c00 - g0 * c01, c02 - g0 * c12, c22 - g2 * c12
+            c01, c11, c12 = c01 - g0 * c11, c11 - g1 * c11, c12 - g1 * c12
+            still = still and _stays(g0, b0) and _stays(g1, b1) and _stays(g2, b2)
+            b0, b1, b2 = g0, g1, g2
+            log_sum += np.log(var)
+        for j in range(series.shape[0]):
+            y, p, w = state[j, 0], state[j, 1], state[j, 2]
+            out[j, 0, i] = out[j, 1, i] = 0.0
+            if angle_ok[i]:
+                e = series[j, 0, i] - y
+                out[j, 0, i] = e / spread[0]
+                y, p, w = y + a0 * e, p + a1 * e, w + a2 * e
+            if rate_ok[i]:
+                e = series[j, 1, i] - p
+                out[j, 1, i] = e / spread[1]
+                y, p, w = y + b0 * e, p + b1 * e, w + b2 * e
+            state[j, 0], state[j, 1], state[j, 2] = y, p, w
+        if i < n - 1:
+            h = steps[i]
+            if abs(h - last_h) > 1e-7 * h:
+                still, last_h = False, h
+                _set_transition(a, k, h, noise, f)
+            yy, yp, yw, py, pp, pw, ww = f[0, 0], f[0, 1], f[0, 2], f[1, 0], f[1, 1], f[1, 2], f[2, 2]
+            u0, u1, u2 = yy * c00 + yp * c01 + yw * c02, yy * c01 + yp * c11 + yw * c12, yy * c02 + yp * c12 + yw * c22
+            v0, v1, v2 = py * c00 + pp * c01 + pw * c02, py * c01 + pp * c11 + pw * c12, py * c02 + pp * c12 + pw * c22
+            c00, c01, c02 = u0 * yy + u1 * yp + u2 * yw, u0 * py + u1 * pp + u2 * pw, u2 * ww
+            c11, c12, c22 = v0 * py + v1 * pp + v2 * pw, v2 * ww, c22 * ww * ww + noise[2] ** 2 * (1.0 - ww * ww)
+            for j in range(series.shape[0]):
+                y, p, w = state[j, 0], state[j, 1], state[j, 2]
+                state[j, 0], state[j, 1], state[j, 2] = yy * y + yp * p + yw * w, py * y + pp * p + pw * w, ww * w
+            settled = settled + 1 if still else 0
+        i += 1
+    cov[0, 0], cov[0, 1], cov[0, 2], cov[1, 1], cov[1, 2], cov[2, 2] = c00, c01, c02, c11, c12, c22
+    gain[0, 0], gain[0, 1], gain[0, 2], gain[1, 0], gain[1, 1], gain[1, 2] = a0, a1, a2, b0, b1, b2
+    return i, log_sum, last_h
+
+
+@jit
 def filtered(
     steps: FloatArray,
     angle_ok: npt.NDArray[np.bool_],
@@ -248,6 +320,12 @@ def filtered(
                 log_sum += 2.0 * (stop - i) * np.log(spread[ch])
             i, settled = stop, 0
             continue
+        if low == 0 and high < 5:
+            i, logs, last_h = _waking(
+                steps, angle_ok, rate_ok, i, last_h, a, k, noise, series, out, spreads, cov, f, gain, spread, state
+            )  # fmt: skip
+            log_sum, settled = log_sum + logs, SETTLED
+            continue
         for ch in range(2):
             spreads[ch, i] = 1.0
             for j in range(series.shape[0]):
@@ -262,7 +340,7 @@ def filtered(
                 settled, last_h = 0, h
                 _set_transition(a, k, h, noise, f)
             _advance(cov, f, fp, noise, low, high)
-            settled = settled + 1 if angle_ok[i] and rate_ok[i] and _moved(gain, last_gain, low, high) < 1e-7 else 0
+            settled = settled + 1 if angle_ok[i] and rate_ok[i] and _all_stay(gain, last_gain, low, high) else 0
             _carry(f, state)
         i += 1
     return log_sum
@@ -285,53 +363,3 @@ def innovations(
     until a sample is missing or the step changes.
     """
     return filtered(steps, angle_ok, rate_ok, a, k, noise, series, out, np.empty((2, steps.shape[0] + 1)))
-
-
-@jit
-def information(
-    steps: FloatArray,
-    angle_ok: npt.NDArray[np.bool_],
-    rate_ok: npt.NDArray[np.bool_],
-    a: float,
-    k: float,
-    noise: FloatArray,
-    place: npt.NDArray[np.int64],
-    residual: FloatArray,
-    score: FloatArray,
-    fisher: FloatArray,
-) -> float:
-    """Return the log likelihood of a residual (1, 2, n); add its score (P,) and Fisher information (P, P).
-
-    Both are by the logarithms x of the noise's numbers at `place` (P,), from forward differences of the innovations e
-    and the logarithms of their spreads s:
-        dl/dx = -sum(ds + e de),  F = sum(2 ds ds' + (de + e ds) (de' + e ds'))
-    Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
-    """
-    count, n = place.shape[0], steps.shape[0] + 1
-    e, spreads = np.empty((1, 2, n)), np.empty((2, n))
-    log_sum = filtered(steps, angle_ok, rate_ok, a, k, noise, residual, e, spreads)
-    wide, raw = np.empty((count, 2, n)), np.empty((count, 2, n))
-    moved_e, moved_spreads, moved = np.empty((1, 2, n)), np.empty((2, n)), noise.copy()
-    for c in range(count):
-        moved[place[c]] = noise[place[c]] * np.exp(LOG_STEP)
-        filtered(steps, angle_ok, rate_ok, a, k, moved, residual, moved_e, moved_spreads)
-        moved[place[c]] = noise[place[c]]
-        for ch in range(2):
-            for i in range(n):
-                known = e[0, ch, i]
-                wider = (moved_spreads[ch, i] / spreads[ch, i] - 1.0) / LOG_STEP
-                slope = (moved_e[0, ch, i] - known) / LOG_STEP
-                score[c] -= wider + known * slope
-                wide[c, ch, i], raw[c, ch, i] = wider, slope + known * wider
-        for d in range(c + 1):
-            value = 0.0
-            for ch in range(2):
-                for i in range(n):
-                    value += 2.0 * wide[c, ch, i] * wide[d, ch, i] + raw[c, ch, i] * raw[d, ch, i]
-            fisher[c, d] += value
-            if d < c:
-                fisher[d, c] += value
-    for ch in range(2):
-        for i in range(n):
-            log_sum += e[0, ch, i] ** 2
-    return -0.5 * log_sum

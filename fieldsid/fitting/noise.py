@@ -9,7 +9,8 @@ from math import comb
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.fitting.kalman import information, innovations
+from fieldsid.fitting.kalman import innovations
+from fieldsid.fitting.scoring import information
 from fieldsid.fitting.step import bounded_step
 from fieldsid.fitting.whitening import NOISE_FIELDS
 from fieldsid.logs.run import BoolArray, FloatArray
@@ -167,18 +168,8 @@ class _Slope:
         score, fisher, total = np.zeros(count), np.zeros((count, count)), 0.0
         noise = self.vector(x)
         for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True):
-            total += information(
-                r.even,
-                r.angle_ok,
-                r.rate_ok,
-                max(a, 1e-3),
-                max(k, 0.0),
-                noise,
-                self.place,
-                np.ascontiguousarray(e[None]),
-                score,
-                fisher,
-            )
+            value, slope, curvature = information(r, max(a, 1e-3), max(k, 0.0), noise, self.place, e)
+            total, score, fisher = total + value, score + slope, fisher + curvature
         if self.likelihood is not None:
             total = self.likelihood(noise)
             score = np.array(

@@ -16,14 +16,18 @@ def bounded_step(
     information, stays; what would cross its bound goes just there, and the rest makes the best of that.
     Source: Marquardt 1963, SIAM J. 11(2).
     """
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-    free = ~(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)) | (np.diag(normal) < 1e-24))
-    scaled = normal / np.outer(scale, scale)
-    scaled[np.diag_indices_from(scaled)] += damping
+    diagonal = normal.diagonal()
+    scale = np.sqrt(np.maximum(diagonal, 1e-30))
+    free = ~(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)) | (diagonal < 1e-24))
+    scaled = normal / scale / scale[:, None]
+    scaled.ravel()[:: x.size + 1] += damping
     step = np.zeros_like(x)
     while free.any():
-        wish = (gradient[free] - normal[np.ix_(free, ~free)] @ step[~free]) / scale[free]
-        step[free] = _solved(scaled[np.ix_(free, free)], wish) / scale[free]
+        if free.all():
+            step = _solved(scaled, gradient / scale) / scale
+        else:
+            wish = (gradient[free] - normal[free][:, ~free] @ step[~free]) / scale[free]
+            step[free] = _solved(scaled[free][:, free], wish) / scale[free]
         end = x + step
         beyond = np.maximum(end - high, low - end) * scale * free
         worst = int(np.argmax(beyond))

@@ -25,6 +25,11 @@ CONSTANTS = (
 DIVERGED = 1e4
 SLOWEST = 0.01
 """Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
+FAINTEST = 1e-150
+AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, FLOW, BY_LENGTH, SIN, COS = range(14)
+"""What is kept of each stage of a step: the state and the share of the interval; the derivatives of p' by y and by p, of -x'
+by x and by the cross factor; and what the derivatives of the constants multiply."""
+STAGED = 14
 
 
 @jit
@@ -120,6 +125,47 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
 
 
 @jit
+def _map_row(row: int, h: float, turn: float, stages: FloatArray, rows: FloatArray, push: FloatArray, pull: FloatArray) -> None:
+    """Fill one row of a step's linear map: rows (3, 9) of the state and of what enters, push and pull (3, 4) of each stage.
+
+    A tangent obeys s' = A_l s + b u_l at stage l of the step, so that s -> s + sum_l W_l (A_l s + b u_l) with
+    W_4 = h/6, W_3 = h/3 + h W_4 A_4, W_2 = h/3 + h/2 W_3 A_3, W_1 = h/6 + h/2 W_2 A_2: the same for every parameter.
+    """
+    in_y, in_p, in_x = 1.0 * (row == 0), 1.0 * (row == 1), 1.0 * (row == 2)
+    of_y, of_p, of_x = in_y, in_p, in_x
+    v_y, v_p, v_x, part = 0.0, 0.0, 0.0, 0.0
+    one, rising, by_a, by_k, of_cross, by_factor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for back in range(4):
+        l = 3 - back
+        whole = _weight(l) * h / 6.0
+        w_y, w_p, w_x = part * v_y + whole * in_y, part * v_p + whole * in_p, part * v_x + whole * in_x
+        v_y, v_p, v_x = w_p * stages[BY_Y, l], w_y + w_p * stages[BY_P, l] - w_x * turn, w_p - w_x * stages[BY_X, l]
+        of_y, of_p, of_x = of_y + v_y, of_p + v_p, of_x + v_x
+        one, rising = one + w_p, rising + w_p * stages[PART, l]
+        by_a, by_k = by_a - w_p * stages[AT_P, l], by_k - w_p * stages[AT_Y, l]
+        of_cross, by_factor = of_cross + w_x, by_factor - w_x * stages[BY_FACTOR, l]
+        push[row, l], pull[row, l] = w_p, w_x
+        part = _reach(l) * h
+    rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3], rows[row, 4] = of_y, of_p, of_x, one, rising
+    rows[row, 5], rows[row, 6], rows[row, 7], rows[row, 8] = by_a, by_k, of_cross, by_factor
+
+
+@jit
+def _is_crossing(
+    drive: FloatArray, c: FloatArray, start: FloatArray, d_drive: FloatArray, d_c: FloatArray, d_start: FloatArray
+) -> bool:
+    """Whether the cross state or a derivative of it is anything but zero."""
+    found = _any(c, 7, 10) or start[2] != 0.0
+    for j in range(d_c.shape[0]):
+        found = found or _any(d_c[j], 7, 10) or d_start[j, 2] != 0.0
+    for i in range(drive.shape[0]):
+        found = found or drive[i, 5] != 0.0
+        for r in range(d_drive.shape[0]):
+            found = found or d_drive[r, i, 5] != 0.0
+    return found
+
+
+@jit
 def tangents(
     steps: FloatArray,
     drive: FloatArray,
@@ -136,15 +182,14 @@ def tangents(
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
     d_drive (K, n-1, 8) holds derivatives of the drives; which (P,) is the row of each parameter in it, -1 for
-    none; d_c (P, 11) those of the constants; d_start (P, 3) those of the initial state.
+    none; d_c (P, 11) those of the constants; d_start (P, 3) those of the initial state. All parameters go through one
+    linear map a step, see `_map_row`.
     """
-    n = steps.shape[0] + 1
-    count = d_c.shape[0]
-    s = d_start.copy()
-    kt = np.zeros((count, 3))
-    acc = np.zeros((count, 3))
-    has_c = np.zeros(count, dtype=np.bool_)
+    n, count = steps.shape[0] + 1, d_c.shape[0]
+    s, has_c = d_start.copy(), np.zeros(count, dtype=np.bool_)
+    stages, rows, push, pull = np.zeros((STAGED, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
     turning, flowing, raised = _any(c, 3, 7), c[1] != 0.0, c[10] != 0.0
+    crossing = _is_crossing(drive, c, start, d_drive, d_c, d_start)
     for j in range(count):
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
         has_c[j] = _any(d_c[j], 0, d_c.shape[1])
@@ -161,55 +206,32 @@ def tangents(
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
-            for j in range(count):
-                for l in range(3):
-                    acc[j, l] = kt[j, l] = 0.0
             for stage in range(4):
-                g = _reach(stage) * h
-                part = (piece + _reach(stage)) / pieces
-                wt = _weight(stage)
+                g, part, wt = _reach(stage) * h, (piece + _reach(stage)) / pieces, _weight(stage)
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
                 drag, log = ps * abs(ps), 0.0
-                by_p = -a - 2.0 * c[0] * abs(ps)
+                by_y, by_p = -k, -a - 2.0 * c[0] * abs(ps)
                 if raised:
                     drag, log = power_drag(ps, c[10])
                     by_p = -a - (2.0 + c[10]) * c[0] * drag / (ps if abs(ps) > STILL else 1.0)
                 f = -a * ps - k * ys + m - c[0] * drag + xs
-                by_y = -k
-                flow, flow_a, flow_p, alpha = 0.0, 0.0, 0.0, 0.0
                 if flowing:
                     alpha = (drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part) / c[2]
-                    flow, flow_a, flow_p = crossflow(alpha, ps)
+                    flow, by_alpha, by_rate = crossflow(alpha, ps)
                     f -= c[1] * flow
-                    by_p -= c[1] * flow_p
-                sin, cos = 0.0, 1.0
+                    by_p -= c[1] * by_rate
+                    stages[FLOW, stage], stages[BY_LENGTH, stage] = flow, c[1] * by_alpha * alpha / c[2]
                 if turning:
                     sin, cos = np.sin(ys), np.cos(ys)
                     f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
                     by_y += c[3] * cos - c[4] * sin + c[5] * (1.0 - cos) - c[6] * sin
+                    stages[SIN, stage], stages[COS, stage] = sin, cos
                 square = xs * abs(xs)
-                by_x = damp + 2.0 * hold * abs(xs)
-                for j in range(count):
-                    dy = s[j, 0] + g * kt[j, 0]
-                    dp = s[j, 1] + g * kt[j, 1]
-                    dx = s[j, 2] + g * kt[j, 2]
-                    e = by_y * dy + by_p * dp + dx
-                    z = -by_x * dx - turn * dp
-                    r = int(which[j])
-                    if r >= 0:
-                        d0, d1 = d_drive[r, i, 2], d_drive[r, i, 3]
-                        e += d0 + (d1 - d0) * part - d_drive[r, i, 0] * ps - d_drive[r, i, 1] * ys
-                        z += d_drive[r, i, 5] - d_drive[r, i, 4] * (c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square)
-                    if has_c[j]:
-                        e -= (d_c[j, 0] + c[0] * log * d_c[j, 10]) * drag
-                        e -= d_c[j, 1] * flow - c[1] * flow_a * alpha / c[2] * d_c[j, 2]
-                        e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * (ys - sin) + d_c[j, 6] * (cos - 1.0)
-                        z -= d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * square
-                    kt[j, 0], kt[j, 1], kt[j, 2] = dp, e, z
-                    acc[j, 0] += wt * dp
-                    acc[j, 1] += wt * e
-                    acc[j, 2] += wt * z
+                stages[AT_Y, stage], stages[AT_P, stage], stages[AT_X, stage], stages[PART, stage] = ys, ps, xs, part
+                stages[BY_Y, stage], stages[BY_P, stage], stages[BY_X, stage] = by_y, by_p, damp + 2.0 * hold * abs(xs)
+                stages[BY_FACTOR, stage] = c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square
+                stages[DRAG, stage], stages[BY_POWER, stage] = drag, c[0] * log * drag
                 ky, kp, kx = ps, f, -damp * xs - hold * square - turn * ps + q
                 ty += wt * ky
                 tp += wt * kp
@@ -217,12 +239,48 @@ def tangents(
             y += h / 6.0 * ty
             p += h / 6.0 * tp
             x += h / 6.0 * tx
+            for row in range(2 + crossing):
+                _map_row(row, h, turn, stages, rows, push, pull)
             for j in range(count):
-                for l in range(3):
-                    s[j, l] += h / 6.0 * acc[j, l]
-                    # a start's influence dies out; below the normal numbers it would only cost time, eightfold
-                    if abs(s[j, l]) < 1e-150:
-                        s[j, l] = 0.0
+                # written out: each call that hands over arrays would cost as much as what it does
+                r, sy, sp, sx = int(which[j]), s[j, 0], s[j, 1], s[j, 2]
+                to_y = rows[0, 0] * sy + rows[0, 1] * sp
+                to_p = rows[1, 0] * sy + rows[1, 1] * sp
+                to_x = 0.0
+                if crossing:
+                    to_y += rows[0, 2] * sx
+                    to_p += rows[1, 2] * sx
+                    to_x = rows[2, 0] * sy + rows[2, 1] * sp + rows[2, 2] * sx
+                if r >= 0:
+                    m, slope = d_drive[r, i, 2], d_drive[r, i, 3] - d_drive[r, i, 2]
+                    d_a, d_k, d_fast, d_q = d_drive[r, i, 0], d_drive[r, i, 1], d_drive[r, i, 4], d_drive[r, i, 5]
+                    to_y += rows[0, 3] * m + rows[0, 4] * slope + rows[0, 5] * d_a + rows[0, 6] * d_k
+                    to_p += rows[1, 3] * m + rows[1, 4] * slope + rows[1, 5] * d_a + rows[1, 6] * d_k
+                    if crossing:
+                        to_y += rows[0, 7] * d_q + rows[0, 8] * d_fast
+                        to_p += rows[1, 7] * d_q + rows[1, 8] * d_fast
+                        to_x += rows[2, 3] * m + rows[2, 4] * slope + rows[2, 5] * d_a + rows[2, 6] * d_k
+                        to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
+                if has_c[j]:
+                    for l in range(4):
+                        ys, ps, xs = stages[AT_Y, l], stages[AT_P, l], stages[AT_X, l]
+                        e = -d_c[j, 0] * stages[DRAG, l] - d_c[j, 10] * stages[BY_POWER, l]
+                        if flowing:
+                            e += d_c[j, 2] * stages[BY_LENGTH, l] - d_c[j, 1] * stages[FLOW, l]
+                        if turning:
+                            e += d_c[j, 3] * stages[SIN, l] + d_c[j, 4] * stages[COS, l]
+                            e += d_c[j, 5] * (ys - stages[SIN, l]) + d_c[j, 6] * (stages[COS, l] - 1.0)
+                        to_y += push[0, l] * e
+                        to_p += push[1, l] * e
+                        if crossing:
+                            z = d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * xs * abs(xs)
+                            to_y -= pull[0, l] * z
+                            to_p -= pull[1, l] * z
+                            to_x += push[2, l] * e - pull[2, l] * z
+                # a start's influence dies out; below the normal numbers it would only cost time, eightfold
+                s[j, 0] = to_y if abs(to_y) > FAINTEST else 0.0
+                s[j, 1] = to_p if abs(to_p) > FAINTEST else 0.0
+                s[j, 2] = to_x if abs(to_x) > FAINTEST else 0.0
         if not abs(p) < DIVERGED:
             _spoil(out, i + 1)
             for j in range(count):

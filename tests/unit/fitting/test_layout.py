@@ -34,7 +34,7 @@ def test_the_reference_is_the_group_nearest_the_median_of_the_groups():
 
 def test_several_groups_have_an_authority_each_and_share_the_exponent():
     layout = layout_of(runs(1.0, 1.5, 2.2), Axis.YAW, ())
-    assert layout.names == ["a22", "b2@1", "b2", "b2@2.2", "C0", "damping_exponent"]
+    assert layout.names == ("a22", "b2@1", "b2", "b2@2.2", "C0", "damping_exponent")
     law = layout.law({"b2": -1.5, "b2@1": -0.7, "b2@2.2": -3.0, "damping_exponent": 0.9})
     assert law.points == ((1.0, -0.7), (1.5, -1.5), (2.2, -3.0))
     assert law.damping_exponent == 0.9

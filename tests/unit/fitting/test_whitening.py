@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fieldsid.fitting.kalman import information, transition
+from fieldsid.fitting.kalman import transition
 from fieldsid.fitting.noise import log_likelihood
+from fieldsid.fitting.scoring import information
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.whitening import noise_vector, whiten
 from fieldsid.models.axis import Axis
@@ -94,9 +95,7 @@ def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
 
 
 def informed(log: Record, noise: np.ndarray, place: np.ndarray, residual: np.ndarray):
-    score, fisher = np.zeros(place.size), np.zeros((place.size, place.size))
-    total = information(log.even, log.angle_ok, log.rate_ok, A, K, noise, place, residual[None], score, fisher)
-    return total, score, fisher
+    return information(log, A, K, noise, place, residual)
 
 
 PLACES = {"disturbance": np.array([0, 1, 2, 3]), "coloured": np.array([0, 1, 4, 5, 6]), "both": np.arange(7)}
