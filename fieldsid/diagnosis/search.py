@@ -12,10 +12,11 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with
 from fieldsid.diagnosis.laws import error_by_law, speed_laws, under_other_law
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
-from fieldsid.diagnosis.worth import ALIKE, WORTH, likelier, pays
+from fieldsid.diagnosis.worth import ALIKE, WORTH, likelier, pays, refines
+from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
-from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.noise import floor_below, floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import carried, ground_of, overlaid, promise_of, shortened, twin_of
@@ -84,6 +85,7 @@ class Search:
             self.report("base model")
             laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
             trial = min((self._base_trial(groups) for groups in laws), key=lambda t: error_by_law(t, self.axis))
+            self._heard(trial)
             families = (self.family,) if self.family else NOISES
             self.told = _at_least(self.floor, TOLD, trial.weights)
             judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
@@ -93,6 +95,10 @@ class Search:
             self._other_law(self.root)
             self._reshape(self.root)
         return self.tried[self.root]
+
+    def _heard(self, trial: Trial) -> None:
+        """Lower the floor to what the sensors show once the motion that a trial follows is taken away."""
+        self.floor = floor_below(self.floor, self.records, residuals_of(trial.problem, trial.x))
 
     def _base_trial(self, groups: Groups) -> Trial:
         layout = layout_of(self.records, self.axis, (), groups)
@@ -238,7 +244,7 @@ class Search:
             if not likelier(known, best):
                 break
             best = with_free_run(best, self.floor)
-            if not pays(known, best):
+            if not refines(known, best):
                 break
             self.tried[key] = best
 
@@ -254,6 +260,7 @@ class Search:
                     return self.best()
                 break
             current = self._swapped(paying) if size else paying
+            self._heard(current.judged.trial)
             if self._turn(current):
                 return self.best()
             if not self.asks_for_more(current):

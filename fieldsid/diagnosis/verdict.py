@@ -68,13 +68,13 @@ def worse_unseen(search: Search, h: Hypothesis) -> float:
 
 
 def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
-    """Return the effects of a hypothesis that were not known before, the one that says most alone first."""
+    """Return the effects of a hypothesis that were not known before, the one whose lack costs most on unseen runs first."""
 
-    def alone(name: str) -> float:
-        single = search.tried.get(search.root | {name})
-        return single.score if single is not None else -float("inf")
+    def lack(name: str) -> float:
+        without = search.tried.get(frozenset(h.names) - {name})
+        return without.judging.mean if without is not None else 0.0
 
-    return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -alone(n)))
+    return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -lack(n)))
 
 
 def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:

@@ -1,8 +1,8 @@
 """The trim moment drifts: moment = drift (t - t_first) / 60, drift in rad/s^2 per minute, t_first the run's first sample.
 
 Flooding, a shifting battery or a cooling servo does this; the trim itself is that of the run's start. Positive
-drift turns toward positive angle. In its other form it levels off: drift (1 - exp(-levelling t)) / levelling.
-Source: Fossen 2011, section 4.1 (restoring moment of a moving centre of gravity).
+drift turns toward positive angle. In its other form it levels off: drift (1 - exp(-levelling t)) / levelling, or gathers
+pace where levelling is negative. Source: Fossen 2011, section 4.1 (restoring moment of a moving centre of gravity).
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from fieldsid.models.record import Record
 
 MINUTE_S = 60.0
 SLOWEST = 1e-6
-"""Rate of levelling off in 1/s below which a drift is steady."""
+"""Rate of levelling off in 1/s, of either sign, below which a drift is steady."""
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the drifting moment, (n,) rad/s^2."""
     since, rate = record.time - record.time[0], values.get("levelling", 0.0)
-    grown = since if rate <= SLOWEST else -np.expm1(-rate * since) / rate
+    grown = since if abs(rate) <= SLOWEST else -np.expm1(-rate * since) / rate
     return Terms(moment=values["drift"] * grown / MINUTE_S)
 
 
@@ -39,10 +39,17 @@ EFFECT = Effect(
     terms=terms,
     forms=(
         Form(
-            "it levels off",
+            "it levels off, or gathers pace",
             (
                 Coefficient(
-                    "levelling", "1/s", 0.0, 0.5, 0.03, scan=(0.015, 0.05), step=1e-3, says="rate at which the drift dies out"
+                    "levelling",
+                    "1/s",
+                    -0.1,
+                    0.5,
+                    0.03,
+                    scan=(-0.02, 0.015, 0.05),
+                    step=1e-3,
+                    says="rate at which the drift dies out",
                 ),
             ),
         ),

@@ -67,6 +67,22 @@ def floor_of(records: Sequence[Record]) -> Noise:
     return Noise(max(angle, SMALLEST_ANGLE), max(rate, SMALLEST_RATE))
 
 
+def floor_below(floor: Noise, records: Sequence[Record], residuals: Sequence[FloatArray]) -> Noise:
+    """Return a floor (white, both channels), lowered to what the third differences of a model's residuals [(2, n)] show.
+
+    Where a vehicle answers within a few samples the signals' own differences show its motion besides the noise; most of
+    that is gone from what a model leaves.
+    """
+    angle = _pooled([white_floor(e[0], r.angle_ok) for e, r in zip(residuals, records, strict=True)])
+    rate = _pooled([white_floor(e[1], r.rate_ok) for e, r in zip(residuals, records, strict=True)])
+    return Noise(
+        *(
+            min(was, max(now, least)) if now > 0.0 else was
+            for was, now, least in ((floor.angle, angle, SMALLEST_ANGLE), (floor.rate, rate, SMALLEST_RATE))
+        )
+    )
+
+
 def _pooled(values: list[float]) -> float:
     known = [v for v in values if np.isfinite(v)]
     return float(np.sqrt(np.mean(np.square(known)))) if known else 0.0
