@@ -31,13 +31,16 @@ def line_of_two_pieces(bend: float, first: float, middle: float, last: float) ->
 
 def bend(x: FloatArray, blend: float) -> FloatArray:
     """Return max(x, 0), its corner rounded over about `blend` to either side: (x + sqrt(x^2 + blend^2)) / 2."""
+    if blend == 0.0:
+        return np.maximum(x, 0.0)
     return np.asarray(0.5 * (x + np.hypot(x, blend)))
 
 
 def area_of_bend(x: FloatArray, blend: float) -> FloatArray:
     """Return an antiderivative of `bend`."""
-    round_part = 0.0 if blend == 0.0 else blend**2 * np.arcsinh(x / blend)
-    return np.asarray(0.25 * (x * x + x * np.hypot(x, blend) + round_part))
+    if blend == 0.0:
+        return np.asarray(0.5 * x * np.maximum(x, 0.0))
+    return np.asarray(0.25 * (x * x + x * np.hypot(x, blend) + blend**2 * np.arcsinh(x / blend)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,9 @@ def through_map(path: FinPath, value: Map, area: Map) -> FinPath:
     """
     change = path.end - path.start
     moves = np.abs(change) > STRAIGHT_RAD
+    if not moves.any():
+        held = value(path.mean)
+        return FinPath(held, held)
     safe = np.where(moves, change, 1.0)
     mean = np.where(moves, (area(path.end) - area(path.start)) / safe, value(path.mean))
     half = 0.5 * (value(path.end) - value(path.start))

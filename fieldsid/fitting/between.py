@@ -112,20 +112,24 @@ class _TimedRun:
 
     def record_with(self, times: FloatArray) -> Record:
         """Return the record with its commands given so much before their samples."""
-        record = self.problem.records[0]
-        early = np.full(len(record), times[-1])
+        return replace(self.problem.records[0], early=self.early(times))
+
+    def early(self, times: FloatArray) -> FloatArray:
+        """Return by how much before its sample each command was given, (n,) s."""
+        early = np.full(len(self.problem.records[0]), times[-1])
         early[self.jumps] = times[:-1]
-        return replace(record, early=early)
+        return early
 
     def residual(self, times: FloatArray) -> FloatArray:
         """Return measured minus simulated, (2, n)."""
         return Problem((self.record_with(times),), self.problem.layout).residual(self.x, 0)[0]
 
     def slopes(self) -> FloatArray:
-        """Return the change of the residual by each time, (K + 1, 2, n), from half an interval."""
-        half = 0.5 * self.most
-        logged = self.residual(0.0 * half)
-        return np.stack([(self.residual(one * half) - logged) / (one @ half) for one in np.eye(half.size)])
+        """Return the change of the residual by each time, (K + 1, 2, n), to first order in what half an interval does."""
+        half, record = 0.5 * self.most, self.problem.records[0]
+        logged = Problem((self.record_with(0.0 * half),), self.problem.layout)
+        moved = logged.along(self.x, 0, [record.given(self.early(t)) for t in np.diag(half)])
+        return -moved * record.ok / half[:, None, None]
 
     def most_gain(self, slopes: FloatArray) -> float:
         """Return the log likelihood, roughly, that times free of bounds gain over one shift, to first order: no less."""

@@ -132,7 +132,8 @@ def descend(
         trial[index] = np.clip(x[index] + step, low, high)
         moved = trial[index] - x[index]
         expected = float(2 * gradient @ moved - moved @ normal @ moved)
-        new, equations = hill.at(trial)
+        # the first step is hardly ever refused: its equations come with its cost
+        new, equations = hill.at(trial, whole=count == 1 and expected > tolerance * cost)
         if new < cost:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x = trial
@@ -183,10 +184,13 @@ class _Hill:
         pull = self.prior.precision * (self.prior.centre - x)
         return cost + self.prior.cost(x), normal + np.diag(self.prior.precision[index]), gradient + pull[index]
 
-    def at(self, x: FloatArray) -> tuple[float, tuple[FloatArray, FloatArray] | None]:
-        """Return the cost at x, with the normal equations where they come with it."""
-        if self.lean is not None:
-            cost, normal, gradient = self.linear(x)
+    def at(self, x: FloatArray, *, whole: bool) -> tuple[float, tuple[FloatArray, FloatArray] | None]:
+        """Return the cost at x, with the normal equations where they are wanted or come with it."""
+        if self.lean is not None or (whole and not self.long):
+            try:
+                cost, normal, gradient = self.linear(x)
+            except EffectError:
+                return float("inf"), None
             return cost, (normal, gradient)
         return cost_of(self.problem, x, self.noise, self.held) + (0.0 if self.prior is None else self.prior.cost(x)), None
 

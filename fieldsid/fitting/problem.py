@@ -11,7 +11,7 @@ from fieldsid.fitting.layout import START_NAMES, Layout, group_name, layout_of
 from fieldsid.fitting.pushes import Pushes
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Effect, Motion, Values
+from fieldsid.models.effect import Effect, FinPath, Motion, Values
 from fieldsid.models.record import Record, first_part
 from fieldsid.models.signal_path import (
     Assembled,
@@ -140,6 +140,10 @@ class Problem:
         shown = pushes.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])
         _difference(self.records[run], shown, stack[0])
         return RunResult(shown.angle, shown.rate, slots, stack, pushes.base)
+
+    def along(self, x: FloatArray, run: int, commanded: Sequence[FinPath]) -> FloatArray:
+        """Return how one run's free run would move with each of K other commands, to first order, (K, 2, n)."""
+        return self._pushes(x, run, ())[1].along(commanded)
 
     def pieces(
         self, x: FloatArray, run: int, free: Sequence[int], length: int

@@ -11,7 +11,7 @@ from fieldsid.fitting.layout import START_NAMES, Layout
 from fieldsid.logs.run import FloatArray
 from fieldsid.models import kernels
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Coefficient, Core, Effect, Motion, Values
+from fieldsid.models.effect import Coefficient, Core, Effect, FinPath, Motion, Values
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import (
     Assembled,
@@ -80,6 +80,28 @@ class Pushes:
             start, d_start = out[-1].copy(), np.column_stack([sens[:, :, -1], np.zeros(len(slots))])
             end = part.stop + 1 if part.stop == last else part.stop
             yield slice(first, end), out[: end - first], sens[:, :, : end - first]
+
+    def along(self, commanded: Sequence[FinPath]) -> FloatArray:
+        """Return how angle and rate would move, (K, 2, n), to first order, with each of K other commands, sensors included."""
+        a, count = self.arrays, len(commanded)
+        paths = [fin_path(self.record, self.layout.effects, self.values, c) for c in commanded]
+        own = lift(a.fin, a.terms)
+
+        def push_of(path: FinPath) -> Push:
+            other, mean = lift(path, a.terms), path.mean - a.fin.mean
+
+            def push(part: slice, row: FloatArray) -> None:
+                for place, new, old in zip(MOMENT, other, own, strict=True):
+                    row[:, place] = self.base.authority * (new[part] - old[part])
+                row[:, CROSS_PUSH] = a.core.cross_fin * mean[part]
+
+            return push
+
+        rows, whole = [push_of(p) for p in paths], slice(0, len(self.record) - 1)
+        d_c, sens = np.zeros((count, len(kernels.CONSTANTS))), np.empty((count, 2, len(self.record)))
+        out = self._march(whole, rows, np.arange(count, dtype=float), d_c, self.start, np.zeros((count, 3)), sens)
+        self.through_sensors(Motion(out[:, 0], out[:, 1]), (), sens)
+        return sens
 
     def _directions(self, slots: tuple[int, ...]) -> tuple[list[Push], FloatArray, FloatArray, FloatArray]:
         """Return what the slots push: drives of a part, whose they are (P,), constants (P, 11), initial states (P, 3)."""

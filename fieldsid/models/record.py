@@ -73,13 +73,15 @@ class Record:
     @property
     def commanded(self) -> FinPath:
         """The fin as logged, as a path over the intervals."""
+        return self.given(self.early)
+
+    def given(self, early: FloatArray | None) -> FinPath:
+        """Return the path of the fin with its held commands given so much before their samples, (n,) s."""
         if not self.fin_is_held:
             return FinPath(self.fin[:-1], self.fin[1:])
-        if self.early is None:
+        if early is None:
             return FinPath(self.fin[:-1], self.fin[:-1])
-        return _jumping(
-            self.fin, np.clip(self.early[1:] / self.steps, 0.0, 1.0), np.clip(-self.early[:-1] / self.steps, 0.0, 1.0)
-        )
+        return _jumping(self.fin, np.clip(early[1:] / self.steps, 0.0, 1.0), np.clip(-early[:-1] / self.steps, 0.0, 1.0))
 
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""

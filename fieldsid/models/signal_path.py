@@ -49,9 +49,9 @@ class Assembled:
     core: Core
 
 
-def fin_path(record: Record, effects: Sequence[Effect], values: Values) -> FinPath:
-    """Return the fin angle over the intervals after the actuator effects, in their order."""
-    path = record.commanded
+def fin_path(record: Record, effects: Sequence[Effect], values: Values, commanded: FinPath | None = None) -> FinPath:
+    """Return the fin angle over the intervals after the actuator effects, in their order, of the log's or another command."""
+    path = record.commanded if commanded is None else commanded
     for effect in sorted((e for e in effects if e.fin is not None), key=lambda e: e.order):
         if effect.fin is not None:
             path = effect.fin(path, values, record)
