@@ -20,6 +20,7 @@ import numpy.typing as npt
 from fieldsid.fitting.layout import START_NAMES
 from fieldsid.fitting.noise import estimate_noise
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.products import least_squares
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
@@ -139,7 +140,7 @@ class _TimedRun:
         left = []
         for columns in (slopes.sum(axis=0, keepdims=True), slopes):
             known = (np.concatenate([columns, self.starts]) * weight[:, None]).reshape(-1, flat.size)
-            left.append((flat - np.linalg.lstsq(known.T, flat, rcond=1e-9)[0] @ known).reshape(logged.shape))
+            left.append((flat - least_squares(known, flat) @ known).reshape(logged.shape))
         return _rough_gain(self.problem.records[0], *left)
 
     def best(self, slopes: FloatArray, shape: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -176,7 +177,7 @@ class _TimedRun:
             noise, _ = estimate_noise([record], [(base.damping, base.stiffness)], [residual], "disturbance", noise)
             white, logs = whiten(record, noise, base.damping, base.stiffness, np.concatenate([residual[None], self.starts]))
             flat = white.reshape(white.shape[0], -1)
-            move = np.linalg.lstsq(flat[1:].T, flat[0], rcond=1e-9)[0]
+            move = least_squares(flat[1:], flat[0])
             residual = residual - np.tensordot(move, self.starts, axes=1)
             best = max(best, -0.5 * (logs + float(np.sum((flat[0] - move @ flat[1:]) ** 2))))
         return best
@@ -186,7 +187,7 @@ class _TimedRun:
         if not np.isfinite(residual).all():
             return residual
         flat = (self.starts * weight[:, None]).reshape(self.starts.shape[0], -1)
-        move = np.linalg.lstsq(flat.T, (residual * weight[:, None]).ravel(), rcond=1e-9)[0]
+        move = least_squares(flat, (residual * weight[:, None]).ravel())
         return np.asarray(residual - np.tensordot(move, self.starts, axes=(0, 0)))
 
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Layout, group_name, layout_of
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.products import least_squares
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
@@ -246,10 +247,8 @@ def projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, F
     step = np.zeros(c.shape[1])
     if not useful.any():
         return float(left @ left), step
-    scaled = free[:, useful] / size[useful]
-    solved = np.linalg.lstsq(scaled, left, rcond=1e-6)[0]
-    after = left - scaled @ solved
-    step[useful] = solved / size[useful]
+    step[useful] = least_squares(free[:, useful].T, left)
+    after = left - free @ step
     return float(after @ after), step
 
 
