@@ -7,8 +7,9 @@ from itertools import product
 
 import numpy as np
 
-from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import judge
+from fieldsid.diagnosis.worth import asks_for_more, likelier, refines
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.layout import Layout
@@ -22,6 +23,19 @@ from fieldsid.models.record import Record
 LIKELY, GLIMPSE, KEPT, ROUNDS, COARSE = 6, 2, 3, 6, 1e-3
 """Starts of a form that are followed, for how many rounds, how many of them go on, for how many more before the best is
 judged; and the share of the cost a round must gain."""
+
+
+def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise) -> Hypothesis:
+    """Return a hypothesis with its effects in other forms, the best one first, as long as that pays and something is left."""
+    while asks_for_more(h, floor):
+        best = max(in_other_forms(h, told, family), key=lambda other: other.score, default=h)
+        if not likelier(h, best):
+            break
+        best = with_free_run(best, floor)
+        if not refines(h, best):
+            break
+        h = best
+    return h
 
 
 def in_other_forms(h: Hypothesis, told: Noise, family: str) -> Iterator[Hypothesis]:

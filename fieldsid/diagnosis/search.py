@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fieldsid.diagnosis.forms import in_other_forms
+from fieldsid.diagnosis.forms import reshaped
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.laws import error_by_law, speed_laws, under_other_law
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
-from fieldsid.diagnosis.worth import ALIKE, WORTH, likelier, pays, refines
+from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, likelier, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
@@ -40,8 +40,8 @@ LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST, PAIR = 4, 2
 """Effects a hypothesis has at most, and those whose parts were all tried on the way to it."""
-CLEAN, TWINS = 1.02, 1.0
-"""Error over the floor up to which nothing is left, and log likelihood within which two starts of one hypothesis are alike."""
+TWINS = 1.0
+"""Log likelihood within which two starts of one hypothesis are alike."""
 
 
 @dataclass(slots=True)
@@ -67,6 +67,7 @@ class Search:
     grown_from: set[frozenset[str]] = field(default_factory=set)
     flown_from: set[frozenset[str]] = field(default_factory=set)
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
+    shaped: dict[frozenset[str], float] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _text: None
 
     @property
@@ -237,16 +238,11 @@ class Search:
             self.tried[key] = with_free_run(other, self.floor)
 
     def _reshape(self, key: frozenset[str]) -> None:
-        """Put a hypothesis's effects into other forms than the textbook's, the best one first, as long as that pays."""
-        while self.asks_for_more(self.tried[key]):
-            known = self.tried[key]
-            best = max(in_other_forms(known, self.told, self.family), key=lambda h: h.score, default=known)
-            if not likelier(known, best):
-                break
-            best = with_free_run(best, self.floor)
-            if not refines(known, best):
-                break
-            self.tried[key] = best
+        """Put a hypothesis's effects into other forms than the textbook's, unless that was tried from where it is."""
+        known = self.tried[key]
+        if known.score > self.shaped.get(key, -np.inf) + SETTLED:
+            self.tried[key] = reshaped(known, self.told, self.family, self.floor)
+            self.shaped[key] = self.tried[key].score
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at."""
@@ -254,7 +250,8 @@ class Search:
         for size in range(LARGEST):
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
-            paying = next((c for c in children if pays(current, c)), None) or self._two_at_once(current, children)
+            paying = next((c for c in children if pays(current, c)), None)
+            paying = paying or (None if size else self._two_at_once(current, children))
             if paying is None:
                 if self._turn(current):
                     return self.best()
@@ -285,6 +282,7 @@ class Search:
         else:
             return False
         self.tried.clear()
+        self.shaped.clear()
         self.grown_from.clear()
         return True
 
@@ -373,7 +371,7 @@ class Search:
 
     def asks_for_more(self, h: Hypothesis) -> bool:
         """Whether something is left above the noise, be it a disturbance or not."""
-        return max(self.error(h), h.train.over(self.floor)) > CLEAN
+        return asks_for_more(h, self.floor)
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

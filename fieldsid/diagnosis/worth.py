@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.models.model import Noise
 
 WORTH = 6.0
 """Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
@@ -14,6 +15,8 @@ MATTERS = 0.92
 exactly what a model has them to be: what that leaves is a few percent of the noise."""
 REFINES = 0.97
 """The same for another form of an effect that has been named."""
+CLEAN = 1.02
+"""Error over the noise floor up to which nothing is left."""
 ALIKE = 1.03
 """Hypotheses predict alike within this factor of each other's error."""
 MATTERS_MORE = 0.02
@@ -24,6 +27,11 @@ def pays(without: Hypothesis, with_: Hypothesis) -> bool:
     """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
     matters = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
     return likelier(without, with_) and with_.judging.mean < matters * without.judging.mean
+
+
+def asks_for_more(h: Hypothesis, floor: Noise) -> bool:
+    """Whether a hypothesis leaves something above the noise floor, be it a disturbance or not."""
+    return max(h.judging.over(floor), h.train.over(floor)) > CLEAN
 
 
 def refines(plain: Hypothesis, formed: Hypothesis) -> bool:
