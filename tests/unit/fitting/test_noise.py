@@ -8,7 +8,7 @@ from truth.noise import ar1
 from truth.paper import YAW, paper_run
 
 from fieldsid.fitting.layout import layout_of
-from fieldsid.fitting.noise import FAMILIES, estimate_noise, white_floor
+from fieldsid.fitting.noise import FAMILIES, estimate_noise, floor_below, floor_of, white_floor
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise, lines_of, restricted_likelihood
 from fieldsid.fitting.small_sample import moved, noise_spread, widened
@@ -39,6 +39,27 @@ def test_kinks_and_gaps_do_not_count_as_noise():
 
 def test_too_few_samples_in_a_row_give_no_floor():
     assert np.isnan(white_floor(np.zeros(15), np.ones(15, dtype=bool)))
+
+
+def test_the_floor_behind_a_fast_vehicles_motion_is_its_sensors_noise():
+    """At 10 Hz a hull of a third of a second shows its motion in the differences; what a rough model leaves does not."""
+    rng, n, small = np.random.default_rng(3), 600, 1e-3
+    clock, fin = np.arange(n) * 0.1, np.repeat(rng.choice([-0.2, 0.2], n // 6), 6)
+    rate, angle = np.zeros(n), np.zeros(n)
+    for i in range(n - 1):
+        to, gone = 2.0 * fin[i], -np.expm1(-0.3)
+        rate[i + 1] = rate[i] + (to - rate[i]) * gone
+        angle[i + 1] = angle[i] + 0.1 * to + (rate[i] - to) * gone / 3.0
+    noisy = (v + small * rng.standard_normal(n) for v in (angle, rate))
+    log = dict(zip(("yaw_rad", "yaw_rate_rad_s"), noisy, strict=True)) | {"rudder_rad": fin}
+    record = record_of(Run("fast", clock, log), Axis.YAW)
+    heard = floor_of([record])
+    assert heard.rate > 3.0 * small
+    rough = [np.stack([record.angle - 0.98 * angle, record.rate - 0.98 * rate])]
+    below = floor_below(heard, [record], rough)
+    assert (below.angle, below.rate) == (pytest.approx(small, rel=0.15), pytest.approx(small, rel=0.15))
+    louder = [np.stack([record.angle, record.rate]) + rng.standard_normal((2, n))]
+    assert floor_below(heard, [record], louder) == heard
 
 
 def problem(coloured=0.0, gust=0.0, seed=3):

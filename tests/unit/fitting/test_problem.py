@@ -16,6 +16,7 @@ from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.lean import lean
 from fieldsid.fitting.predict import frozen_problem
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.products import least_squares
 from fieldsid.fitting.start import start_vector
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
@@ -113,6 +114,32 @@ def test_a_bent_fins_trim_follows_what_changes_the_authority_within_a_run():
         held = {s.name: x[i] for i, s in enumerate(problem.layout.slots) if s.run == run}
         start = np.array([held.get(s.name, v) for s, v in zip(ours.layout.slots, start, strict=True)])
         np.testing.assert_allclose(ours.residual(start, 0)[0], problem.residual(x, run)[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("effects", [(), ("servo_lag", "sway_coupling"), ("quadratic_damping", "gyro_scale")], ids=str)
+def test_another_command_moves_the_free_run_as_its_tangent_says(effects):
+    problem = problem_of([record(YAW[1], early=np.zeros(660))], effects)
+    x, log = moved_start(problem), problem.records[0]
+    jumps = np.flatnonzero(np.diff(log.fin)) + 1
+    steps = [np.where(np.arange(660) == j, 1e-3, 0.0) for j in jumps[:3]]
+    logged = problem.residual(x, 0)[0]
+    for early, mine in zip(steps, problem.along(x, 0, [log.given(e) for e in steps]), strict=True):
+        other = Problem((replace(log, early=early),), problem.layout)
+        slope = logged - other.residual(x, 0)[0]
+        assert np.abs(mine - slope).max() < 1e-3 * np.abs(slope).max()
+
+
+def test_least_squares_by_products_are_those_of_the_rows_themselves():
+    rng = np.random.default_rng(4)
+    columns = rng.standard_normal((5, 400)) * np.array([1.0, 1e-6, 1e4, 1.0, 0.0])[:, None]
+    target = rng.standard_normal(400)
+    alike = columns[:4] / np.linalg.norm(columns[:4], axis=1)[:, None]
+    best = np.linalg.lstsq(alike.T, target, rcond=None)[0] @ alike
+    np.testing.assert_allclose(least_squares(columns, target) @ columns, best, atol=1e-12)
+    columns[3] = columns[0]
+    twice = least_squares(columns, target)
+    assert twice[3] == pytest.approx(twice[0])
+    assert twice[4] == 0.0
 
 
 def test_a_hidden_state_that_is_not_driven_starts_at_zero():
