@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,8 +11,10 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import Trial, judge
 from fieldsid.diagnosis.worth import WORTH
 from fieldsid.fitting.layout import Groups, speed_groups
-from fieldsid.fitting.starts import by_other_law
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.starts import by_other_law, under_groups
 from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
+from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -37,15 +40,24 @@ def error_by_law(trial: Trial, axis: Axis) -> float:
 
 
 def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: bool) -> Hypothesis | None:
-    """Return a hypothesis under the other law of the speed, see `by_other_law`, where that has more evidence.
+    """Return a hypothesis under another law of the speed, see `by_other_law`, where that has more evidence.
 
-    Speeds that share an authority pin it down far better; a group that is off the law shows once what hid it is found.
+    Speeds that share an authority pin it down far better; a group that is off the law shows once what hid it is found. So
+    does a run that was not flown at its group's speed.
     """
     trial = h.judged.trial
     groups = trial.problem.layout.groups
+    if groups.snapped and asks_for_more:
+        own = speed_groups(trial.problem.records, trim_of_fin=groups.trim_of_fin)
+        own = replace(groups, snapped=False, run_speeds=own.run_speeds)
+        return _better(h, *under_groups(trial.problem, trial.x, own), told, family, 0.0)
     one_speed = len(groups.speeds) == 1
     if (one_speed or groups.by_law) and not (asks_for_more and np.ptp(groups.run_speeds) > 0.0):
         return None
-    problem, x = by_other_law(trial.problem, trial.x)
+    return _better(h, *by_other_law(trial.problem, trial.x), told, family, WORTH if one_speed else 0.0)
+
+
+def _better(h: Hypothesis, problem: Problem, x: FloatArray, told: Noise, family: str, worth: float) -> Hypothesis | None:
+    """Return what a problem of the same effects comes to where it has that much more evidence."""
     other = hypothesis_of(judge(problem, x, h.judged.noise, told, family), h.validation)
-    return other if other.score > h.score + (WORTH if one_speed else 0.0) else None
+    return other if other.score > h.score + worth else None

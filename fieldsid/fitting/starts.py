@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.fitting.descent import cost_of
-from fieldsid.fitting.layout import Layout, group_name, layout_of
+from fieldsid.fitting.layout import Groups, Layout, group_name, layout_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.products import least_squares
 from fieldsid.fitting.whitening import whiten
@@ -82,10 +82,14 @@ def by_other_law(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
     At several speeds the groups share one authority, or have one each. At one, of which the runs are a little off, the
     damping goes with it or stays.
     """
+    old = problem.layout.groups
+    several = len(old.speeds) > 1
+    return under_groups(problem, x, replace(old, by_law=not old.by_law) if several else replace(old, exponent=1.0 - old.exponent))
+
+
+def under_groups(problem: Problem, x: FloatArray, groups: Groups) -> tuple[Problem, FloatArray]:
+    """Return a problem with its runs' speeds taken in another way, and x carried over."""
     old = problem.layout
-    several = len(old.groups.speeds) > 1
-    other = {"by_law": not old.groups.by_law} if several else {"exponent": 1.0 - old.groups.exponent}
-    groups = replace(old.groups, **other)
     new = layout_of(problem.records, old.axis, old.effects, groups)
     authority = NAMES[old.axis].authority
     shared = float(x[old.names.index(authority)])
