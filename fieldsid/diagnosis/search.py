@@ -245,25 +245,32 @@ class Search:
             self.shaped[key] = self.tried[key].score
 
     def best(self) -> Hypothesis:
-        """Return the hypothesis the search ends at."""
-        current = self.base()
-        for size in range(LARGEST):
+        """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
+        best = self.base()
+        while frozenset(best.names) not in self.grown_from and len(best.names) < len(self.known) + LARGEST:
+            current = self._climbed(best)
+            if current is None:
+                return self.best()
+            found = self._pruned(self._thinned(current))
+            best = max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
+            if not self.asks_for_more(best):
+                break
+        return best
+
+    def _climbed(self, current: Hypothesis) -> Hypothesis | None:
+        """Return where the additions that pay lead to from a hypothesis, None where all has to begin anew."""
+        for size in range(len(current.names) - len(self.known), LARGEST):
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if pays(current, c)), None)
             paying = paying or (None if size else self._two_at_once(current, children))
-            if paying is None:
-                if self._turn(current):
-                    return self.best()
-                break
-            current = self._swapped(paying) if size else paying
+            current = (self._swapped(paying) if size else paying) if paying else current
             self._heard(current.judged.trial)
             if self._turn(current):
-                return self.best()
-            if not self.asks_for_more(current):
+                return None
+            if paying is None or not self.asks_for_more(current):
                 break
-        found = self._pruned(self._thinned(current))
-        return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
+        return current
 
     def _turn(self, found: Hypothesis) -> bool:
         """Begin anew under the other noise, or the other law of the trim, where that fits a hypothesis better, each once.
@@ -333,17 +340,13 @@ class Search:
         What is left out is judged from the numbers of the whole; a pair's parts were tried on the way to it, though not in
         the forms that the pair has taken since.
         """
-        while len(found.names) > len(self.known) + (1 if self._is_shaped(found) else PAIR):
+        while len(found.names) > len(self.known) + (1 if any(e not in self.catalogue for e in found.effects) else PAIR):
             smaller = [self._without(found, e) for e in found.effects if e.name not in self.known]
             idle = [h for h in smaller if not pays(h, found)]
             if not idle:
                 break
             found = max(idle, key=lambda h: h.score)
         return found
-
-    def _is_shaped(self, h: Hypothesis) -> bool:
-        """Whether one of a hypothesis's effects is in another form than the textbook's."""
-        return any(e not in self.catalogue for e in h.effects)
 
     def _without(self, h: Hypothesis, gone: Effect) -> Hypothesis:
         """Return a hypothesis without one of its effects, tried from the numbers it has with it."""
