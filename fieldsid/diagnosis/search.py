@@ -59,6 +59,8 @@ class Search:
     turned: bool = False
     trim_of_fin: bool | None = None
     told: Noise = field(init=False)
+    is_noiseless: bool = False
+    """Whether the logs show so little noise that the base errs by a hundred times it."""
 
     def __post_init__(self) -> None:
         """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
@@ -75,11 +77,6 @@ class Search:
         """The effects of the base."""
         return frozenset(self.known)
 
-    @property
-    def is_noiseless(self) -> bool:
-        """Whether the logs show so little noise that the base errs by a hundred times it."""
-        return self.told != self.floor
-
     def base(self) -> Hypothesis:
         """Return the hypothesis of the known effects alone."""
         if self.root not in self.tried:
@@ -89,6 +86,7 @@ class Search:
             self._heard(trial)
             families = (self.family,) if self.family else NOISES
             self.told = _at_least(self.floor, TOLD, trial.weights)
+            self.is_noiseless = self.told != self.floor
             judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)

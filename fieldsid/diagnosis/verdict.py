@@ -19,9 +19,11 @@ RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
 BEYOND_CHANCE = 2e-2
 """p-value below which what is left is not a disturbance, where nothing was found."""
-BESIDE = ((0.7, 1e-6), (0.5, 1e-3))
+BESIDE = ((0.7, 1e-6), (0.5, 1e-3), (0.3, BEYOND_CHANCE))
 """Share of the excess error an effect must explain to be named where what is left is less likely than this p-value: a form
 is never exact, but the less it explains the less it may leave."""
+BESIDE_MUCH = ((0.97, BESIDE[0][1]),)
+"""The same where what is left is beyond any sea: most of a base that is far off is explained by whatever bends."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
 FAINT, STORM = 2.0, 4.0
@@ -52,7 +54,7 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
         odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
     share = explained(search, found)
-    if visible and any(left.p < p and share < enough for enough, p in BESIDE):
+    if visible and any(left.p < p and share < enough for enough, p in (*BESIDE, *(BESIDE_MUCH if error > STORM else ()))):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
@@ -68,11 +70,14 @@ def worse_unseen(search: Search, h: Hypothesis) -> float:
 
 
 def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
-    """Return the effects of a hypothesis that were not known before, the one whose lack costs most on unseen runs first."""
+    """Return the effects of a hypothesis that were not known before, the one whose lack costs most on unseen runs first.
+
+    What is left without one was tried unless it promised nothing.
+    """
 
     def lack(name: str) -> float:
         without = search.tried.get(frozenset(h.names) - {name})
-        return without.judging.mean if without is not None else 0.0
+        return without.judging.mean if without is not None else float("inf")
 
     return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -lack(n)))
 

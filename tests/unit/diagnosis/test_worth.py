@@ -61,3 +61,9 @@ def test_the_effect_whose_lack_costs_most_on_unseen_runs_is_named_first():
     likely, useful = hypothesis("speed_varying", gain=60.0, over=3.0), hypothesis("current", gain=50.0, over=1.3)
     search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, likely, useful)})
     assert added(search, both) == ("current", "speed_varying")
+
+
+def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
+    both, alone = hypothesis("speed_varying", "stall", gain=90.0, over=1.0), hypothesis("stall", gain=80.0, over=1.2)
+    search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, alone)})
+    assert added(search, both) == ("stall", "speed_varying")
