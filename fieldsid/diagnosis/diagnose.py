@@ -58,9 +58,12 @@ def diagnose(
     found = work.best()
     left = remainder_of(found)
     verdict = verdict_of(work, found, left)
-    other = freely(work) if verdict.word == "unexplained" and work.is_noiseless else None
-    if other is not None and explained(work, other) > MOSTLY:
-        found, left, verdict = other, remainder_of(other), Verdict("effect", added(work, other))
+    if verdict.word == "unexplained" and work.is_noiseless:
+        # from the first base: one begun anew under the other noise is that of a search that has led nowhere
+        first = search(learned, judged, axis, catalogue, known=known, report=report)
+        other = freely(first)
+        if other is not None and explained(first, other) > MOSTLY:
+            work, found, left, verdict = first, other, remainder_of(other), Verdict("effect", added(first, other))
     floor = shown_floor(work.floor, found.judged.noise)
     return _said(work, found, verdict, headline(work, verdict, found, left, floor), floor, skipped, notes)
 

@@ -19,8 +19,7 @@ from fieldsid.diagnosis.trial import Trial, judge, refine
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import Promise, ground_of, promise_of, shortened
 
-TRIED = 5
-LARGEST = 3
+TRIED, FRONT, LARGEST = 5, 2, 3
 ROUNDS, FINE = 200, 1e-7
 """Rounds of each free run, and the share of its sum of squares a round must gain: the valleys are long."""
 BETTER = 0.95
@@ -28,19 +27,28 @@ BETTER = 0.95
 
 
 def freely(search: Search) -> Hypothesis | None:
-    """Return the hypothesis that the free run on unseen runs leads to, None where no effect makes it better."""
+    """Return the hypothesis that the free run on unseen runs leads to, None where no effect makes it better.
+
+    The best two of every size are grown: the first step down need not be the one the valley is reached by.
+    """
     base, unseen = search.base(), bool(search.validation)
-    current, errors = base.shown, base.errors
-    while len(current.effects) < LARGEST + len(search.known):
-        better = [(_fall(new, errors, unseen=unseen), trial, new) for trial, new in _tried(search, current)]
-        fall, trial, new = min(better, key=lambda b: b[0], default=(1.0, current, errors))
-        if fall > BETTER:
+    lowest, best, front = 1.0, base.shown, [(base.shown, base.errors)]
+    for _ in range(LARGEST):
+        grown: dict[frozenset[str], tuple[float, Trial, Pair]] = {}
+        for current, errors in front:
+            for trial, new in _tried(search, current):
+                way, fall = frozenset(trial.names), _fall(new, base.errors, unseen=unseen)
+                if _fall(new, errors, unseen=unseen) <= BETTER and fall < grown.get(way, (1.0,))[0]:
+                    grown[way] = (fall, trial, new)
+        kept = sorted(grown.values(), key=lambda g: g[0])[:FRONT]
+        if not kept or kept[0][0] > BETTER * lowest:
             break
-        current, errors = trial, new
-    if current is base.shown:
+        lowest, best = kept[0][:2]
+        front = [(trial, errors) for _, trial, errors in kept]
+    if best is base.shown:
         return None
-    judged = judge(current.problem, current.x, base.judged.noise, search.told, search.family)
-    return replace(hypothesis_of(judged, search.validation), plain=current)
+    judged = judge(best.problem, best.x, base.judged.noise, search.told, search.family)
+    return replace(hypothesis_of(judged, search.validation), plain=best)
 
 
 def _tried(search: Search, current: Trial) -> list[tuple[Trial, Pair]]:

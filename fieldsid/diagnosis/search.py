@@ -83,10 +83,10 @@ class Search:
             self.report("base model")
             laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
             trial = min((self._base_trial(groups) for groups in laws), key=lambda t: error_by_law(t, self.axis))
-            self._heard(trial)
+            self.is_noiseless = _at_least(self.floor, TOLD, trial.weights) != self.floor
+            self.hear(trial)
             families = (self.family,) if self.family else NOISES
             self.told = _at_least(self.floor, TOLD, trial.weights)
-            self.is_noiseless = self.told != self.floor
             judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)
@@ -95,9 +95,10 @@ class Search:
             self._reshape(self.root)
         return self.tried[self.root]
 
-    def _heard(self, trial: Trial) -> None:
-        """Lower the floor to what the sensors show once the motion that a trial follows is taken away."""
-        self.floor = floor_below(self.floor, self.records, residuals_of(trial.problem, trial.x))
+    def hear(self, trial: Trial) -> None:
+        """Lower the floor to what the sensors show once the motion that a trial follows is taken away, if they show noise."""
+        if not self.is_noiseless:
+            self.floor = floor_below(self.floor, self.records, residuals_of(trial.problem, trial.x))
 
     def _base_trial(self, groups: Groups) -> Trial:
         layout = layout_of(self.records, self.axis, (), groups)
@@ -263,7 +264,7 @@ class Search:
             paying = next((c for c in children if pays(current, c)), None)
             paying = paying or (None if size else self._two_at_once(current, children))
             current = (self._swapped(paying) if size else paying) if paying else current
-            self._heard(current.judged.trial)
+            self.hear(current.judged.trial)
             if self._turn(current):
                 return None
             if paying is None or not self.asks_for_more(current):

@@ -54,7 +54,8 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
         odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
     share = explained(search, found)
-    if visible and any(left.p < p and share < enough for enough, p in (*BESIDE, *(BESIDE_MUCH if error > STORM else ()))):
+    much = error > STORM and not search.is_noiseless
+    if visible and any(left.p < p and share < enough for enough, p in (*BESIDE, *(BESIDE_MUCH if much else ()))):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:

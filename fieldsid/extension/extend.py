@@ -98,6 +98,7 @@ def extend(
     work = search(learned, judged, parent.axis, parts, known=parent.effects, report=report)
     before = base_from(work, parent)
     after = _with_all(work)
+    work.hear(after.judged.trial)
     gain = Gain(
         added=tuple(e.name for e in new),
         before=before.errors,
