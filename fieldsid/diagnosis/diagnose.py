@@ -145,8 +145,8 @@ def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[tuple[Place, ...
         return (), tuple(notes)
     channel = 1 if records[0].rate_ok.any() else 0
     worst = max(shown, key=lambda s: float(np.mean(s.residual[channel] ** 2)))
-    ok = (worst.record.angle_ok, worst.record.rate_ok)[channel]
-    found = places(worst.record.time, worst.residual[channel] ** 2, ok, conditions(worst.record, worst.rate, 0.0))
+    seen, squared = worst.record, worst.residual[channel] ** 2
+    found = places(seen.time, squared, seen.ok[channel], conditions(seen, worst.rate, 0.0))
     return found, tuple(notes)
 
 

@@ -134,8 +134,7 @@ def left_over(problem: Problem, x: FloatArray) -> FloatArray:
     if np.isfinite(residual).all():
         return residual
     r = problem.records[0]
-    channels = ((r.angle, r.angle_ok), (r.rate, r.rate_ok))
-    return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in channels])
+    return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in zip(r.both, r.ok, strict=True)])
 
 
 def with_free_run(h: Hypothesis, floor: Noise, parent: Hypothesis | None = None, known: Sequence[Trial] = ()) -> Hypothesis:

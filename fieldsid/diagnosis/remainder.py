@@ -87,7 +87,7 @@ def _colour(runs: Sequence[Left]) -> float:
     for channel in range(2):
         statistic, freedom = 0.0, 0
         for run in runs:
-            ok = (run.record.angle_ok, run.record.rate_ok)[channel]
+            ok = run.record.ok[channel]
             if ok.sum() > 4 * LAGS:
                 statistic += ljung_box(run.white[channel][ok])
                 freedom += LAGS
@@ -194,7 +194,7 @@ def _bursts(runs: Sequence[Left]) -> tuple[float, int, int, float]:
 
 def _energy(run: Left, channel: int, *, slow: bool) -> tuple[int, FloatArray] | None:
     """Return the degrees of freedom and energies of a run's windows, of all innovations or of their slow part."""
-    if not (run.record.angle_ok, run.record.rate_ok)[channel].any():
+    if not run.record.ok[channel].any():
         return None
     sample = float(np.median(run.record.steps))
     block = max(1, round(WINDOW_S / 8 / sample)) if slow else 1

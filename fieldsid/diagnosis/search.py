@@ -61,16 +61,15 @@ class Search:
     told: Noise = field(init=False)
     is_noiseless: bool = False
     """Whether the logs show so little noise that the base errs by a hundred times it."""
-
-    def __post_init__(self) -> None:
-        """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
-        self.told = self.floor
-
     grown_from: set[frozenset[str]] = field(default_factory=set)
     flown_from: set[frozenset[str]] = field(default_factory=set)
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
     shaped: dict[frozenset[str], float] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _text: None
+
+    def __post_init__(self) -> None:
+        """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
+        self.told = self.floor
 
     @property
     def root(self) -> frozenset[str]:
@@ -232,7 +231,7 @@ class Search:
     def _other_law(self, key: frozenset[str]) -> None:
         """Put a hypothesis under the other law of the speed where that has more evidence."""
         known = self.tried[key]
-        other = under_other_law(known, self.told, self.family, asks_for_more=self.asks_for_more(known))
+        other = under_other_law(known, self.told, self.family, asks_for_more=asks_for_more(known, self.floor))
         if other is not None:
             self.tried[key] = with_free_run(other, self.floor)
 
@@ -252,7 +251,7 @@ class Search:
                 return self.best()
             found = self._pruned(self._thinned(current))
             best = max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
-            if not self.asks_for_more(best):
+            if not asks_for_more(best, self.floor):
                 break
         return best
 
@@ -267,7 +266,7 @@ class Search:
             self.hear(current.judged.trial)
             if self._turn(current):
                 return None
-            if paying is None or not self.asks_for_more(current):
+            if paying is None or not asks_for_more(current, self.floor):
                 break
         return current
 
@@ -295,7 +294,7 @@ class Search:
     def _better_trim(self, found: Hypothesis) -> bool | None:
         """Return the trim's other law where a hypothesis fits better with it, once."""
         trial, layout = found.judged.trial, found.judged.trial.problem.layout
-        if self.trim_of_fin is not None or not self.asks_for_more(found):
+        if self.trim_of_fin is not None or not asks_for_more(found, self.floor):
             return None
         varying = any(e.terms is not None for e in found.effects)
         for trim in possible_trims(speed_groups(self.records), varying=varying):
@@ -370,10 +369,6 @@ class Search:
     def error(self, h: Hypothesis) -> float:
         """Return the free-run error over the noise floor."""
         return h.judging.over(self.floor)
-
-    def asks_for_more(self, h: Hypothesis) -> bool:
-        """Whether something is left above the noise, be it a disturbance or not."""
-        return asks_for_more(h, self.floor)
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

@@ -108,13 +108,11 @@ def _all_stay(gain: FloatArray, last: FloatArray, low: int, high: int) -> bool:
 
 
 @jit
-def _settled_until(
-    steps: FloatArray, angle_ok: npt.NDArray[np.bool_], rate_ok: npt.NDArray[np.bool_], first: int, h: float
-) -> int:
+def _settled_until(steps: FloatArray, ok: npt.NDArray[np.bool_], first: int, h: float) -> int:
     """Return the first sample from `first` on that is not measured in full or not followed by a step of h."""
     n = steps.shape[0] + 1
     i = first
-    while i < n and angle_ok[i] and rate_ok[i] and (i == n - 1 or abs(steps[i] - h) <= 1e-7 * h):
+    while i < n and ok[0, i] and ok[1, i] and (i == n - 1 or abs(steps[i] - h) <= 1e-7 * h):
         i += 1
     return i
 
@@ -222,8 +220,25 @@ def _carry(f: FloatArray, state: FloatArray) -> None:
 
 
 @jit
+def _learnt(
+    own: float, cross: float, own_w: float, other: float, other_w: float, w: float, white: float
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """Return a sample's variance, its gains, and what it leaves of the covariance of (y, p, w), in the order given.
+
+    The sample is of y or of p, which is its own state; the gains are those of its own state, of the other and of w.
+    """
+    var = own + white
+    of_own, of_other, of_w = own / var, cross / var, own_w / var
+    other, other_w, w = other - of_other * cross, other_w - of_other * own_w, w - of_w * own_w
+    return (
+        var, of_own, of_other, of_w,
+        own - of_own * own, cross - of_own * cross, own_w - of_own * own_w, other, other_w, w,
+    )  # fmt: skip
+
+
+@jit
 def _waking(
-    steps: FloatArray, angle_ok: npt.NDArray[np.bool_], rate_ok: npt.NDArray[np.bool_], first: int, last_h: float,
+    steps: FloatArray, ok: npt.NDArray[np.bool_], first: int, last_h: float,
     a: float, k: float, noise: FloatArray, series: FloatArray, out: FloatArray, spreads: FloatArray,
     cov: FloatArray, f: FloatArray, gain: FloatArray, spread: FloatArray, state: FloatArray,
 ) -> tuple[int, float, float]:  # fmt: skip
@@ -235,36 +250,29 @@ def _waking(
     n, log_sum, settled, i = steps.shape[0] + 1, 0.0, 0, first
     c00, c01, c02, c11, c12, c22 = cov[0, 0], cov[0, 1], cov[0, 2], cov[1, 1], cov[1, 2], cov[2, 2]
     a0, a1, a2, b0, b1, b2 = gain[0, 0], gain[0, 1], gain[0, 2], gain[1, 0], gain[1, 1], gain[1, 2]
-    angle_white, rate_white = noise[0] ** 2, noise[1] ** 2
     while i < n and settled < SETTLED:
-        still = angle_ok[i] and rate_ok[i]
+        still = ok[0, i] and ok[1, i]
         spreads[0, i] = spreads[1, i] = 1.0
-        if angle_ok[i]:
-            var = c00 + angle_white
-            spreads[0, i] = spread[0] = np.sqrt(var)
-            g0, g1, g2 = c00 / var, c01 / var, c02 / var
-            c11, c12, c22 = c11 - g1 * c01, c12 - g1 * c02, c22 - g2 * c02
-            c00, c01, c02 = c00 - g0 * c00, c01 - g0 * c01, c02 - g0 * c02
+        if ok[0, i]:
+            var, g0, g1, g2, c00, c01, c02, c11, c12, c22 = _learnt(c00, c01, c02, c11, c12, c22, noise[0] ** 2)
             still = still and _stays(g0, a0) and _stays(g1, a1) and _stays(g2, a2)
             a0, a1, a2 = g0, g1, g2
+            spreads[0, i] = spread[0] = np.sqrt(var)
             log_sum += np.log(var)
-        if rate_ok[i]:
-            var = c11 + rate_white
-            spreads[1, i] = spread[1] = np.sqrt(var)
-            g0, g1, g2 = c01 / var, c11 / var, c12 / var
-            c00, c02, c22 = c00 - g0 * c01, c02 - g0 * c12, c22 - g2 * c12
-            c01, c11, c12 = c01 - g0 * c11, c11 - g1 * c11, c12 - g1 * c12
+        if ok[1, i]:
+            var, g1, g0, g2, c11, c01, c12, c00, c02, c22 = _learnt(c11, c01, c12, c00, c02, c22, noise[1] ** 2)
             still = still and _stays(g0, b0) and _stays(g1, b1) and _stays(g2, b2)
             b0, b1, b2 = g0, g1, g2
+            spreads[1, i] = spread[1] = np.sqrt(var)
             log_sum += np.log(var)
         for j in range(series.shape[0]):
             y, p, w = state[j, 0], state[j, 1], state[j, 2]
             out[j, 0, i] = out[j, 1, i] = 0.0
-            if angle_ok[i]:
+            if ok[0, i]:
                 e = series[j, 0, i] - y
                 out[j, 0, i] = e / spread[0]
                 y, p, w = y + a0 * e, p + a1 * e, w + a2 * e
-            if rate_ok[i]:
+            if ok[1, i]:
                 e = series[j, 1, i] - p
                 out[j, 1, i] = e / spread[1]
                 y, p, w = y + b0 * e, p + b1 * e, w + b2 * e
@@ -279,9 +287,7 @@ def _waking(
             v0, v1, v2 = py * c00 + pp * c01 + pw * c02, py * c01 + pp * c11 + pw * c12, py * c02 + pp * c12 + pw * c22
             c00, c01, c02 = u0 * yy + u1 * yp + u2 * yw, u0 * py + u1 * pp + u2 * pw, u2 * ww
             c11, c12, c22 = v0 * py + v1 * pp + v2 * pw, v2 * ww, c22 * ww * ww + noise[2] ** 2 * (1.0 - ww * ww)
-            for j in range(series.shape[0]):
-                y, p, w = state[j, 0], state[j, 1], state[j, 2]
-                state[j, 0], state[j, 1], state[j, 2] = yy * y + yp * p + yw * w, py * y + pp * p + pw * w, ww * w
+            _carry(f, state)
             settled = settled + 1 if still else 0
         i += 1
     cov[0, 0], cov[0, 1], cov[0, 2], cov[1, 1], cov[1, 2], cov[2, 2] = c00, c01, c02, c11, c12, c22
@@ -292,8 +298,7 @@ def _waking(
 @jit
 def filtered(
     steps: FloatArray,
-    angle_ok: npt.NDArray[np.bool_],
-    rate_ok: npt.NDArray[np.bool_],
+    ok: npt.NDArray[np.bool_],
     a: float,
     k: float,
     noise: FloatArray,
@@ -302,7 +307,7 @@ def filtered(
     spreads: FloatArray,
 ) -> float:
     """Do what `innovations` does, and fill spreads (2, n) with their standard deviations, one where not measured."""
-    n, ok = steps.shape[0] + 1, (angle_ok, rate_ok)
+    n = steps.shape[0] + 1
     cov, f, fp = np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 5))
     gain, last_gain, spread, row = np.zeros((2, 5)), np.zeros((2, 5)), np.empty(2), np.zeros(5)
     state = np.zeros((series.shape[0], 5))
@@ -312,7 +317,7 @@ def filtered(
     i = min(0, n)  # no literal: everything called with one is compiled once more
     while i < n:
         if settled >= SETTLED:
-            stop = _settled_until(steps, angle_ok, rate_ok, i, last_h)
+            stop = _settled_until(steps, ok, i, last_h)
             _settled(series, out, i, stop, gain, f, spread, state, low, high)
             for ch in range(2):
                 for l in range(i, stop):
@@ -322,7 +327,7 @@ def filtered(
             continue
         if low == 0 and high < 5:
             i, logs, last_h = _waking(
-                steps, angle_ok, rate_ok, i, last_h, a, k, noise, series, out, spreads, cov, f, gain, spread, state
+                steps, ok, i, last_h, a, k, noise, series, out, spreads, cov, f, gain, spread, state
             )  # fmt: skip
             log_sum, settled = log_sum + logs, SETTLED
             continue
@@ -330,7 +335,7 @@ def filtered(
             spreads[ch, i] = 1.0
             for j in range(series.shape[0]):
                 out[j, ch, i] = 0.0
-            if ok[ch][i]:
+            if ok[ch, i]:
                 spreads[ch, i] = spread[ch] = _correct(cov, ch, noise[ch] ** 2, gain, row, low, high)
                 log_sum += 2.0 * np.log(spread[ch])
                 _take(series, out, i, ch, gain, spread[ch], state)
@@ -340,7 +345,7 @@ def filtered(
                 settled, last_h = 0, h
                 _set_transition(a, k, h, noise, f)
             _advance(cov, f, fp, noise, low, high)
-            settled = settled + 1 if angle_ok[i] and rate_ok[i] and _all_stay(gain, last_gain, low, high) else 0
+            settled = settled + 1 if ok[0, i] and ok[1, i] and _all_stay(gain, last_gain, low, high) else 0
             _carry(f, state)
         i += 1
     return log_sum
@@ -349,8 +354,7 @@ def filtered(
 @jit
 def innovations(
     steps: FloatArray,
-    angle_ok: npt.NDArray[np.bool_],
-    rate_ok: npt.NDArray[np.bool_],
+    ok: npt.NDArray[np.bool_],
     a: float,
     k: float,
     noise: FloatArray,
@@ -362,4 +366,4 @@ def innovations(
     Samples not measured give zero. Once four steps in a row of equal length leave the gains as they are, they are kept
     until a sample is missing or the step changes.
     """
-    return filtered(steps, angle_ok, rate_ok, a, k, noise, series, out, np.empty((2, steps.shape[0] + 1)))
+    return filtered(steps, ok, a, k, noise, series, out, np.empty((2, steps.shape[0] + 1)))

@@ -111,7 +111,7 @@ def log_likelihood(
     total = 0.0
     for record, (a, k), e in zip(records, dynamics, residuals, strict=True):
         out = np.empty((1, *e.shape))
-        logs = innovations(record.even, record.angle_ok, record.rate_ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
+        logs = innovations(record.even, record.ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
         total -= 0.5 * (logs + float(np.vdot(out, out)))
     return total
 

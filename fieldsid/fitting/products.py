@@ -15,7 +15,11 @@ def least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:
 
     Half of the digits are lost: enough where the answer is only a step or a score.
     """
-    size = np.sqrt(np.einsum("km,km->k", columns, columns))
+    return solved(columns @ columns.T, columns @ target)
+
+
+def solved(gram: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solution (k,) of normal equations, products of the columns (k, k) and of columns and target (k,)."""
+    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
     size[size == 0.0] = 1.0
-    gram = columns @ columns.T / size / size[:, None]
-    return np.asarray(np.linalg.lstsq(gram, columns @ target / size, rcond=SINGULAR)[0] / size)
+    return np.asarray(np.linalg.lstsq(gram / size / size[:, None], right / size, rcond=SINGULAR)[0] / size)

@@ -64,7 +64,7 @@ def products(lines: list[Line], count: int, noise: FloatArray) -> tuple[FloatArr
     for line in lines:
         white = np.empty_like(line.stack)
         r = line.record
-        logs += innovations(r.even, r.angle_ok, r.rate_ok, line.damping, line.stiffness, noise, line.stack, white)
+        logs += innovations(r.even, r.ok, line.damping, line.stiffness, noise, line.stack, white)
         flat = white.reshape(white.shape[0], -1)
         where = np.concatenate([[0], 1 + line.place]).astype(int)
         square[np.ix_(where, where)] += flat @ flat.T
@@ -142,7 +142,7 @@ def whitened(lines: list[Line], family: str, found: Mapping[str, tuple[Noise, fl
             if ok.sum() < 4 * LAGS:
                 continue
             white = np.empty((1, *line.residual.shape))
-            innovations(r.even, r.angle_ok, r.rate_ok, line.damping, line.stiffness, noise, line.stack[:1], white)
+            innovations(r.even, r.ok, line.damping, line.stiffness, noise, line.stack[:1], white)
             statistic += ljung_box(white[0, channel][ok])
             count += LAGS
         if count and chi_square_tail(statistic, count) < WHITE_ENOUGH:

@@ -17,8 +17,7 @@ LOG_STEP = 3e-4
 @jit
 def slopes(
     steps: FloatArray,
-    angle_ok: npt.NDArray[np.bool_],
-    rate_ok: npt.NDArray[np.bool_],
+    ok: npt.NDArray[np.bool_],
     a: float,
     k: float,
     noise: FloatArray,
@@ -35,10 +34,10 @@ def slopes(
     """
     n = steps.shape[0] + 1
     spreads, moved_e, moved_spreads, moved = np.empty((2, n)), np.empty((1, 2, n)), np.empty((2, n)), noise.copy()
-    log_sum = filtered(steps, angle_ok, rate_ok, a, k, noise, residual, known, spreads)
+    log_sum = filtered(steps, ok, a, k, noise, residual, known, spreads)
     for c in range(place.shape[0]):
         moved[place[c]] = noise[place[c]] * np.exp(LOG_STEP)
-        filtered(steps, angle_ok, rate_ok, a, k, moved, residual, moved_e, moved_spreads)
+        filtered(steps, ok, a, k, moved, residual, moved_e, moved_spreads)
         moved[place[c]] = noise[place[c]]
         for ch in range(2):
             for i in range(n):
@@ -59,7 +58,7 @@ def information(
     """
     count, series = place.size, np.ascontiguousarray(residual[None])
     known, wider, steeper = np.empty_like(series), np.empty((count, *residual.shape)), np.empty((count, *residual.shape))
-    logs = slopes(record.even, record.angle_ok, record.rate_ok, a, k, noise, place, series, known, wider, steeper)
+    logs = slopes(record.even, record.ok, a, k, noise, place, series, known, wider, steeper)
     e, wide, steep = known.ravel(), wider.reshape(count, -1), steeper.reshape(count, -1)
     raw = steep + wide * e
     return -0.5 * (logs + float(e @ e)), -(wide.sum(axis=1) + steep @ e), 2.0 * wide @ wide.T + raw @ raw.T

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Groups, Layout, group_name, layout_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.products import least_squares
+from fieldsid.fitting.products import least_squares, solved
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
@@ -307,16 +307,14 @@ def _alike(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray
         row = np.concatenate([[1.0], -step])
         return np.asarray(np.einsum("i,rgij,j->rg", row, square, row))
 
-    def solved(one: FloatArray) -> FloatArray:
-        size = np.sqrt(np.maximum(np.diag(one)[1:], np.finfo(float).tiny))
-        step = np.linalg.lstsq(one[1:, 1:] / np.outer(size, size), one[1:, 0] / size, rcond=1e-10)[0] / size
-        return np.asarray(np.clip(step, low, high))
+    def within(one: FloatArray) -> FloatArray:
+        return np.asarray(np.clip(solved(one[1:, 1:], one[1:, 0]), low, high))
 
-    alone = (solved(one) for one in square.reshape(-1, *square.shape[2:]))
+    alone = (within(one) for one in square.reshape(-1, *square.shape[2:]))
     best = min((costs(step) for step in alone), key=lambda c: float(c.min(axis=1).sum()))
     runs, chosen = np.arange(square.shape[0]), best.argmin(axis=1)
     for _ in range(ROUNDS_ALIKE):
-        again = costs(solved(square[runs, chosen].sum(axis=0))).argmin(axis=1)
+        again = costs(within(square[runs, chosen].sum(axis=0))).argmin(axis=1)
         if (again == chosen).all():
             break
         chosen = again

@@ -19,8 +19,7 @@ from fieldsid.models.record import Record
 @jit
 def _middle(
     steps: FloatArray,
-    angle_ok: npt.NDArray[np.bool_],
-    rate_ok: npt.NDArray[np.bool_],
+    ok: npt.NDArray[np.bool_],
     a: float,
     k: float,
     noise: FloatArray,
@@ -56,8 +55,7 @@ def _middle(
                 for l in range(5):
                     adjoint[j, l] = nxt[l]
         for ch in range(2):
-            ok = angle_ok[i] if ch == 0 else rate_ok[i]
-            if not ok:
+            if not ok[ch, i]:
                 continue
             for j in range(count):
                 g = weighted[j, ch, i]
@@ -78,7 +76,7 @@ def middle(record: Record, noise: FloatArray, damping: float, stiffness: float, 
     """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise vector (7,)."""
     out = np.zeros((weighted.shape[0], weighted.shape[0]))
     _middle(
-        record.even, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
+        record.even, record.ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
         np.ascontiguousarray(weighted), out,
     )  # fmt: skip
     return np.asarray(out + np.tril(out, -1).T)

@@ -42,7 +42,5 @@ def whiten(record: Record, noise: Noise, damping: float, stiffness: float, serie
         white = series * weight[:, None]
         return white if record.is_whole else np.where(record.ok, white, 0.0), log_sum
     out = np.empty_like(series)
-    log_sum = innovations(
-        record.even, record.angle_ok, record.rate_ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise), series, out
-    )
+    log_sum = innovations(record.even, record.ok, max(damping, 1e-3), max(stiffness, 0.0), noise_vector(noise), series, out)
     return out, float(log_sum)
