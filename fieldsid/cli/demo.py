@@ -16,6 +16,7 @@ import typer
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.options import Force, JsonFlag, OutputDir
+from fieldsid.cli.patience import compiling_first
 from fieldsid.errors import ArtifactError
 
 if TYPE_CHECKING:
@@ -44,25 +45,31 @@ def command(
     The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
     """
+    began = perf_counter()
+    with compiling_first():
+        body = _tour(effect, output, began, force=force, quiet=as_json)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+
+
+def _tour(effect: str, output: Path | None, began: float, *, force: bool, quiet: bool) -> dict[str, Any]:
     from fieldsid.demo.steps import PLAN, STEPS, places
     from fieldsid.demo.trial import make_trial
     from fieldsid.demo.vehicle import hidden_vehicle
     from fieldsid.planning.plan_file import load_plan
 
-    began = perf_counter()
     folder = _folder(output, force=force)
     vehicle = hidden_vehicle(effect)
     known = dict(places(folder, vehicle.axis))
-    _told(OPENING, quiet=as_json)
-    done = [_taken(1, PLAN, known, force=force, quiet=as_json)]
+    _told(OPENING, quiet=quiet)
+    done = [_taken(1, PLAN, known, force=force, quiet=quiet)]
     (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
     trial = make_trial(vehicle, folder / "trial", leg, force=force)
-    _told(_flown(trial, folder, leg), quiet=as_json)
+    _told(_flown(trial, folder, leg), quiet=quiet)
     for step in (s for s in STEPS if vehicle.axis in s.axes):
         if step.possible(known):
-            done.append(_taken(len(done) + 1, step, known, force=force, quiet=as_json))
+            done.append(_taken(len(done) + 1, step, known, force=force, quiet=quiet))
             known |= step.learns(done[-1]["result"])
-    body = {
+    return {
         "schema": "fieldsid/demo/1",
         "folder": str(folder),
         "hidden": {"effect": effect, "axis": vehicle.axis, "values": dict(vehicle.values)},
@@ -71,7 +78,6 @@ def command(
         "files": sorted(str(p) for p in folder.rglob("*") if p.is_file()),
         "seconds": perf_counter() - began,
     }
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
 
 
 def _folder(asked: Path | None, *, force: bool) -> Path:

@@ -12,6 +12,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import AxisOption, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.cli.patience import compiling_first, refuse_existing, trying
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ KnownModel = Annotated[
 FigureFile = Annotated[Path | None, typer.Option("--figure", metavar="PNG", help="Draw the candidates.", show_default=False)]
 
 
+@compiling_first()
 def command(
     runs: RunFiles,
     axis: AxisOption,
@@ -52,7 +54,6 @@ def command(
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
     from fieldsid.cli.inputs import files_of, read_runs
-    from fieldsid.cli.patience import refuse_existing, trying
     from fieldsid.diagnosis import diagnose
 
     refuse_existing(output, figure, force=force)

@@ -13,6 +13,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
+from fieldsid.cli.patience import compiling_first, refuse_existing, trying
 from fieldsid.errors import ArtifactError, UsageError
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ Keep = Annotated[bool, typer.Option("--keep", help="Keep the addition even where
 Undo = Annotated[bool, typer.Option("--undo", help="Go back: give the model that this one was extended from.")]
 
 
+@compiling_first()
 def command(
     model: ModelFile,
     runs: LearnedRuns = None,
@@ -90,7 +92,6 @@ def _extended(
     force: bool,
 ) -> tuple[dict[str, Any], Sequence[Any]]:
     from fieldsid.cli.inputs import read_runs
-    from fieldsid.cli.patience import refuse_existing, trying
     from fieldsid.extension import extend, save_extension
     from fieldsid.models.model import load_model
 

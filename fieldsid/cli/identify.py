@@ -23,6 +23,7 @@ from fieldsid.cli.options import (
     VehicleFile,
     names_of,
 )
+from fieldsid.cli.patience import compiling_first
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,6 +44,7 @@ Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01,
 Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor of svf_rls.")]
 
 
+@compiling_first()
 def command(
     runs: RunFiles,
     axis: AxisOption,

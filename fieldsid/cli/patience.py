@@ -28,3 +28,13 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
         return
     with console.status(says) as status:
         yield lambda text: status.update(f"{says}: {text}")
+
+
+@contextmanager
+def compiling_first() -> Iterator[None]:
+    """Decorate a command that fits: the first one on a machine compiles on two cores, and says so on a terminal."""
+    from fieldsid.fitting.ahead import compiling_ahead
+
+    console = messages()
+    with compiling_ahead(lambda text: console.print(text) if console.is_terminal else None):
+        yield

@@ -253,7 +253,7 @@ PLAN = Step(
 STEPS: tuple[Step, ...] = (
     Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", _inspected),
     Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _imported),
-    Step("A model for each speed", "identify {runs}/learn_*.parquet --axis {axis} -o {models}", _identified),
+    Step("A model for each speed", "identify {runs}/learn_*.parquet --axis {axis} -o {models} --no-figures", _identified),
     Step("One model for all speeds", "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
     Step(
         "Does it hold on runs it has not seen?",

@@ -67,6 +67,10 @@ def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> Non
 
 def save(figure: Figure, path: Path, *, force: bool = False) -> Path:
     """Write a figure as PNG, whole or not at all; raises ArtifactError."""
+    engine = figure.get_layout_engine()
+    if engine is not None:  # laid out here, once: left to the writer it costs a whole drawing that is thrown away
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     with replacing(path, force=force) as temporary:
         figure.savefig(temporary, format="png", metadata={"Software": "fieldsid"})
     return path

@@ -351,7 +351,6 @@ def filtered(
     return log_sum
 
 
-@jit
 def innovations(
     steps: FloatArray,
     ok: npt.NDArray[np.bool_],

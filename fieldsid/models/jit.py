@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 P = ParamSpec("P")
@@ -19,3 +20,14 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 def plain_of(function: Callable[P, R]) -> Callable[P, R]:
     """Return the Python function behind a compiled one; it is the oracle of the tests."""
     return cast("Callable[P, R]", getattr(function, "py_func", function))
+
+
+def is_compiled(function: Callable[..., object]) -> bool:
+    """Whether a function is compiled in this process, or by an earlier one that left it on the disk, newer than its source."""
+    door: Any = function
+    if not hasattr(door, "py_func") or door.signatures:
+        return True
+    code = door.py_func.__code__
+    source = Path(code.co_filename)
+    kept = Path(door.stats.cache_path).glob(f"{source.stem}.{door.py_func.__qualname__}-{code.co_firstlineno}.*.nbi")
+    return any(file.stat().st_mtime >= source.stat().st_mtime for file in kept)
