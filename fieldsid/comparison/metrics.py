@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.colour import LAGS, chi_square_tail, ljung_box
+from fieldsid.fitting.colour import LAGS, ljung_box
 from fieldsid.fitting.predict import Prediction
+from fieldsid.fitting.tails import chi_square_tail
 from fieldsid.logs.run import FloatArray
 
 

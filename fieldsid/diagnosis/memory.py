@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from fieldsid.diagnosis.trial import Trial
 from fieldsid.fitting.starts import ground_of, grown, projected, run_columns
+from fieldsid.fitting.tails import chi_square_tail
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
@@ -91,4 +91,4 @@ def follows(trial: Trial, noise: Noise) -> Follows:
     before, _ = projected(ground.basis, e, c[:, :0])
     after, _ = projected(ground.basis, e, c)
     alone = [projected(ground.basis, e, c[:, [i]])[0] for i in range(c.shape[1])]
-    return Follows(float(stats.chi2.sf(before - after, len(NAMES))), NAMES[int(np.argmin(alone))])
+    return Follows(chi_square_tail(before - after, len(NAMES)), NAMES[int(np.argmin(alone))])

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.memory import follows
 from fieldsid.fitting.colour import LAGS, ljung_box
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.tails import chi_square_tail, f_tail, pearson3_tail
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.record import Record
@@ -92,7 +92,7 @@ def _colour(runs: Sequence[Left]) -> float:
                 statistic += ljung_box(run.white[channel][ok])
                 freedom += LAGS
         if freedom:
-            smallest = min(smallest, float(stats.chi2.sf(statistic, freedom)))
+            smallest = min(smallest, chi_square_tail(statistic, freedom))
     return min(1.0, 2.0 * smallest)
 
 
@@ -155,7 +155,7 @@ def _growth(runs: Sequence[Left]) -> tuple[float, str]:
         w = x / x.mean() - 1.0
         spread = np.sqrt(2.0 * float(w @ w))
         if spread > 0.0:
-            p = float(stats.pearson3.sf(float(w @ (y / y.mean() - 1.0)) / spread, 8.0 * float(np.sum(w**3)) / spread**3))
+            p = pearson3_tail(float(w @ (y / y.mean() - 1.0)) / spread, 8.0 * float(np.sum(w**3)) / spread**3)
             best, name = min((best, name), (3.0 * p, f"the size of {what}"))
     return min(best, 1.0), name
 
@@ -170,7 +170,7 @@ def _f_test(y: FloatArray, x: FloatArray) -> tuple[float, int]:
     freedom = y.size - 1 - int(rank)
     f = ((float(y @ y) - float(left @ left)) / int(rank)) / (float(left @ left) / freedom)
     single = np.abs(x.T @ y)
-    return float(stats.f.sf(f, int(rank), freedom)), int(np.flatnonzero(size > 1e-12)[int(np.argmax(single))])
+    return f_tail(f, int(rank), freedom), int(np.flatnonzero(size > 1e-12)[int(np.argmax(single))])
 
 
 def _bursts(runs: Sequence[Left]) -> tuple[float, int, int, float]:
@@ -186,7 +186,7 @@ def _bursts(runs: Sequence[Left]) -> tuple[float, int, int, float]:
             for i, width, energy in energies:
                 count += energy.size
                 index = int(np.argmax(energy))
-                p = float(stats.chi2.sf(energy[index] / average, width))
+                p = chi_square_tail(energy[index] / average, width)
                 if p < smallest:
                     smallest, where = p, (i, index, float(energy[index] / average / width))
     return min(1.0, smallest * max(count, 1)), *where

@@ -79,10 +79,10 @@ def _columns(record: Record, rate: FloatArray) -> FloatArray:
 
 def _faded(values: FloatArray, tau: float) -> FloatArray:
     """Return block means (m,) through a first-order lag of time constant tau."""
-    from scipy.signal import lfilter
-
-    keep = float(np.exp(-BLOCK_S / tau))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values))
+    keep, out, last = float(np.exp(-BLOCK_S / tau)), np.empty_like(values), 0.0
+    for i, value in enumerate(values.tolist()):
+        out[i] = last = keep * last + (1.0 - keep) * value
+    return out
 
 
 def block_means(values: FloatArray, record: Record, seconds: float) -> FloatArray:

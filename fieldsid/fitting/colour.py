@@ -5,12 +5,13 @@ from __future__ import annotations
 from fieldsid.fitting.descent import dynamics_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise
-from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, chi_square_tail, ljung_box
+from fieldsid.fitting.tails import chi_square_tail
+from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, ljung_box
 from fieldsid.fitting.whitening import is_white, whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
 
-__all__ = ["LAGS", "best_noise", "chi_square_tail", "chosen_noise", "dynamics_of", "ljung_box", "residuals_of", "whiteness"]
+__all__ = ["LAGS", "best_noise", "chosen_noise", "dynamics_of", "ljung_box", "residuals_of", "whiteness"]
 
 
 def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:

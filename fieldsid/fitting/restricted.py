@@ -17,7 +17,8 @@ from fieldsid.fitting.descent import covariance
 from fieldsid.fitting.kalman import innovations
 from fieldsid.fitting.noise import FAMILIES, estimate_noise
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, chi_square_tail, ljung_box
+from fieldsid.fitting.tails import chi_square_tail
+from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, ljung_box
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise

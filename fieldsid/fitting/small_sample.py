@@ -11,6 +11,7 @@ from collections.abc import Callable
 from itertools import combinations
 
 import numpy as np
+from scipy.special import stdtrit
 
 from fieldsid.fitting.noise import FAMILIES
 from fieldsid.fitting.whitening import NOISE_FIELDS
@@ -64,8 +65,6 @@ def widened(
     found(noise vector) gives the estimate (F,) that the noise leads to and its covariance (F, F); spread is the
     covariance of the logs of the noise numbers, fewest the least degrees of freedom a variance is given.
     """
-    from scipy.special import stdtrit
-
     names = FAMILIES[family]
     slopes, gradients = [], []
     for i in range(len(names)):

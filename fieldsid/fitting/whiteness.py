@@ -19,10 +19,3 @@ def ljung_box(e: FloatArray) -> float:
         return 0.0
     lags = np.array([float(centred[lag:] @ centred[:-lag]) / power for lag in range(1, LAGS + 1)])
     return float(n * (n + 2) * np.sum(lags**2 / (n - np.arange(1, LAGS + 1))))
-
-
-def chi_square_tail(statistic: float, freedom: int) -> float:
-    """Return P(chi-square > statistic)."""
-    from scipy.special import gammaincc
-
-    return float(gammaincc(0.5 * freedom, 0.5 * statistic))

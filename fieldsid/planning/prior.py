@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import FloatArray
@@ -132,6 +131,8 @@ def scales_of(model: Model, base: Base, fin: float) -> dict[str, float]:
 
 def disturbances(model: Model, draws: int, count: int, step: float, rng: np.random.Generator) -> FloatArray:
     """Return draws of the prior's disturbance moment, (draws, count) rad/s^2, samples `step` s apart."""
+    from scipy.signal import lfilter
+
     sigma = model.noise.disturbance
     if sigma <= 0:
         return np.zeros((draws, count))

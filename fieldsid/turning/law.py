@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
+from fieldsid.fitting.tails import student_quantile, student_tail
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.turning.line import Line, fit_power_law, fit_powers, t_factor
 
@@ -129,7 +129,7 @@ def leave_one_out(
     count, size = values.size, len(line.powers)
     if count - 1 - size < 1:
         return ()
-    limit = float(stats.t.ppf(1.0 - FAMILY_ALPHA / (2 * count), count - 1 - size))
+    limit = student_quantile(1.0 - FAMILY_ALPHA / (2 * count), count - 1 - size)
     checks = []
     for i in range(count):
         keep = np.arange(count) != i
@@ -169,7 +169,7 @@ def _exponent(power: Line) -> Exponent:
     half = t_factor(power.dof) * error
     p = float("nan")
     if power.dof > 0 and error > 0:
-        p = float(2 * stats.t.sf(abs(value - EXPONENT_OF_LIFT) / error, power.dof))
+        p = 2.0 * student_tail(abs(value - EXPONENT_OF_LIFT) / error, power.dof)
     return Exponent(value, error, (value - half, value + half), p)
 
 

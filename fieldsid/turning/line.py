@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from fieldsid.errors import ArtifactError
+from fieldsid.fitting.tails import student_quantile
 from fieldsid.logs.run import FloatArray
 
 LEVEL = 0.95
@@ -112,7 +112,7 @@ def fit_power_law(speed: FloatArray, value: FloatArray, std_error: FloatArray | 
 
 def t_factor(dof: int) -> float:
     """Return Student's 97.5 % point; the normal one where no scatter could be measured."""
-    return float(stats.t.ppf(0.5 + LEVEL / 2, dof)) if dof > 0 else float(stats.norm.ppf(0.5 + LEVEL / 2))
+    return student_quantile(0.5 + LEVEL / 2, dof)
 
 
 def _least_squares(x: FloatArray, y: FloatArray, std_error: FloatArray | None) -> tuple[FloatArray, FloatArray, int]:
