@@ -69,8 +69,13 @@ def compiling_ahead(tell: Callable[[str], None] = lambda _text: None) -> Iterato
         yield
         return
     tell("first run on this machine: compiling, about ten seconds, once")
-    command = [sys.executable, "-P", "-m", __name__]
-    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as other:
+    command, quiet = [sys.executable, "-P", "-m", __name__], subprocess.DEVNULL
+    try:
+        other = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+    except OSError:  # where no second process is to be had, what is inside compiles it all
+        yield
+        return
+    with other:
         try:
             compile_filters()
             yield

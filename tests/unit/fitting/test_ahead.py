@@ -85,3 +85,15 @@ def test_the_second_process_runs_only_where_nothing_is_compiled_and_ends_with_th
         assert begun[-1].poll() is None
     assert begun[-1].poll() is not None
     assert told[-1].startswith("first run")
+
+
+def test_without_a_second_process_the_work_goes_on(monkeypatch):
+    def refused(*_args, **_kwargs):
+        raise PermissionError
+
+    monkeypatch.setattr(ahead, "is_compiled", lambda _function: False)
+    monkeypatch.setattr(ahead.subprocess, "Popen", refused)
+    done = []
+    with ahead.compiling_ahead():
+        done.append(True)
+    assert done
