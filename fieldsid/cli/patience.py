@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rich.live import Live
+
 from fieldsid.cli.console import messages
 from fieldsid.errors import ArtifactError
 
@@ -26,8 +28,9 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
     if not console.is_terminal:
         yield lambda _text: None
         return
-    with console.status(says) as status:
-        yield lambda text: status.update(f"{says}: {text}")
+    # drawn by hand: a thread that redraws would keep the search from using a second core
+    with Live(console=console, auto_refresh=False, transient=True) as line:
+        yield lambda text: line.update(f"{says}: {text}", refresh=True)
 
 
 @contextmanager

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import numpy as np
 
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import judge
 from fieldsid.diagnosis.worth import asks_for_more, likelier, refines
@@ -25,10 +26,10 @@ LIKELY, GLIMPSE, KEPT, ROUNDS, COARSE = 6, 2, 3, 6, 1e-3
 judged; and the share of the cost a round must gain."""
 
 
-def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise) -> Hypothesis:
+def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise, beside: Beside) -> Hypothesis:
     """Return a hypothesis with its effects in other forms, the best one first, as long as that pays and something is left."""
     while asks_for_more(h, floor):
-        best = max(in_other_forms(h, told, family), key=lambda other: other.score, default=h)
+        best = max(in_other_forms(h, told, family, beside), key=lambda other: other.score, default=h)
         if not likelier(h, best):
             break
         best = with_free_run(best, floor)
@@ -38,14 +39,16 @@ def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise) -> Hypothesi
     return h
 
 
-def in_other_forms(h: Hypothesis, told: Noise, family: str) -> Iterator[Hypothesis]:
-    """Yield a hypothesis with every form that one of its effects has besides its own, judged as in the search."""
+def in_other_forms(h: Hypothesis, told: Noise, family: str, beside: Beside) -> list[Hypothesis]:
+    """Return a hypothesis with every form that one of its effects has besides its own, judged as in the search."""
     left = residuals_of(h.judged.trial.problem, h.judged.trial.x) if any(e.forms for e in h.effects) else []
-    for effect in h.effects:
-        for form in effect.forms:
-            problem, start = _begun(h, effect, form, left)
-            judged = judge(problem, start, h.judged.noise, told, family, rival=h.judged.likelihood)
-            yield hypothesis_of(judged, h.validation)
+
+    def judged_in(of: tuple[Effect, Form]) -> Hypothesis:
+        problem, start = _begun(h, *of, left)
+        judged = judge(problem, start, h.judged.noise, told, family, rival=h.judged.likelihood)
+        return hypothesis_of(judged, h.validation)
+
+    return beside.each(judged_in, [(effect, form) for effect in h.effects for form in effect.forms])
 
 
 def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:

@@ -9,6 +9,7 @@ output error predict unseen runs by a twentieth better.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -55,15 +56,17 @@ def _tried(search: Search, current: Trial) -> list[tuple[Trial, Pair]]:
     """Return the most promising effects' free runs, each from the screen's start and from its declared one."""
     ground = ground_of(current.problem, current.x, current.weights)
     left = [e for e in search.catalogue if e.name not in current.names]
-    promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
-    noise, found = search.base().judged.noise, []
-    for promise in promises[:TRIED]:
+    promises = sorted(search.beside.each(partial(promise_of, ground), left), key=lambda p: p.cost)
+    noise = search.base().judged.noise
+
+    def flown_with(promise: Promise) -> tuple[Trial, Pair]:
         search.report("+".join((*current.names, promise.effect.name)))
         screened = refine(promise.problem, shortened(ground, promise).start, current.weights, ROUNDS, FINE)
         trial = min((screened, _declared(promise, current)), key=lambda t: t.weights.angle * t.weights.rate)
         flown = flown_by(bare_model(trial.problem, trial.x, noise), trial, search.validation)
-        found.append((trial, Pair(training_errors(trial), unseen_errors(flown, search.validation))))
-    return found
+        return trial, Pair(training_errors(trial), unseen_errors(flown, search.validation))
+
+    return search.beside.each(flown_with, promises[:TRIED])
 
 
 def _declared(promise: Promise, current: Trial) -> Trial:

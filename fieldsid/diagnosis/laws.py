@@ -8,14 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
-from fieldsid.diagnosis.trial import Trial, judge
+from fieldsid.diagnosis.trial import Trial, judge, refine
 from fieldsid.diagnosis.worth import WORTH
-from fieldsid.fitting.layout import Groups, speed_groups
+from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.starts import by_other_law, under_groups
+from fieldsid.fitting.start import start_vector
+from fieldsid.fitting.starts import by_other_law, ground_of, promise_of, shortened, under_groups
 from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import TRIM_OF_FIN
@@ -30,6 +32,17 @@ def speed_laws(records: Sequence[Record], *, trim_of_fin: bool | None) -> tuple[
     snapped = (False, True) if len(groups.speeds) < len(records) else (False,)
     trims = possible_trims(groups) if trim_of_fin is None else (trim_of_fin,)
     return tuple(speed_groups(records, snapped=s, trim_of_fin=t) for t in trims for s in snapped)
+
+
+def base_trial(records: tuple[Record, ...], axis: Axis, known: Sequence[Effect], groups: Groups, floor: Noise) -> Trial:
+    """Return the output error of the base model with the effects it is known to have, under a law of the speed."""
+    layout = layout_of(records, axis, (), groups)
+    trial = refine(Problem(records, layout), start_vector(records, layout), floor)
+    for effect in known:
+        ground = ground_of(trial.problem, trial.x, trial.weights)
+        promise = shortened(ground, promise_of(ground, effect))
+        trial = refine(promise.problem, promise.start, trial.weights)
+    return trial
 
 
 def error_by_law(trial: Trial, axis: Axis) -> float:
@@ -55,6 +68,19 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
     if (one_speed or groups.by_law) and not (asks_for_more and np.ptp(groups.run_speeds) > 0.0):
         return None
     return _better(h, *by_other_law(trial.problem, trial.x), told, family, WORTH if one_speed else 0.0)
+
+
+def better_trim(h: Hypothesis, told: Noise) -> bool | None:
+    """Return the trim's other law where a hypothesis fits better with it, None where it does not."""
+    trial, layout, family = h.judged.trial, h.judged.trial.problem.layout, h.judged.family
+    records, varying = trial.problem.records, any(e.terms is not None for e in h.effects)
+    for trim in possible_trims(speed_groups(records), varying=varying):
+        if trim != layout.groups.trim_of_fin:
+            other = Problem(records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
+            fit = judge(other, trial.x, h.judged.noise, told, family)
+            if fit.likelihood > h.judged.likelihood + (0.0 if trim == TRIM_OF_FIN[layout.axis] else WORTH):
+                return trim
+    return None
 
 
 def _better(h: Hypothesis, problem: Problem, x: FloatArray, told: Noise, family: str, worth: float) -> Hypothesis | None:

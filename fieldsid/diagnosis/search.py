@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.forms import reshaped
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
-from fieldsid.diagnosis.laws import error_by_law, speed_laws, under_other_law
+from fieldsid.diagnosis.laws import base_trial, better_trim, error_by_law, speed_laws, under_other_law
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
-from fieldsid.diagnosis.ways import GLIMPSE_PLAIN, Way, ways
-from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, likelier, pays
+from fieldsid.diagnosis.ways import Way, brought, by_effect, ways
+from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, likelier, pays
 from fieldsid.fitting.colour import residuals_of
-from fieldsid.fitting.descent import cost_of
-from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.noise import floor_below, floor_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import carried, ground_of, overlaid, promise_of, shortened, twin_of
-from fieldsid.fitting.trim_law import possible_trims
+from fieldsid.fitting.starts import carried, overlaid, twin_of
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.models.speed_law import TRIM_OF_FIN
 
 NOISES = ("disturbance", "coloured")
 FREE_RUNS = 3
@@ -66,10 +62,12 @@ class Search:
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
     shaped: dict[frozenset[str], float] = field(default_factory=dict)
     report: Callable[[str], None] = lambda _text: None
+    beside: Beside = field(init=False)
 
     def __post_init__(self) -> None:
         """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
         self.told = self.floor
+        self.beside = Beside((*self.records, *self.validation), self.catalogue)
 
     @property
     def root(self) -> frozenset[str]:
@@ -81,7 +79,9 @@ class Search:
         if self.root not in self.tried:
             self.report("base model")
             laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
-            trial = min((self._base_trial(groups) for groups in laws), key=lambda t: error_by_law(t, self.axis))
+            known = [e for e in self.catalogue if e.name in self.known]
+            trials = (base_trial(self.records, self.axis, known, groups, self.floor) for groups in laws)
+            trial = min(trials, key=lambda t: error_by_law(t, self.axis))
             self.is_noiseless = _at_least(self.floor, TOLD, trial.weights) != self.floor
             self.hear(trial)
             families = (self.family,) if self.family else NOISES
@@ -99,15 +99,6 @@ class Search:
         if not self.is_noiseless:
             self.floor = floor_below(self.floor, self.records, residuals_of(trial.problem, trial.x))
 
-    def _base_trial(self, groups: Groups) -> Trial:
-        layout = layout_of(self.records, self.axis, (), groups)
-        trial = refine(Problem(self.records, layout), start_vector(self.records, layout), self.floor)
-        for effect in (e for e in self.catalogue if e.name in self.known):
-            ground = ground_of(trial.problem, trial.x, trial.weights)
-            promise = shortened(ground, promise_of(ground, effect))
-            trial = refine(promise.problem, promise.start, trial.weights)
-        return trial
-
     def _keep(self, judged: Judged) -> Hypothesis:
         key = frozenset(judged.trial.names)
         known, cost = self.tried.get(key), price(judged, self.validation)
@@ -122,21 +113,16 @@ class Search:
             self.grown_from.add(key)
             most = most or (PROMISING if key == self.root else PROMISING_LATER)
             left = [e for e in self.catalogue if e.name not in key]
-            found = ways(parent, left, None if forced else most, anew=key == self.root, flown=key in self.flown_from)
+            anew, flown = key == self.root, key in self.flown_from
+            found = ways(parent, left, None if forced else most, self.beside, anew=anew, flown=flown)
             self._flown_before(parent)
             self.flown_from.add(key)
-            later = [w for w in found if not self._gone(parent, w)]
+            later = self._gone(parent, by_effect(found))
             leading = {n for h in self._children(key)[:LEADING] for n in h.names if n not in key}
-            for way in later:
-                if way.promise.effect.name in leading:
-                    self._go(parent, way)
+            self._gone(parent, by_effect([w for w in later if w.promise.effect.name in leading]), every=True)
             self._back_from_child(key)
             self._free_runs(key)
-            for name in self._leading(key)[: None if key == self.root else 1]:
-                if self._fits(self.tried[key], self.tried[name]):
-                    self._other_law(name)
-                if likelier(self.tried[key], self.tried[name]):
-                    self._reshape(name)
+            self._improve(key, self._leading(key)[: None if key == self.root else 1])
         return self._children(key)
 
     def _children(self, key: frozenset[str]) -> list[Hypothesis]:
@@ -150,10 +136,6 @@ class Search:
         best = sorted(children, key=lambda h: h.cost - h.by_run.sum())[:1]
         return list(dict.fromkeys(frozenset(h.names) for h in (*children[:FREE_RUNS], *best)))
 
-    def _fits(self, parent: Hypothesis, child: Hypothesis) -> bool:
-        """Whether a child has evidence on the training runs alone."""
-        return bool(child.by_run.sum() - child.cost > parent.by_run.sum() - parent.cost + WORTH)
-
     def _flown_before(self, parent: Hypothesis) -> None:
         """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""
         key = frozenset(parent.names)
@@ -161,20 +143,33 @@ class Search:
             for free in self.free[name]:
                 self._judge_child(parent, free.problem, free.x, next(e for e in free.effects if e.name not in key))
 
-    def _gone(self, parent: Hypothesis, way: Way) -> bool:
-        """Go a way, unless one already gone to the same hypothesis has brought what this one promises."""
-        known = self.tried.get(frozenset((*parent.names, way.promise.effect.name)))
-        if known is not None:
-            trial, cost = known.judged.trial, way.promise.cost
-            gained = known.judged.likelihood - parent.judged.likelihood
-            if way.plain and cost_of(trial.problem, trial.x, way.ground.noise) < (1.0 + GLIMPSE_PLAIN) * cost:
-                return False
-            if not way.plain and gained > 0.5 * (way.ground.cost - cost) - SETTLED:
-                return False
-        self._go(parent, way)
-        return True
+    def _gone(self, parent: Hypothesis, groups: Sequence[Sequence[Way]], *, every: bool = False) -> list[Way]:
+        """Go the ways of each effect; return those left out where one gone before has brought what they promise.
 
-    def _go(self, parent: Hypothesis, way: Way) -> None:
+        Each of them is gone where every is asked for. All see the same rival, whoever goes first.
+        """
+        rival = max((h.judged.likelihood for h in self._children(frozenset(parent.names))), default=-np.inf)
+
+        def go_all(group: Sequence[Way]) -> tuple[Hypothesis, list[Trial], list[int]]:
+            key = frozenset((*parent.names, group[0].promise.effect.name))
+            later = []
+            for i, way in enumerate(group):
+                if every or key not in self.tried or not brought(way, parent, self.tried[key]):
+                    self._go(parent, way, rival)
+                else:
+                    later.append(i)
+            return self.tried[key], self.free.get(key, []), later
+
+        left = []
+        for group, (found, free, later) in zip(groups, self.beside.each(go_all, groups), strict=True):
+            key = frozenset(found.names)
+            self.tried[key] = found
+            if free:
+                self.free[key] = free
+            left += [group[i] for i in later]
+        return left
+
+    def _go(self, parent: Hypothesis, way: Way, rival: float) -> None:
         """Judge what a way leads to."""
         promise, start = way.promise, way.promise.start
         self.report("+".join((*parent.names, promise.effect.name)))
@@ -182,11 +177,12 @@ class Search:
             free = refine(promise.problem, start, parent.judged.trial.weights)
             self.free.setdefault(frozenset(free.names), []).append(free)
             start = free.x
-        self._judge_child(parent, promise.problem, start, promise.effect)
+        self._judge_child(parent, promise.problem, start, promise.effect, rival)
 
-    def _judge_child(self, parent: Hypothesis, problem: Problem, start: FloatArray, effect: Effect) -> None:
+    def _judge_child(
+        self, parent: Hypothesis, problem: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf
+    ) -> None:  # fmt: skip
         """Judge a start, and the other start that has the same response at one speed; of two alike the smaller effect is kept."""
-        rival = max((h.judged.likelihood for h in self._children(frozenset(parent.names))), default=-np.inf)
         judged = judge(problem, start, parent.judged.noise, self.told, self.family, rival=rival)
         self._keep(judged)
         x = judged.trial.x
@@ -223,10 +219,29 @@ class Search:
 
     def _free_runs(self, key: frozenset[str]) -> None:
         """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
-        for child in self._children(key)[:FREE_RUNS]:
-            if child.score > self.tried[key].score:
-                name = frozenset(child.names)
-                self.tried[name] = with_free_run(child, self.floor, self.tried[key], self.free.get(name, ()))
+        parent = self.tried[key]
+        children = [c for c in self._children(key)[:FREE_RUNS] if c.score > parent.score]
+
+        def flown(child: Hypothesis) -> Hypothesis:
+            return with_free_run(child, self.floor, parent, self.free.get(frozenset(child.names), ()))
+
+        for child in self.beside.each(flown, children):
+            self.tried[frozenset(child.names)] = child
+
+    def _improve(self, key: frozenset[str], names: Sequence[frozenset[str]]) -> None:
+        """Put children under another law of the speed, and into other forms, where that has more evidence."""
+
+        def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
+            if fits(self.tried[key], self.tried[name]):
+                self._other_law(name)
+            if likelier(self.tried[key], self.tried[name]):
+                self._reshape(name)
+            return self.tried[name], self.shaped.get(name)
+
+        for name, (child, shaped) in zip(names, self.beside.each(better, names), strict=True):
+            self.tried[name] = child
+            if shaped is not None:
+                self.shaped[name] = shaped
 
     def _other_law(self, key: frozenset[str]) -> None:
         """Put a hypothesis under the other law of the speed where that has more evidence."""
@@ -239,7 +254,7 @@ class Search:
         """Put a hypothesis's effects into other forms than the textbook's, unless that was tried from where it is."""
         known = self.tried[key]
         if known.score > self.shaped.get(key, -np.inf) + SETTLED:
-            self.tried[key] = reshaped(known, self.told, self.family, self.floor)
+            self.tried[key] = reshaped(known, self.told, self.family, self.floor, self.beside)
             self.shaped[key] = self.tried[key].score
 
     def best(self) -> Hypothesis:
@@ -292,18 +307,8 @@ class Search:
         return True
 
     def _better_trim(self, found: Hypothesis) -> bool | None:
-        """Return the trim's other law where a hypothesis fits better with it, once."""
-        trial, layout = found.judged.trial, found.judged.trial.problem.layout
-        if self.trim_of_fin is not None or not asks_for_more(found, self.floor):
-            return None
-        varying = any(e.terms is not None for e in found.effects)
-        for trim in possible_trims(speed_groups(self.records), varying=varying):
-            if trim != layout.groups.trim_of_fin:
-                other = Problem(self.records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
-                fit = judge(other, trial.x, found.judged.noise, self.told, self.family)
-                if fit.likelihood > found.judged.likelihood + (0.0 if trim == TRIM_OF_FIN[self.axis] else WORTH):
-                    return trim
-        return None
+        """Return the trim's other law where something is left that it explains better, once."""
+        return better_trim(found, self.told) if self.trim_of_fin is None and asks_for_more(found, self.floor) else None
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
         """Return a pair that pays where the first of the two has evidence but the error falls with the second only."""

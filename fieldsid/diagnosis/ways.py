@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis
-from fieldsid.diagnosis.trial import refine
+from fieldsid.diagnosis.trial import SETTLED, refine
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, shortened
@@ -33,7 +35,7 @@ class Way:
     plain: bool
 
 
-def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: bool, flown: bool) -> list[Way]:
+def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, beside: Beside, *, anew: bool, flown: bool) -> list[Way]:
     """Return the ways worth going, the `most` best of two screens: the free run's error, and that whitened by its noise.
 
     Every way to every effect where most is None. anew: the base itself may have bent its numbers, see `_shifted`. The
@@ -43,15 +45,33 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, *, anew: 
     for plain in (False,) if flown else (True, False):
         ground = _free_ground(parent) if plain else _whitened_ground(parent)
         worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
-        promises = sorted((promise_of(ground, e) for e in left), key=lambda p: p.cost)
+        promises = sorted(beside.each(partial(promise_of, ground), left), key=lambda p: p.cost)
         kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p.cost > worth]
-        kept = [shortened(ground, p) for p in kept]
         if plain and most is not None:
-            kept = sorted((_followed(ground, p) for p in kept), key=lambda p: p.cost)[:most]
+            kept = sorted(beside.each(partial(_followed, ground), kept), key=lambda p: p.cost)[:most]
+        else:
+            kept = beside.each(partial(shortened, ground), kept)
         found += [Way(p, ground, plain) for p in kept]
         if plain and anew:
-            found += [Way(_shifted(ground, e), ground, plain) for e in left if shifts_time(e)]
+            late = [e for e in left if shifts_time(e)]
+            found += [Way(p, ground, plain) for p in beside.each(partial(_shifted, ground), late)]
     return found
+
+
+def by_effect(found: Sequence[Way]) -> list[list[Way]]:
+    """Return the ways to each effect, in their order."""
+    groups: dict[str, list[Way]] = {}
+    for way in found:
+        groups.setdefault(way.promise.effect.name, []).append(way)
+    return list(groups.values())
+
+
+def brought(way: Way, parent: Hypothesis, known: Hypothesis) -> bool:
+    """Whether another way to the same hypothesis has brought what this one promises."""
+    trial, cost = known.judged.trial, way.promise.cost
+    if way.plain:
+        return cost_of(trial.problem, trial.x, way.ground.noise) < (1.0 + GLIMPSE_PLAIN) * cost
+    return known.judged.likelihood - parent.judged.likelihood > 0.5 * (way.ground.cost - cost) - SETTLED
 
 
 def _free_ground(parent: Hypothesis) -> Ground:
@@ -66,7 +86,8 @@ def _whitened_ground(parent: Hypothesis) -> Ground:
 
 
 def _followed(ground: Ground, promise: Promise) -> Promise:
-    """Return a promise after a few rounds of descent, when it is worth what it has kept."""
+    """Return a promise, shortened and after a few rounds of descent, when it is worth what it has kept."""
+    promise = shortened(ground, promise)
     found = descend(promise.problem, promise.start, ground.noise, rounds=FOLLOWED, tolerance=1e-3)
     return replace(promise, cost=found.cost, start=found.x)
 

@@ -29,6 +29,11 @@ def pays(without: Hypothesis, with_: Hypothesis) -> bool:
     return likelier(without, with_) and with_.judging.mean < matters * without.judging.mean
 
 
+def fits(without: Hypothesis, with_: Hypothesis) -> bool:
+    """Whether an addition has evidence on the runs fitted to alone."""
+    return bool(with_.by_run.sum() - with_.cost > without.by_run.sum() - without.cost + WORTH)
+
+
 def asks_for_more(h: Hypothesis, floor: Noise) -> bool:
     """Whether a hypothesis leaves something above the noise floor, be it a disturbance or not."""
     return max(h.judging.over(floor), h.train.over(floor)) > CLEAN

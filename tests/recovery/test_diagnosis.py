@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from truth.bank import Case, make_case
 
-from fieldsid.diagnosis import Diagnosis, diagnose
+from fieldsid.diagnosis import Diagnosis, beside, diagnose
+from fieldsid.diagnosis.diagnose import body_of
 from fieldsid.diagnosis.search import search
 from fieldsid.diagnosis.usable import usable
 from fieldsid.effects import all_effects
@@ -94,3 +95,11 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
     after = found.final.validation
     for channel, error in (("angle_rad", after.angle_rms_rad), ("rate_rad_s", after.rate_rms_rad_s)):
         assert error < 1.06 * case.floor[channel]
+
+
+@pytest.mark.parametrize("kind", ["single", "pair"])
+def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = visible_case(kind, 40)
+    shared = diagnosed(case)
+    monkeypatch.setattr(beside, "can_copy", lambda: False)
+    assert body_of(diagnosed(case)) == body_of(shared)

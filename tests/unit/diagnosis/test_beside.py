@@ -1,0 +1,121 @@
+"""Work that is shared out comes to what it comes to in one process, whatever becomes of the other."""
+
+from __future__ import annotations
+
+import os
+import threading
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis import beside
+from fieldsid.diagnosis.beside import Beside, can_copy, formed
+from fieldsid.effects import all_effects
+from fieldsid.fitting.ahead import a_record
+from fieldsid.fitting.layout import layout_of
+from fieldsid.fitting.problem import Problem
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import in_form
+
+EFFECTS = all_effects(Axis.YAW)
+RECORD = a_record()
+KNOWN = Beside([RECORD], EFFECTS.values())
+
+copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
+
+
+def test_values_come_back_in_the_order_of_the_items():
+    assert KNOWN.each(lambda i: i * i, range(40)) == [i * i for i in range(40)]
+
+
+@copies
+def test_two_processes_take_the_items():
+    here = threading.Event()
+
+    def slowly(_item):
+        here.wait(0.02)
+        return os.getpid()
+
+    assert len(set(KNOWN.each(slowly, range(8)))) == 2
+
+
+@copies
+def test_what_comes_back_refers_to_what_is_known():
+    problem = Problem((RECORD,), layout_of((RECORD,), Axis.YAW, (EFFECTS["servo_lag"],)))
+    for back in KNOWN.each(lambda _item: problem, range(6)):
+        assert back.records[0] is RECORD
+        assert back.layout.effects[0] is EFFECTS["servo_lag"]
+        assert back.layout.slots == problem.layout.slots
+        assert isinstance(back.layout.own, MappingProxyType)
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS.values() if e.forms], ids=lambda e: e.name)
+def test_every_form_of_an_effect_is_known_by_its_coefficients(effect):
+    for form in effect.forms:
+        shaped = in_form(effect, form)
+        again = KNOWN.loads(KNOWN.dumps(shaped))
+        assert again.coefficients == shaped.coefficients
+        assert again.moment is shaped.moment
+
+
+def test_a_form_that_is_none_of_the_effects_is_not():
+    assert formed(EFFECTS["servo_lag"], ("lag", "nothing")) is None
+
+
+def test_a_record_that_is_not_known_is_copied():
+    other = a_record()
+    back = KNOWN.loads(KNOWN.dumps(other))
+    assert back is not other
+    np.testing.assert_array_equal(back.both, other.both)
+
+
+@copies
+@pytest.mark.parametrize("how", ["raises", "dies", "cannot be written"])
+def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
+    here = os.getpid()
+    pause = threading.Event()
+
+    def value(item):
+        pause.wait(0.01)
+        if os.getpid() != here:
+            if how == "raises":
+                raise ValueError("only in the copy")
+            if how == "dies":
+                os._exit(9)
+            return lambda: item
+        return item
+
+    assert KNOWN.each(value, range(6)) == list(range(6))
+
+
+def test_an_error_is_raised_as_it_is_and_leaves_no_process_behind():
+    def refused(item):
+        raise ValueError(f"no {item}")
+
+    with pytest.raises(ValueError, match="no "):
+        KNOWN.each(refused, range(4))
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@copies
+def test_a_copy_copies_no_more():
+    assert [can_copy(), *KNOWN.each(lambda _item: (threading.Event().wait(0.02), can_copy())[1], range(6))].count(False) >= 1
+
+
+def test_nothing_is_copied_beside_another_thread():
+    done = threading.Event()
+    other = threading.Thread(target=done.wait)
+    other.start()
+    try:
+        assert not can_copy()
+    finally:
+        done.set()
+        other.join()
+
+
+def test_nothing_is_copied_elsewhere_than_on_linux(monkeypatch):
+    monkeypatch.setattr(beside.sys, "platform", "darwin")
+    assert not can_copy()
+    assert KNOWN.each(lambda i: (i, os.getpid()), range(3)) == [(i, os.getpid()) for i in range(3)]
