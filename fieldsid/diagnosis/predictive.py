@@ -31,6 +31,8 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 STEP = 1e-4
+ROUNDED = 1e-14
+"""Share of a slot's information below which what is left of it is not told from rounding."""
 SINGULAR = 1e-10
 """What is added to the precision of every combination of parameters, in units of their own."""
 MEASURED, GUESSED = 0.003, 0.01
@@ -156,11 +158,18 @@ def _led(run: Unseen, product: FloatArray, middle: FloatArray) -> FloatArray:
 
 
 def _without_own(normal: FloatArray, gradient: FloatArray, shared: int) -> tuple[FloatArray, FloatArray]:
-    """Return normal matrix and gradient of the shared slots with the others at their best."""
-    cross = normal[shared:, :shared]
-    inverse = np.linalg.pinv(normal[shared:, shared:], rcond=1e-12, hermitian=True)
-    a = normal[:shared, :shared] - cross.T @ inverse @ cross
-    return 0.5 * (a + a.T), gradient[:shared] - cross.T @ inverse @ gradient[shared:]
+    """Return normal matrix and gradient of the shared slots with the others at their best.
+
+    In units of each slot's own information: what is left of a slot that the others stand in for is a small difference.
+    """
+    size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
+    unit, pull = normal / np.outer(size, size), gradient / size
+    cross = unit[shared:, :shared]
+    inverse = np.linalg.pinv(unit[shared:, shared:], rcond=1e-12, hermitian=True)
+    a = unit[:shared, :shared] - cross.T @ inverse @ cross
+    known, of = 0.5 * (a + a.T), size[:shared]
+    known[np.diag_indices(shared)] = np.maximum(np.diag(known), ROUNDED)
+    return known * np.outer(of, of), (pull[:shared] - cross.T @ inverse @ pull[shared:]) * of
 
 
 def _without_speed(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray, float]:

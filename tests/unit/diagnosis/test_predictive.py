@@ -9,7 +9,7 @@ import pytest
 from truth.paper import YAW, paper_run
 
 from fieldsid.diagnosis.hypothesis import bare_model, flown_by, left_over
-from fieldsid.diagnosis.predictive import Unseen, _under, moves_of, precision, speed_doubt
+from fieldsid.diagnosis.predictive import Unseen, _under, _without_own, moves_of, precision, speed_doubt
 from fieldsid.diagnosis.trial import Judged, refine
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.layout import layout_of
@@ -86,3 +86,17 @@ def test_the_shared_slots_of_a_run_move_as_the_law_says(judged):
             if slot < run.problem.layout.shared:
                 direct += result.sensitivity[i, 1] * run.moves[slot, j]
         np.testing.assert_allclose(direct, slope, atol=2e-3 * np.abs(slope).max() + 1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("apart", [1e-3, 1e-5, 1e-9])
+def test_what_is_left_of_a_slot_that_a_runs_own_stand_in_for_is_never_negative(apart):
+    t = np.linspace(0.0, 1.0, 400)
+    own = np.stack([1e3 * np.ones(400), 1e-4 * t])
+    beside = np.random.default_rng(3).standard_normal(400)
+    columns = np.stack([1e6 * (1.0 + t + apart * beside), np.cos(9.0 * t), *own])
+    left = beside - np.linalg.qr(own.T)[0] @ (np.linalg.qr(own.T)[0].T @ beside)
+    known, _ = _without_own(columns @ columns.T, np.zeros(4), 2)
+    exact = (1e6 * apart) ** 2 * float(left @ left)
+    rounding = 1e-13 * float(columns[0] @ columns[0])
+    assert known[0, 0] > 0.0
+    assert known[0, 0] == pytest.approx(exact, rel=1e-3, abs=rounding)
