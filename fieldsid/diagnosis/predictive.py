@@ -24,6 +24,7 @@ from fieldsid.fitting.descent import normal_equations, products
 from fieldsid.fitting.noise import estimate_noise, log_likelihood
 from fieldsid.fitting.predict import values_held
 from fieldsid.fitting.problem import Problem, RunResult
+from fieldsid.fitting.products import solved
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
@@ -153,7 +154,7 @@ def _led(run: Unseen, product: FloatArray, middle: FloatArray) -> FloatArray:
     step = run.moves @ middle
     a, b = _without_own(normal, product[1:, 0], shared)
     step = step + run.speed * float(run.speed @ (b - a @ step)) / (1.0 + float(run.speed @ a @ run.speed))
-    own = -np.linalg.lstsq(normal[shared:, shared:], normal[shared:, :shared] @ step, rcond=1e-12)[0]
+    own = -solved(normal[shared:, shared:], normal[shared:, :shared] @ step)
     return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), run.line.sensitivity, axes=1))
 
 
