@@ -76,6 +76,8 @@ def _dispatch(arguments: list[str]) -> int:
         sys.stdout.write(f"fieldsid {__version__}\n")
         return DONE
     result = run(arguments)
+    if result == INTERRUPTED:  # typer makes a number of it
+        raise KeyboardInterrupt
     return result if isinstance(result, int) else DONE
 
 

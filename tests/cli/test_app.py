@@ -115,6 +115,13 @@ def test_an_interrupt_is_130(run_cli, monkeypatch):
     assert run_cli("identify").code == 130
 
 
+def test_an_interrupt_inside_a_command_says_so(run_cli, monkeypatch, tmp_path):
+    monkeypatch.setattr("fieldsid.extension.history_of", Broken(KeyboardInterrupt()))
+    (tmp_path / "model.yaml").touch()
+    answer = run_cli("history", tmp_path / "model.yaml")
+    assert (answer.code, answer.err) == (130, "interrupted\n")
+
+
 def test_a_reader_that_goes_away_is_no_error():
     command = f"{sys.executable} -m fieldsid effects list --json | head -c 1"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False)
