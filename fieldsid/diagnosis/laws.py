@@ -71,14 +71,14 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
 
 
 def better_trim(h: Hypothesis, told: Noise) -> bool | None:
-    """Return the trim's other law where a hypothesis fits better with it, None where it does not."""
+    """Return the trim's other law where a hypothesis has more evidence with it, None where it has not."""
     trial, layout, family = h.judged.trial, h.judged.trial.problem.layout, h.judged.family
     records, varying = trial.problem.records, any(e.terms is not None for e in h.effects)
     for trim in possible_trims(speed_groups(records), varying=varying):
         if trim != layout.groups.trim_of_fin:
             other = Problem(records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
-            fit = judge(other, trial.x, h.judged.noise, told, family)
-            if fit.likelihood > h.judged.likelihood + (0.0 if trim == TRIM_OF_FIN[layout.axis] else WORTH):
+            fit = hypothesis_of(judge(other, trial.x, h.judged.noise, told, family), h.validation)
+            if fit.score > h.score + (0.0 if trim == TRIM_OF_FIN[layout.axis] else WORTH):
                 return trim
     return None
 

@@ -15,7 +15,7 @@ from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
 from fieldsid.diagnosis.ways import Way, brought, by_effect, ways
 from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, likelier, pays
 from fieldsid.fitting.colour import residuals_of
-from fieldsid.fitting.noise import floor_below, floor_of
+from fieldsid.fitting.noise import at_least, floor_below, floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried, overlaid, twin_of
 from fieldsid.logs.run import FloatArray
@@ -32,6 +32,9 @@ the base, of a hypothesis with effects, and of one that is only tried in another
 TOLD = 0.01
 """Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
 and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
+FAR = 4.0
+"""Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
+off, a textbook's shape tells little, and the first of two effects less."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST, PAIR = 4, 2
@@ -82,10 +85,10 @@ class Search:
             known = [e for e in self.catalogue if e.name in self.known]
             trials = (base_trial(self.records, self.axis, known, groups, self.floor) for groups in laws)
             trial = min(trials, key=lambda t: error_by_law(t, self.axis))
-            self.is_noiseless = _at_least(self.floor, TOLD, trial.weights) != self.floor
+            self.is_noiseless = at_least(self.floor, TOLD, trial.weights) != self.floor
             self.hear(trial)
             families = (self.family,) if self.family else NOISES
-            self.told = _at_least(self.floor, TOLD, trial.weights)
+            self.told = at_least(self.floor, TOLD, trial.weights)
             judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)
@@ -113,8 +116,7 @@ class Search:
             self.grown_from.add(key)
             most = most or (PROMISING if key == self.root else PROMISING_LATER)
             left = [e for e in self.catalogue if e.name not in key]
-            anew, flown = key == self.root, key in self.flown_from
-            found = ways(parent, left, None if forced else most, self.beside, anew=anew, flown=flown)
+            found = ways(parent, left, None if forced else most, self.beside, anew=key == self.root, flown=key in self.flown_from)
             self._flown_before(parent)
             self.flown_from.add(key)
             later = self._gone(parent, by_effect(found))
@@ -122,7 +124,7 @@ class Search:
             self._gone(parent, by_effect([w for w in later if w.promise.effect.name in leading]), every=True)
             self._back_from_child(key)
             self._free_runs(key)
-            self._improve(key, self._leading(key)[: None if key == self.root else 1])
+            self._improve(key, self._leading(key))
         return self._children(key)
 
     def _children(self, key: frozenset[str]) -> list[Hypothesis]:
@@ -131,10 +133,14 @@ class Search:
         return sorted(children, key=lambda h: -h.score)
 
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
-        """Return the best children, and the one that fits the training runs best: a wrong law of speed may hide it elsewhere."""
+        """Return the best children, and the one that fits the training runs best: a wrong law of speed may hide it elsewhere.
+
+        Only the first of them where a hypothesis has effects and its best child is near the floor.
+        """
         children = self._children(key)
         best = sorted(children, key=lambda h: h.cost - h.by_run.sum())[:1]
-        return list(dict.fromkeys(frozenset(h.names) for h in (*children[:FREE_RUNS], *best)))
+        names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:FREE_RUNS], *best)))
+        return names if key == self.root or any(self.error(h) > FAR for h in children[:1]) else names[:1]
 
     def _flown_before(self, parent: Hypothesis) -> None:
         """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""
@@ -276,7 +282,8 @@ class Search:
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if pays(current, c)), None)
-            paying = paying or (None if size else self._two_at_once(current, children))
+            if paying is None and (size == 0 or self.error(current) > FAR):
+                paying = self._two_at_once(current, children)
             current = (self._swapped(paying) if size else paying) if paying else current
             self.hear(current.judged.trial)
             if self._turn(current):
@@ -295,7 +302,9 @@ class Search:
         other = next(f for f in NOISES if f != self.family)
         if not self.turned and judge(trial.problem, trial.x, self.floor, self.told, other).likelihood > known + WORTH:
             self.turned, self.family = True, other
-        elif (trim := self._better_trim(found)) is not None:
+        elif (
+            self.trim_of_fin is None and asks_for_more(found, self.floor) and (trim := better_trim(found, self.told)) is not None
+        ):
             self.trim_of_fin = trim
             self.free.clear()
             self.flown_from.clear()
@@ -305,10 +314,6 @@ class Search:
         self.shaped.clear()
         self.grown_from.clear()
         return True
-
-    def _better_trim(self, found: Hypothesis) -> bool | None:
-        """Return the trim's other law where something is left that it explains better, once."""
-        return better_trim(found, self.told) if self.trim_of_fin is None and asks_for_more(found, self.floor) else None
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
         """Return a pair that pays where the first of the two has evidence but the error falls with the second only."""
@@ -378,11 +383,6 @@ class Search:
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""
         return sorted(self.tried.values(), key=lambda h: -h.score)
-
-
-def _at_least(noise: Noise, share: float, errors: Noise) -> Noise:
-    """Return a white noise, raised to a share of the errors (both angle and rate)."""
-    return Noise(max(noise.angle, share * errors.angle), max(noise.rate, share * errors.rate))
 
 
 def search(

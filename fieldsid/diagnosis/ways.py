@@ -13,7 +13,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.trial import SETTLED, refine
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promise_of, shared_points, shortened
+from fieldsid.fitting.starts import Ground, Promise, ground_of, grown, promises_of, shared_points, shortened
 from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.effect import Effect, Stage
 from fieldsid.models.record import Record
@@ -22,6 +22,8 @@ GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
 MORE, FOLLOWED = 3, 4
 """Effects beyond the `most` that the free run's screen follows for some rounds: far from an effect first order says little."""
+POINTS = 4
+"""Scan points of an effect that are followed."""
 SHIFTS, SHIFT_ROUNDS = 3, 12
 """Shifts of time that are followed, and for how many rounds."""
 
@@ -45,13 +47,13 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, beside: B
     for plain in (False,) if flown else (True, False):
         ground = _free_ground(parent) if plain else _whitened_ground(parent)
         worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
-        promises = sorted(beside.each(partial(promise_of, ground), left), key=lambda p: p.cost)
-        kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p.cost > worth]
+        promises = sorted(beside.each(partial(_foremost, ground), left), key=lambda points: points[0].cost)
+        kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p[0].cost > worth]
         if plain and most is not None:
-            kept = sorted(beside.each(partial(_followed, ground), kept), key=lambda p: p.cost)[:most]
+            going = sorted(beside.each(partial(_followed, ground), kept), key=lambda p: p.cost)[:most]
         else:
-            kept = beside.each(partial(shortened, ground), kept)
-        found += [Way(p, ground, plain) for p in kept]
+            going = beside.each(partial(shortened, ground), [points[0] for points in kept])
+        found += [Way(p, ground, plain) for p in going]
         if plain and anew:
             late = [e for e in left if shifts_time(e)]
             found += [Way(p, ground, plain) for p in beside.each(partial(_shifted, ground), late)]
@@ -85,11 +87,19 @@ def _whitened_ground(parent: Hypothesis) -> Ground:
     return ground_of(trial.problem, trial.x, parent.judged.noise)
 
 
-def _followed(ground: Ground, promise: Promise) -> Promise:
-    """Return a promise, shortened and after a few rounds of descent, when it is worth what it has kept."""
-    promise = shortened(ground, promise)
-    found = descend(promise.problem, promise.start, ground.noise, rounds=FOLLOWED, tolerance=1e-3)
-    return replace(promise, cost=found.cost, start=found.x)
+def _foremost(ground: Ground, effect: Effect) -> list[Promise]:
+    """Return the scan points of an effect that promise most, the best first."""
+    return promises_of(ground, effect)[:POINTS]
+
+
+def _followed(ground: Ground, points: Sequence[Promise]) -> Promise:
+    """Return the best of some scan points after a few rounds of descent: only there is a promise worth what it has kept."""
+    tried = []
+    for point in points:
+        promise = shortened(ground, point)
+        found = descend(promise.problem, promise.start, ground.noise, rounds=FOLLOWED, tolerance=1e-3)
+        tried.append(replace(promise, cost=found.cost, start=found.x))
+    return min(tried, key=lambda p: p.cost)
 
 
 def _shifted(ground: Ground, effect: Effect) -> Promise:

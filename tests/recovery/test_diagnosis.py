@@ -19,6 +19,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 
 SEED = 2026
+CHANNELS = (("angle", "rad"), ("rate", "rad_s"))
 
 
 def runs_of(logs: list[dict[str, np.ndarray]], tag: str) -> list[Run]:
@@ -95,6 +96,16 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
     after = found.final.validation
     for channel, error in (("angle_rad", after.angle_rms_rad), ("rate_rad_s", after.rate_rms_rad_s)):
         assert error < 1.06 * case.floor[channel]
+
+
+@pytest.mark.parametrize(("seed", "index"), [(132, 75), (132, 84)], ids=("far off", "many ends"))
+def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, index: int) -> None:
+    case = make_case(index, seed)
+    assert len(case.effects) == 2
+    found = diagnosed(case)
+    assert set(found.effects) == set(case.effects)
+    over = np.mean([getattr(found.final.validation, f"{c}_rms_{unit}") / case.floor[f"{c}_{unit}"] for c, unit in CHANNELS])
+    assert over < 1.3
 
 
 @pytest.mark.parametrize("kind", ["single", "pair"])
