@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from io import BytesIO
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Never, TypeVar
 
@@ -109,7 +110,13 @@ def can_copy() -> bool:
     """
     if not sys.platform.startswith("linux") or _IS_COPY in os.environ:
         return False
-    return len(os.sched_getaffinity(0)) > 1 and threading.active_count() == 1
+    return len(os.sched_getaffinity(0)) > 1 and threading.active_count() == 1 and not _warns()
+
+
+def _warns() -> bool:
+    """Whether Python would warn of a copy, as it does from 3.12 on beside any thread, a linear algebra library's too."""
+    threads = Path("/proc/self/task")
+    return sys.version_info >= (3, 12) and (not threads.is_dir() or sum(1 for _ in threads.iterdir()) > 1)
 
 
 class _Writer(pickle.Pickler):

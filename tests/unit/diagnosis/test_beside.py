@@ -119,3 +119,8 @@ def test_nothing_is_copied_elsewhere_than_on_linux(monkeypatch):
     monkeypatch.setattr(beside.sys, "platform", "darwin")
     assert not can_copy()
     assert KNOWN.each(lambda i: (i, os.getpid()), range(3)) == [(i, os.getpid()) for i in range(3)]
+
+
+def test_nothing_is_copied_where_python_would_warn_of_it(monkeypatch):
+    monkeypatch.setattr(beside, "_warns", lambda: True)
+    assert not can_copy()
