@@ -282,8 +282,8 @@ class Search:
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if pays(current, c)), None)
-            if paying is None and (size == 0 or self.error(current) > FAR):
-                paying = self._two_at_once(current, children)
+            if size == 0 or (paying is None and self.error(current) > FAR):
+                paying = self._two_at_once(current, children, paying) or paying
             current = (self._swapped(paying) if size else paying) if paying else current
             self.hear(current.judged.trial)
             if self._turn(current):
@@ -315,12 +315,13 @@ class Search:
         self.grown_from.clear()
         return True
 
-    def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis]) -> Hypothesis | None:
-        """Return a pair that pays where the first of the two has evidence but the error falls with the second only."""
+    def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis], paying: Hypothesis | None) -> Hypothesis | None:
+        """Return a pair that pays, of whose two the first has more evidence than what pays alone, and no less error yet."""
+        least = -np.inf if paying is None else paying.score + WORTH
         first = next((c for c in children if likelier(current, c)), None)
-        if first is None:
+        if first is None or first.score <= least:
             return None
-        return next((c for c in self.grow(first) if pays(first, c) and pays(current, c)), None)
+        return next((c for c in self.grow(first) if pays(first, c) and pays(current, c) and c.score > least), None)
 
     def admissible(self, h: Hypothesis) -> bool:
         """Whether every effect of a hypothesis is worth having: it pays over each smaller one that was tried."""
