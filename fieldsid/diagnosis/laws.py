@@ -70,8 +70,8 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
     return _better(h, *by_other_law(trial.problem, trial.x), told, family, WORTH if one_speed else 0.0)
 
 
-def better_trim(h: Hypothesis, told: Noise) -> bool | None:
-    """Return the trim's other law where a hypothesis has more evidence with it, None where it has not."""
+def better_trim(h: Hypothesis, told: Noise) -> Hypothesis | None:
+    """Return a hypothesis under the trim's other law where it has more evidence there, None where it has not."""
     trial, layout, family = h.judged.trial, h.judged.trial.problem.layout, h.judged.family
     records, varying = trial.problem.records, any(e.terms is not None for e in h.effects)
     for trim in possible_trims(speed_groups(records), varying=varying):
@@ -79,7 +79,7 @@ def better_trim(h: Hypothesis, told: Noise) -> bool | None:
             other = Problem(records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
             fit = hypothesis_of(judge(other, trial.x, h.judged.noise, told, family), h.validation)
             if fit.score > h.score + (0.0 if trim == TRIM_OF_FIN[layout.axis] else WORTH):
-                return trim
+                return fit
     return None
 
 

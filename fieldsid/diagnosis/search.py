@@ -286,33 +286,37 @@ class Search:
                 paying = self._two_at_once(current, children, paying) or paying
             current = (self._swapped(paying) if size else paying) if paying else current
             self.hear(current.judged.trial)
-            if self._turn(current):
+            if self._turn():
                 return None
             if paying is None or not asks_for_more(current, self.floor):
                 break
         return current
 
-    def _turn(self, found: Hypothesis) -> bool:
-        """Begin anew under the other noise, or the other law of the trim, where that fits a hypothesis better, each once.
+    def _turn(self) -> bool:
+        """Begin anew under the other noise, or the other law of the trim, where that fits the likeliest better, each once.
 
         What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
-        coloured sensors lets the heading wander for free.
+        coloured sensors lets the heading wander for free. What was found stays among what is tried, judged anew.
         """
-        trial, known = found.judged.trial, found.judged.likelihood
+        found = max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score)
+        trial, again = found.judged.trial, None
         other = next(f for f in NOISES if f != self.family)
-        if not self.turned and judge(trial.problem, trial.x, self.floor, self.told, other).likelihood > known + WORTH:
-            self.turned, self.family = True, other
-        elif (
-            self.trim_of_fin is None and asks_for_more(found, self.floor) and (trim := better_trim(found, self.told)) is not None
-        ):
-            self.trim_of_fin = trim
-            self.free.clear()
-            self.flown_from.clear()
-        else:
+        judged = None if self.turned else judge(trial.problem, trial.x, self.floor, self.told, other)
+        if judged is not None and judged.likelihood > found.judged.likelihood + WORTH:
+            self.turned, self.family, again = True, other, hypothesis_of(judged, self.validation)
+        elif self.trim_of_fin is None and asks_for_more(found, self.floor):
+            again = better_trim(found, self.told)
+            if again is not None:
+                self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
+                self.free.clear()
+                self.flown_from.clear()
+        if again is None:
             return False
         self.tried.clear()
         self.shaped.clear()
         self.grown_from.clear()
+        if frozenset(found.names) != self.root:
+            self.tried[frozenset(found.names)] = with_free_run(again, self.floor)
         return True
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis], paying: Hypothesis | None) -> Hypothesis | None:
@@ -387,14 +391,9 @@ class Search:
 
 
 def search(
-    records: Sequence[Record],
-    validation: Sequence[Record],
-    axis: Axis,
-    catalogue: Sequence[Effect],
-    *,
-    known: Sequence[str] = (),
-    report: Callable[[str], None] = lambda _text: None,
-) -> Search:
+    records: Sequence[Record], validation: Sequence[Record], axis: Axis, catalogue: Sequence[Effect], *,
+    known: Sequence[str] = (), report: Callable[[str], None] = lambda _text: None,
+) -> Search:  # fmt: skip
     """Return a search ready to go; known effects are part of its base."""
     floor = floor_of([*records, *validation])
     return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor, tuple(known), report=report)
