@@ -270,8 +270,8 @@ class Search:
             current = self._climbed(best)
             if current is None:
                 return self.best()
-            found = self._pruned(self._thinned(current))
-            best = max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score, default=found)
+            self._thinned(current)
+            best = self._likeliest()
             if not asks_for_more(best, self.floor):
                 break
         return best
@@ -298,7 +298,7 @@ class Search:
         What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
         coloured sensors lets the heading wander for free. What was found stays among what is tried, judged anew.
         """
-        found = max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score)
+        found = self._likeliest()
         trial, again = found.judged.trial, None
         other = next(f for f in NOISES if f != self.family)
         judged = None if self.turned else judge(trial.problem, trial.x, self.floor, self.told, other)
@@ -331,6 +331,10 @@ class Search:
         """Whether every effect of a hypothesis is worth having: it pays over each smaller one that was tried."""
         key = frozenset(h.names)
         return all(pays(self.tried[k], h) for k in self.tried if k < key)
+
+    def _likeliest(self) -> Hypothesis:
+        """Return the hypothesis of most evidence among the admissible ones, of which the base is always one."""
+        return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score)
 
     def _swapped(self, found: Hypothesis) -> Hypothesis:
         """Drop each effect in turn and add the best other one; keep what scores higher and predicts as well."""
@@ -373,13 +377,6 @@ class Search:
         if kept is not before:
             self.tried[key] = with_free_run(kept, self.floor)
         return self.tried[key]
-
-    def _pruned(self, found: Hypothesis) -> Hypothesis:
-        """Return the smallest tried subset that loses nothing worth having."""
-        for key in sorted(self.tried, key=len):
-            if self.root <= key < frozenset(found.names) and not pays(self.tried[key], found):
-                return self.tried[key]
-        return found
 
     def error(self, h: Hypothesis) -> float:
         """Return the free-run error over the noise floor."""
