@@ -44,7 +44,12 @@ class Beside:
         if not 1 < len(items) < MOST or not can_copy():
             return [function(item) for item in items]
         left, source, target = _numbers(len(items)), *os.pipe()
-        copy = os.fork()
+        try:
+            copy = os.fork()
+        except OSError:  # where memory or processes are short there is no copy
+            for end in (left, source, target):
+                os.close(end)
+            return [function(item) for item in items]
         if copy == 0:
             os.close(source)
             self._answer(function, items, left, target)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -87,6 +88,17 @@ def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
         return item
 
     assert KNOWN.each(value, range(6)) == list(range(6))
+
+
+@copies
+def test_where_no_copy_is_to_be_had_all_is_done_here_and_nothing_stays_open(monkeypatch):
+    def refused():
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(beside.os, "fork", refused)
+    ends = len(list(Path("/proc/self/fd").iterdir()))
+    assert KNOWN.each(lambda i: (i, os.getpid()), range(4)) == [(i, os.getpid()) for i in range(4)]
+    assert len(list(Path("/proc/self/fd").iterdir())) == ends
 
 
 def test_an_error_is_raised_as_it_is_and_leaves_no_process_behind():
