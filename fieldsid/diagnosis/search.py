@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fieldsid.diagnosis.again import begun_again
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.forms import reshaped
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
@@ -238,9 +239,10 @@ class Search:
         """Put children under another law of the speed, and into other forms, where that has more evidence."""
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
-            if fits(self.tried[key], self.tried[name]):
+            fitted = fits(self.tried[key], self.tried[name])
+            if fitted:
                 self._other_law(name)
-            if likelier(self.tried[key], self.tried[name]):
+            if fitted or likelier(self.tried[key], self.tried[name]):
                 self._reshape(name)
             return self.tried[name], self.shaped.get(name)
 
@@ -274,6 +276,8 @@ class Search:
             best = self._likeliest()
             if not asks_for_more(best, self.floor):
                 break
+        best = begun_again(best, self.known, self.told, self.family, self.floor, self.beside)
+        self.tried[frozenset(best.names)] = best
         return best
 
     def _climbed(self, current: Hypothesis) -> Hypothesis | None:

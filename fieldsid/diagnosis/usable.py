@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
 
 
 def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tuple[Effect, ...], dict[str, str]]:
-    """Return the effects whose signals every run has, and why each other one is skipped."""
+    """Return the effects whose signals every run has, with the forms that can be tried, and why each other one is skipped."""
     kept, skipped = [], {}
     for effect in catalogue:
-        missing = sorted({role for role in effect.needs for r in records if role not in r.signals})
+        missing = _missing(effect.needs, records)
         if missing:
             skipped[effect.name] = f"needs {', '.join(missing)}, which the log lacks"
         else:
-            kept.append(effect)
+            forms = [f for f in effect.forms if not _missing(f.needs, records) and all(r.axis in f.axes for r in records)]
+            kept.append(effect if len(forms) == len(effect.forms) else replace(effect, forms=tuple(forms)))
     return tuple(kept), skipped
+
+
+def _missing(needs: Iterable[str], records: Sequence[Record]) -> list[str]:
+    """Return the roles that some run lacks."""
+    return sorted({role for role in needs for r in records if role not in r.signals})

@@ -1,8 +1,10 @@
 """The propeller turns the hull: moment = prop_moment thrust, in rad/s^2 per unit of the logged thrust.
 
 Swirl over the fins and a thrust line beside the centre of gravity both do this; the trim is then that at zero
-thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust, or builds up
-behind it with a first-order lag, as swirl and inflow do. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
+thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust, builds up
+behind it with a first-order lag, as swirl and inflow do, or is trimmed away by the rudder (in pitch that is `speed_moment`):
+the trim then has a part that goes with the square of the run's speed beside one that stays, counted from 1 m/s, so that
+with either the two make up both. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
 """
 
 from __future__ import annotations
@@ -37,7 +39,9 @@ def terms(values: Values, record: Record) -> Terms:
         late = np.empty(thrust.size)
         behind(record.steps, thrust, lag, late)
         thrust = late
-    return Terms(moment=values["prop_moment"] * thrust + values.get("prop_square", 0.0) * thrust * thrust)
+    moment = values["prop_moment"] * thrust + values.get("prop_square", 0.0) * thrust * thrust
+    trimmed = float(values.get("prop_trimmed", 0.0))
+    return Terms(moment=moment + trimmed * (record.speed**2 - 1.0) if trimmed else moment)
 
 
 EFFECT = Effect(
@@ -67,6 +71,12 @@ EFFECT = Effect(
         Form(
             "it builds up behind the thrust",
             (Coefficient("build_up", "s", 0.0, 20.0, 1.0, scan=(0.5, 2.0, 6.0), step=1e-3, says="time it builds up in"),),
+        ),
+        Form(
+            "the rudder is trimmed against it",
+            (Coefficient("prop_trimmed", "1/m^2", -2.0, 2.0, 0.0, says="trim moment per (m/s)^2, from 1 m/s on"),),
+            axes=(Axis.YAW,),
+            needs=("surge",),
         ),
     ),
 )

@@ -89,12 +89,11 @@ def extend(
     cannot be used or lack a signal the effects need, EffectError for a user's effect that fails.
     """
     new = _new_effects(parent, add)
-    parts = (*(pick_effect(n) for n in parent.effects), *new)
     records = [record_of(r, parent.axis) for r in training]
     unseen = tuple(record_of(r, parent.axis) for r in validation)
     check([*records, *unseen], parent.axis)
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
-    _refuse_missing_signals(parts, [*learned, *judged])
+    parts = _with_signals((*(pick_effect(n) for n in parent.effects), *new), [*learned, *judged])
     work = search(learned, judged, parent.axis, parts, known=parent.effects, report=report)
     before = base_from(work, parent)
     after = _with_all(work)
@@ -175,11 +174,13 @@ def _new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
     return effects
 
 
-def _refuse_missing_signals(parts: Sequence[Effect], records: Sequence[Record]) -> None:
-    _, skipped = usable(parts, records)
+def _with_signals(parts: Sequence[Effect], records: Sequence[Record]) -> tuple[Effect, ...]:
+    """Return the effects with the forms that can be tried; raises DataError for one whose signals the records lack."""
+    kept, skipped = usable(parts, records)
     for name, why in skipped.items():
         raise DataError(
             f"effect `{name}` {why}",
             found=", ".join(dict.fromkeys(f"{r.name} has {', '.join(sorted(r.signals)) or 'none'}" for r in records)),
             hint="map the signal on import: `sysid inspect LOG`, or leave the effect out",
         )
+    return kept

@@ -71,13 +71,16 @@ class Form:
 
     The effect's hooks take the textbook's shape where the values lack them. suggest gives the start values of the shared
     ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids. moment is
-    a hook the effect has in this form only: the core is slower with one.
+    a hook the effect has in this form only: the core is slower with one. axes and needs are those of the form, where it has
+    fewer axes than the effect or needs more signals.
     """
 
     says: str
     coefficients: tuple[Coefficient, ...]
     suggest: Suggest | None = None
     moment: MomentHook | None = None
+    axes: tuple[Axis, ...] = tuple(Axis)
+    needs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

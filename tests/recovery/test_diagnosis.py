@@ -108,6 +108,16 @@ def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, ind
     assert over < 1.3
 
 
+def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named() -> None:
+    """Neither law of the trim holds then: a part goes with the square of the speed, and one does not."""
+    case = make_case(131, 135)
+    assert case.effects == ("prop_moment",)
+    assert not case.details["bent_fin"]
+    found = diagnosed(case)
+    assert (found.verdict, found.effects) == ("effect", case.effects)
+    assert found.final.validation.angle_rms_rad < 1.15 * case.floor["angle_rad"]
+
+
 @pytest.mark.parametrize("kind", ["single", "pair"])
 def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case(kind, 40)

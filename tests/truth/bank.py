@@ -134,11 +134,11 @@ def draw_hidden(rng, kind, names, scene):
     return Hidden(causes)
 
 
-def inputs_of(scene, hidden, leg, i, updates, *, noisy, only=None):
+def inputs_of(scene, physics, hidden, leg, i, updates, *, noisy, only=None):
     """The kernel's inputs for one leg: weather, thrust, roll and events."""
     inputs = leg.inputs.copy()
     swing = updates.get("thrust_swing", scene.notes["swing"])
-    inputs[kernel.THRUST] = scene.base.nominal_thrust * (1.0 + swing * inputs[kernel.THRUST])
+    inputs[kernel.THRUST] = physics.nominal_thrust * (1.0 + swing * inputs[kernel.THRUST])
     inputs[kernel.ROLL_PUSH] *= updates.get("roll_push", 0.01)
     scale = 1.0 if noisy else 0.0
     inputs[kernel.ANGLE_NOISE] *= scene.sigma[0] * scale
@@ -155,7 +155,7 @@ def fly_leg(scene, hidden, i, *, noisy, only=None, step=0.002):
     leg = scene.legs[i]
     updates = hidden.updates(leg.speed / scene.base.nominal_speed, i, only)
     physics = scene.physics(leg, updates)
-    inputs = inputs_of(scene, hidden, leg, i, updates, noisy=noisy, only=only)
+    inputs = inputs_of(scene, physics, hidden, leg, i, updates, noisy=noisy, only=only)
     depth = 6.0 + updates.get("depth_spread", 0.3) * (leg.depth - 6.0)
     flight = {"pitching": scene.pitching, "angle": leg.angle, "depth": depth}
     if updates.get("thrust_swing", scene.notes["swing"]) > 0.0 or physics.surge_loss > 0.0:

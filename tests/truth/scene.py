@@ -51,7 +51,7 @@ class Scene:
         return (leg.speed / self.base.nominal_speed) ** 2 * self.scatter[leg.group] if self.notes.get("bent_fin") else 1.0
 
     def physics(self, leg, updates):
-        """Coefficients of a leg: authority ~ u^2 with scatter, damping ~ u^law, pilot's gains to match."""
+        """Coefficients of a leg: authority ~ u^2 with scatter, damping ~ u^law, thrust ~ u^2, pilot's gains to match."""
         ratio = leg.speed / self.base.nominal_speed
         updates = {k: v for k, v in updates.items() if k not in ("thrust_swing", "roll_push", "depth_spread")}
         times = updates.pop("authority_times", 1.0)
@@ -62,7 +62,7 @@ class Scene:
         kp, kd = gains(damping, self.base.stiffness, authority, self.base.kp)
         return self.base._replace(
             authority=authority, damping=damping, trim=trim, fin_bend=bend, kp=kp, kd=kd,
-            nominal_speed=leg.speed, median_speed=leg.speed,
+            nominal_speed=leg.speed, median_speed=leg.speed, nominal_thrust=self.base.nominal_thrust * ratio**2,
         )._replace(**updates)  # fmt: skip
 
 
@@ -166,10 +166,10 @@ def calibrated(scene):
         return scene
     moved = []
     for leg in scene.legs:
-        inputs = calm(scene.clock, scene.base.nominal_thrust)
-        inputs[kernel.DISTURBANCE] = leg.inputs[kernel.DISTURBANCE]
         quiet = maneuvers.Maneuver("drift", np.zeros(scene.clock.samples), np.full(scene.clock.samples, kernel.OPEN))
         free = scene.physics(leg, {"trim": -scene.base.trim * scene.trim_factor(leg)})._replace(kp=0.0, kd=0.0)
+        inputs = calm(scene.clock, free.nominal_thrust)
+        inputs[kernel.DISTURBANCE] = leg.inputs[kernel.DISTURBANCE]
         drift = fly(free, scene.clock, quiet, inputs, pitching=scene.pitching, step=0.02).angle
         slope = np.polyfit(scene.clock.time, drift, 1)
         moved.append(np.sqrt(np.mean((drift - np.polyval(slope, scene.clock.time)) ** 2)))

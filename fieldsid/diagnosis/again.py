@@ -1,0 +1,54 @@
+"""A hypothesis with one of its effects begun again from its own scan points: far from the floor a cost has many ends."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from fieldsid.diagnosis.beside import Beside
+from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.trial import SETTLED, judge, refine
+from fieldsid.fitting.descent import descend
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.starts import carried, ground_of, promises_of, shortened
+from fieldsid.logs.run import FloatArray
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Noise
+
+DOUBTFUL = 1.5
+"""Error over the noise floor from which a hypothesis may be at another end than its best."""
+POINTS, ROUNDS, COARSE = 6, 6, 1e-3
+"""Scan points that are followed, for how many rounds, and the share of the cost a round must gain."""
+
+
+def begun_again(h: Hypothesis, known: Collection[str], told: Noise, family: str, floor: Noise, beside: Beside) -> Hypothesis:
+    """Return the likeliest end of a hypothesis's effects, each begun again beside the others.
+
+    known are the effects of the base, which stay as they are.
+    """
+
+    def judged_from(of: tuple[Effect, bool]) -> Hypothesis:
+        effect, plain = of
+        problem, start = _start(h, effect, plain=plain)
+        return hypothesis_of(judge(problem, start, h.judged.noise, told, family), h.validation)
+
+    if h.judging.over(floor) < DOUBTFUL:
+        return h
+    ends = beside.each(judged_from, [(e, plain) for e in h.effects if e.name not in known for plain in (True, False)])
+    best = max(ends, key=lambda end: end.score, default=h)
+    return with_free_run(best, floor) if best.score > h.score + SETTLED else h
+
+
+def _start(h: Hypothesis, effect: Effect, *, plain: bool) -> tuple[Problem, FloatArray]:
+    """Return where the best scan points of an effect lead to beside a hypothesis's others, by the free run or by its noise."""
+    trial = h.judged.trial
+    rest = trial.problem.with_effects([e for e in h.effects if e is not effect])
+    x = carried(trial.problem.layout, trial.x, rest.layout)
+    free = refine(rest, x, trial.weights) if plain else None
+    ground = ground_of(rest, x, h.judged.noise) if free is None else ground_of(rest, free.x, free.weights)
+    found = []
+    for point in promises_of(ground, effect)[:POINTS]:
+        promise = shortened(ground, point)
+        end = descend(promise.problem, promise.start, ground.noise, rounds=ROUNDS, tolerance=COARSE)
+        found.append((end.cost, promise.problem, end.x))
+    _, problem, start = min(found, key=lambda end: end[0])
+    return problem, start

@@ -1,0 +1,44 @@
+"""Which effects, and which of their forms, a log can show at all."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.usable import usable
+from fieldsid.effects import pick_effect
+from fieldsid.models.axis import Axis
+from fieldsid.models.simulate import command_record
+
+PROP = pick_effect("prop_moment")
+
+
+def run(axis: Axis, *roles: str):
+    time = np.arange(0.0, 10.0, 0.1)
+    signals = {role: np.ones(time.size) for role in roles}
+    made = command_record(axis, time, np.zeros(time.size), speed=1.5, signals=signals)
+    object.__setattr__(made, "signals", MappingProxyType(signals))
+    return made
+
+
+def test_an_effect_without_its_signal_is_left_out_with_the_reason():
+    kept, skipped = usable([PROP], [run(Axis.YAW, "thrust"), run(Axis.YAW)])
+    assert kept == ()
+    assert skipped == {"prop_moment": "needs thrust, which the log lacks"}
+
+
+@pytest.mark.parametrize(
+    ("axis", "roles", "trimmed"),
+    [(Axis.YAW, ("thrust", "surge"), True), (Axis.YAW, ("thrust",), False), (Axis.PITCH, ("thrust", "surge"), False)],
+)
+def test_a_form_is_tried_on_its_own_axes_and_with_its_own_signals_alone(axis, roles, trimmed):
+    (kept,), _ = usable([PROP], [run(axis, *roles)])
+    tried = {c.name for form in kept.forms for c in form.coefficients}
+    assert tried == {"prop_square", "build_up"} | ({"prop_trimmed"} if trimmed else set())
+
+
+def test_an_effect_all_of_whose_forms_can_be_tried_is_the_one_declared():
+    (kept,), _ = usable([PROP], [run(Axis.YAW, "thrust", "surge")])
+    assert kept is PROP
