@@ -14,7 +14,7 @@ import numpy as np
 
 from fieldsid.diagnosis.predictive import Unseen, moves_of, predictive, speed_doubt
 from fieldsid.diagnosis.records import Errors, Pair
-from fieldsid.diagnosis.trial import Judged, Trial, likelihood_by_run, refine, samples
+from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, likelihood_at, likelihood_by_run, refine, samples
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import frozen_problem, refit_own, with_times
@@ -142,14 +142,21 @@ def with_free_run(h: Hypothesis, floor: Noise, parent: Hypothesis | None = None,
 
     Generalised least squares is efficient when the hypothesis is right and may lose the free run when it is not. Its
     numbers must not contradict what the parent's noise weighs most, as a gyro's scale that bends the rate of a free run
-    contradicts the heading. known are free runs found before.
+    contradicts the heading. known are free runs found before. Where the free run is the more likely one too, the
+    hypothesis was judged at another end than its best, and is judged from there.
     """
     trial, names = h.judged.trial, h.judged.trial.problem.layout.names
     free = [refine(trial.problem, trial.x, trial.weights), *(t for t in known if t.problem.layout.names == names)]
     other = replace(h, plain=min(free, key=lambda t: t.weights.angle * t.weights.rate))
     if other.judging.over(floor) >= h.judging.over(floor) or (parent is not None and _contradicts(other, parent)):
         return h
-    return other
+    flown, judged = other.shown, h.judged
+    if likelihood_at(flown.problem, flown.x, judged) < judged.likelihood + SETTLED:
+        return other
+    again = judge(flown.problem, flown.x, judged.noise, judged.floor, judged.family)
+    h = hypothesis_of(again, h.validation)
+    other = replace(h, plain=flown)
+    return other if other.judging.over(floor) < h.judging.over(floor) else h
 
 
 def _contradicts(h: Hypothesis, parent: Hypothesis) -> bool:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import Trial, judge, refine
-from fieldsid.diagnosis.worth import WORTH
+from fieldsid.diagnosis.worth import WORTH, asks_for_more
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
@@ -68,6 +68,22 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
     if (one_speed or groups.by_law) and not (asks_for_more and np.ptp(groups.run_speeds) > 0.0):
         return None
     return _better(h, *by_other_law(trial.problem, trial.x), told, family, WORTH if one_speed else 0.0)
+
+
+def other_trim(
+    found: Hypothesis, tried: Mapping[frozenset[str], Hypothesis], told: Noise, floor: Noise
+) -> Hypothesis | None:  # fmt: skip
+    """Return a hypothesis that has more evidence under the trim's other law than what was found has under this one.
+
+    One of the effects found may stand in for that law. Where something is left, it may be hidden by it: what was found is
+    tried, and the likeliest of all, which the law may have kept from predicting.
+    """
+    key = frozenset(found.names)
+    asked = [tried[k] for k in tried if k < key and len(k) == len(key) - 1]
+    if asks_for_more(found, floor):
+        asked += [found, max(tried.values(), key=lambda h: h.score)]
+    again = [better_trim(h, told) for h in {frozenset(h.names): h for h in asked}.values()]
+    return max((h for h in again if h is not None and h.score > found.score), key=lambda h: h.score, default=None)
 
 
 def better_trim(h: Hypothesis, told: Noise) -> Hypothesis | None:

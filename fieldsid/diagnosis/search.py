@@ -11,14 +11,14 @@ from fieldsid.diagnosis.again import begun_again
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.forms import reshaped
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
-from fieldsid.diagnosis.laws import base_trial, better_trim, error_by_law, speed_laws, under_other_law
-from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine
+from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
+from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import Way, brought, by_effect, ways
 from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, likelier, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.noise import at_least, floor_below, floor_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.starts import carried, overlaid, twin_of
+from fieldsid.fitting.starts import carried, overlaid
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -40,8 +40,6 @@ LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 LARGEST, PAIR = 4, 2
 """Effects a hypothesis has at most, and those whose parts were all tried on the way to it."""
-TWINS = 1.0
-"""Log likelihood within which two starts of one hypothesis are alike."""
 
 
 @dataclass(slots=True)
@@ -189,20 +187,9 @@ class Search:
     def _judge_child(
         self, parent: Hypothesis, problem: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf
     ) -> None:  # fmt: skip
-        """Judge a start, and the other start that has the same response at one speed; of two alike the smaller effect is kept."""
+        """Judge a start, and the other start that has the same response at one speed."""
         judged = judge(problem, start, parent.judged.noise, self.told, self.family, rival=rival)
-        self._keep(judged)
-        x = judged.trial.x
-        other = twin_of(problem, x, effect)
-        if other is None:
-            return
-        twin = judge(problem, other, judged.noise, self.told, self.family)
-        place = problem.layout.names.index(effect.coefficients[0].name)
-        key = frozenset(judged.trial.names)
-        if twin.likelihood > self.tried[key].judged.likelihood - TWINS and twin.trial.x[place] < x[place]:
-            self.tried[key] = hypothesis_of(twin, self.validation)
-        else:
-            self._keep(twin)
+        self._keep(smaller_twin(judged, effect))
 
     def _back_from_child(self, key: frozenset[str]) -> None:
         """Judge a hypothesis again from where its best child has led its numbers: a cost that is not smooth has many ends.
@@ -308,8 +295,8 @@ class Search:
         judged = None if self.turned else judge(trial.problem, trial.x, self.floor, self.told, other)
         if judged is not None and judged.likelihood > found.judged.likelihood + WORTH:
             self.turned, self.family, again = True, other, hypothesis_of(judged, self.validation)
-        elif self.trim_of_fin is None and asks_for_more(found, self.floor):
-            again = better_trim(found, self.told)
+        elif self.trim_of_fin is None:
+            again = other_trim(found, self.tried, self.told, self.floor)
             if again is not None:
                 self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
                 self.free.clear()
@@ -319,8 +306,8 @@ class Search:
         self.tried.clear()
         self.shaped.clear()
         self.grown_from.clear()
-        if frozenset(found.names) != self.root:
-            self.tried[frozenset(found.names)] = with_free_run(again, self.floor)
+        if frozenset(again.names) != self.root:
+            self.tried[frozenset(again.names)] = with_free_run(again, self.floor)
         return True
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis], paying: Hypothesis | None) -> Hypothesis | None:

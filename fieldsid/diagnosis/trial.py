@@ -16,6 +16,7 @@ from fieldsid.fitting.colour import dynamics_of, residuals_of
 from fieldsid.fitting.descent import descend
 from fieldsid.fitting.noise import estimate_noise, log_likelihood
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.starts import twin_of
 from fieldsid.fitting.weights import white_weights
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
@@ -29,6 +30,8 @@ SETTLED = 0.5
 HOPE = 10.0
 """What the rounds to come gain at most, in gains of the last one."""
 REFINE_ROUNDS = 25
+TWINS = 1.0
+"""Log likelihood within which two starts of one hypothesis are alike."""
 COARSE, FINE = 1e-4, 1e-5
 """Share of the sum of squares a round must gain: of free runs that are compared to the percent, of likelihoods to a half."""
 
@@ -94,6 +97,23 @@ def judge(
 
 def _noise_at(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str) -> tuple[Noise, float]:
     return estimate_noise(problem.records, dynamics_of(problem, x), residuals_of(problem, x), family, start, floor=floor)
+
+
+def smaller_twin(judged: Judged, effect: Effect) -> Judged:
+    """Return the likelier of a trial and its twin, which has the same response at one speed: of two alike the smaller effect."""
+    problem, x = judged.trial.problem, judged.trial.x
+    other = twin_of(problem, x, effect)
+    if other is None:
+        return judged
+    twin = judge(problem, other, judged.noise, judged.floor, judged.family)
+    place = problem.layout.names.index(effect.coefficients[0].name)
+    is_smaller = twin.likelihood > judged.likelihood - TWINS and twin.trial.x[place] < x[place]
+    return twin if is_smaller or twin.likelihood > judged.likelihood else judged
+
+
+def likelihood_at(problem: Problem, x: FloatArray, judged: Judged) -> float:
+    """Return the log likelihood of other parameters of a hypothesis under the noise of its family that is likeliest there."""
+    return _noise_at(problem, x, judged.noise, judged.floor, judged.family)[1]
 
 
 def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArray:

@@ -1,10 +1,10 @@
 """The propeller turns the hull: moment = prop_moment thrust, in rad/s^2 per unit of the logged thrust.
 
 Swirl over the fins and a thrust line beside the centre of gravity both do this; the trim is then that at zero
-thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust, builds up
-behind it with a first-order lag, as swirl and inflow do, or is trimmed away by the rudder (in pitch that is `speed_moment`):
-the trim then has a part that goes with the square of the run's speed beside one that stays, counted from 1 m/s, so that
-with either the two make up both. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
+thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust; in yaw it may
+build up behind it with a first-order lag, as swirl and inflow do, or be trimmed away by the rudder: the trim then has a part
+that goes with the square of the run's speed beside one that stays, counted from 1 m/s, so that with either the two make up
+both. In pitch `speed_moment` says both. Source: Carlton 2018, Marine Propellers and Propulsion, chapter 6.
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ EFFECT = Effect(
         Form(
             "it builds up behind the thrust",
             (Coefficient("build_up", "s", 0.0, 20.0, 1.0, scan=(0.5, 2.0, 6.0), step=1e-3, says="time it builds up in"),),
+            axes=(Axis.YAW,),
         ),
         Form(
             "the rudder is trimmed against it",

@@ -118,6 +118,14 @@ def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named() -> None:
     assert found.final.validation.angle_rms_rad < 1.15 * case.floor["angle_rad"]
 
 
+@pytest.mark.parametrize(("seed", "index"), [(136, 15), (136, 50), (136, 29)], ids=("no better yet", "stands in", "another end"))
+def test_a_single_effect_is_found_whatever_law_of_the_trim_or_end_of_the_fit_hid_it(seed: int, index: int) -> None:
+    case = make_case(index, seed)
+    found = diagnosed(case)
+    assert (found.verdict, found.effects) == ("effect", case.effects)
+    assert found.final.validation.angle_rms_rad < 1.06 * case.floor["angle_rad"]
+
+
 @pytest.mark.parametrize("kind", ["single", "pair"])
 def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case(kind, 40)

@@ -30,13 +30,17 @@ def test_an_effect_without_its_signal_is_left_out_with_the_reason():
 
 
 @pytest.mark.parametrize(
-    ("axis", "roles", "trimmed"),
-    [(Axis.YAW, ("thrust", "surge"), True), (Axis.YAW, ("thrust",), False), (Axis.PITCH, ("thrust", "surge"), False)],
+    ("axis", "roles", "more"),
+    [
+        (Axis.YAW, ("thrust", "surge"), {"build_up", "prop_trimmed"}),
+        (Axis.YAW, ("thrust",), {"build_up"}),
+        (Axis.PITCH, ("thrust", "surge"), set()),
+    ],
 )
-def test_a_form_is_tried_on_its_own_axes_and_with_its_own_signals_alone(axis, roles, trimmed):
+def test_a_form_is_tried_on_its_own_axes_and_with_its_own_signals_alone(axis, roles, more):
     (kept,), _ = usable([PROP], [run(axis, *roles)])
     tried = {c.name for form in kept.forms for c in form.coefficients}
-    assert tried == {"prop_square", "build_up"} | ({"prop_trimmed"} if trimmed else set())
+    assert tried == {"prop_square"} | more
 
 
 def test_an_effect_all_of_whose_forms_can_be_tried_is_the_one_declared():
