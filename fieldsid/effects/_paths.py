@@ -1,6 +1,9 @@
-"""Straight lines that stand for a bent fin path over one interval: exact mean, and the slope nearest in the mean square.
+"""Paths through the fin's gear, interval by interval: straight lines for the hull, the pieces behind them for the gear.
 
-The area under the path moves the hull, so the mean is kept exactly; start and end may overshoot the path a little.
+The area under the path moves the hull, so a line has the path's exact mean and, as slope, its first moment; where the path
+bends or jumps the line's ends pass it. The next part of the gear must not see that: a play would remember angles that never
+were, a stall answer to them. It sees the path rebuilt from its ends, mean and moment: held, straight and held again, which
+a delayed, a limited, a freed fin is exactly between two held commands, or straight, bent and straight, as a lagged one nearly.
 """
 
 from __future__ import annotations
@@ -15,8 +18,94 @@ from fieldsid.models.effect import FinPath
 from fieldsid.models.jit import jit
 
 Map = Callable[[FloatArray], FloatArray]
+Part = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], object]
+"""(steps, start, end, out): fills out (k, 4) with a line's start and end, and where the fin itself begins and ends."""
 STRAIGHT_RAD = 1e-6
 """Below this change over an interval a map is taken as straight; the mean is then wrong by less than 1e-7 rad."""
+PASSED_RAD = 5e-5
+"""By how much a line may pass the fin's own ends and still be taken for its path: it moves a play or a kink's edge by that."""
+BRIEF = 1e-6
+"""Share of an interval below which a piece of it is none."""
+
+
+def through(path: FinPath, steps: FloatArray, part: Part) -> FinPath:
+    """Return a path seen through a part of the gear, which is given straight pieces of it with their lengths in s."""
+    if path.first is None or path.last is None:
+        out = np.empty((steps.size, 4))
+        part(steps, path.start, path.end, out)
+        return FinPath(*(out[:, i].copy() for i in range(4)))
+    pieces = np.empty((3 * steps.size, 4))
+    count = split(steps, path.start, path.end, path.first, path.last, pieces)
+    lengths, start, end = (pieces[:count, i].copy() for i in range(3))
+    out, joined = np.empty((count, 4)), np.empty((steps.size, 4))
+    part(lengths, start, end, out)
+    join(pieces[:count], out, joined)
+    return FinPath(*(joined[:, i].copy() for i in range(4)))
+
+
+@jit
+def split(
+    steps: FloatArray, start: FloatArray, end: FloatArray, first: FloatArray, last: FloatArray, out: FloatArray
+) -> int:  # fmt: skip
+    """Fill out with length, start, end and interval of the pieces of a path, at most three an interval; return their number.
+
+    In shares of the interval and of the change from `first` to `last`: held at 0 up to c - w/2, straight to 1 at c + w/2 and
+    held has the mean 1 - c and the moment c (1 - c) / 2 - w^2 / 24 about the middle. Where that w does not fit beside c,
+    straight to s + e at the share s and on to 1, e = 1 - 2 c, has the moment (1 + e (2 s - 1)) / 12. A path that comes back,
+    for which there is no such c, is left as its line, and so is one that next to keeps to it.
+    """
+    k = 0
+    for i in range(steps.shape[0]):
+        change = last[i] - first[i]
+        centre = 2.0
+        if abs(start[i] - first[i]) + abs(end[i] - last[i]) > PASSED_RAD and abs(change) > STRAIGHT_RAD:
+            centre = (last[i] - 0.5 * (start[i] + end[i])) / change
+        if centre < -BRIEF or centre > 1.0 + BRIEF:
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3] = steps[i], start[i], end[i], i
+            k += 1
+            continue
+        centre = min(max(centre, 0.0), 1.0)
+        slope = (end[i] - start[i]) / change
+        square, room = 12.0 * centre * (1.0 - centre) - 2.0 * slope, 2.0 * min(centre, 1.0 - centre)
+        if square > room * room:
+            excess = 1.0 - 2.0 * centre
+            low, high = max(0.0, -excess), min(1.0, 1.0 - excess)
+            leaves = arrives = min(max(0.5 + 0.5 * (slope - 1.0) / excess, low), high) if excess != 0.0 else 0.0
+            before = after = first[i] + (leaves + excess) * change
+        else:
+            width = np.sqrt(square) if square > BRIEF * BRIEF else 0.0
+            leaves, arrives = centre - 0.5 * width, centre + 0.5 * width
+            before, after = first[i], last[i]
+        if leaves > BRIEF:
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3] = leaves * steps[i], first[i], before, i
+            k += 1
+        if arrives - leaves > BRIEF:
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3] = (arrives - leaves) * steps[i], before, after, i
+            k += 1
+        if arrives < 1.0 - BRIEF:
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3] = (1.0 - arrives) * steps[i], after, last[i], i
+            k += 1
+    return k
+
+
+@jit
+def join(pieces: FloatArray, lines: FloatArray, out: FloatArray) -> None:
+    """Fill out (n-1, 4) with the line of each interval and where the fin begins and ends, from those of its pieces (k, 4)."""
+    k, count = 0, pieces.shape[0]
+    while k < count:
+        i = int(pieces[k, 3])
+        begins, length, area = k, 0.0, 0.0
+        while k < count and pieces[k, 3] == i:
+            length += pieces[k, 0]
+            area += 0.5 * pieces[k, 0] * (lines[k, 0] + lines[k, 1])
+            k += 1
+        moment, at = 0.0, -0.5 * length
+        for j in range(begins, k):
+            h = pieces[j, 0]
+            moment += 0.5 * h * (lines[j, 0] + lines[j, 1]) * (at + 0.5 * h) + h * h * (lines[j, 1] - lines[j, 0]) / 12.0
+            at += h
+        mean, half = area / length, 6.0 * moment / (length * length)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, lines[begins, 2], lines[k - 1, 3]
 
 
 @jit
@@ -63,17 +152,22 @@ class Beyond:
         )
 
 
-def through_map(path: FinPath, value: Map, area: Map) -> FinPath:
+def through_map(path: FinPath, steps: FloatArray, value: Map, area: Map) -> FinPath:
     """Return a path seen through a static map d -> value(d), with area(d) the integral of value from 0 to d.
 
-    The mean over an interval is (area(end) - area(start)) / (end - start), exact across kinks. Arrays (n-1,) rad.
+    The mean over a piece is (area(end) - area(start)) / (end - start), exact across kinks. Arrays (n-1,) rad and s.
     """
-    change = path.end - path.start
-    moves = np.abs(change) > STRAIGHT_RAD
-    if not moves.any():
+    if path.first is None and (np.abs(path.end - path.start) <= STRAIGHT_RAD).all():
         held = value(path.mean)
         return FinPath(held, held)
-    safe = np.where(moves, change, 1.0)
-    mean = np.where(moves, (area(path.end) - area(path.start)) / safe, value(path.mean))
-    half = 0.5 * (value(path.end) - value(path.start))
-    return FinPath(mean - half, mean + half)
+
+    def mapped(_lengths: FloatArray, start: FloatArray, end: FloatArray, out: FloatArray) -> None:
+        change = end - start
+        moves = np.abs(change) > STRAIGHT_RAD
+        safe = np.where(moves, change, 1.0)
+        mean = np.where(moves, (area(end) - area(start)) / safe, value(0.5 * (start + end)))
+        out[:, 2], out[:, 3] = value(start), value(end)
+        half = 0.5 * (out[:, 3] - out[:, 2])
+        out[:, 0], out[:, 1] = mean - half, mean + half
+
+    return through(path, steps, mapped)

@@ -6,9 +6,7 @@ The fin starts in the middle of the play. Source: Nordin and Gutman 2002, Contro
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldsid.effects._paths import line_of_two_pieces
+from fieldsid.effects._paths import line_of_two_pieces, through
 from fieldsid.effects._reach import shares_of_reach
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -19,7 +17,7 @@ from fieldsid.models.record import Record
 
 @jit
 def played(start: FloatArray, end: FloatArray, gap: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with start and end of the path behind a play of width `gap`."""
+    """Fill out (n-1, 4) with line and ends of the path behind a play of width `gap`."""
     half = 0.5 * gap
     fin = start[0]
     for i in range(start.shape[0]):
@@ -31,6 +29,7 @@ def played(start: FloatArray, end: FloatArray, gap: float, out: FloatArray) -> N
             touches = first + half if end[i] > start[i] else first - half
             bend = min(max((touches - start[i]) / (end[i] - start[i]), 0.0), 1.0)
         out[i, 0], out[i, 1] = line_of_two_pieces(bend, first, first, last)
+        out[i, 2], out[i, 3] = first, last
         fin = last
 
 
@@ -38,9 +37,8 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of a fin behind a play of `gap`, (n-1,) rad."""
     if values["gap"] <= 0.0:
         return path
-    out = np.empty((path.start.size, 2))
-    played(path.start, path.end, float(values["gap"]), out)
-    return FinPath(out[:, 0].copy(), out[:, 1].copy())
+    gap = float(values["gap"])
+    return through(path, record.steps, lambda _steps, start, end, out: played(start, end, gap, out))
 
 
 GAP = Coefficient("gap", "rad", 0.0, 0.3, 0.05, step=5e-4, says="full width of the play")

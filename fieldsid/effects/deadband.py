@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.effects._paths import Beyond, through_map
+from fieldsid.effects._paths import Beyond, through, through_map
 from fieldsid.effects._reach import shares_of_reach
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -28,7 +28,7 @@ def _share(here: float, there: float, edge: float) -> float:
 
 @jit
 def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_go: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with mean and change over each interval of a fin that takes off at `width` and stops at `let_go`.
+    """Fill out (n-1, 4) with line and ends of the path of a fin that takes off at `width` and stops at `let_go`.
 
     Once it moves it stands `lost` short of the command. Lengths in rad, let_go <= width.
     """
@@ -54,8 +54,9 @@ def held_on(start: FloatArray, end: FloatArray, width: float, lost: float, let_g
                 mean += 0.5 * (1.0 - takes_off) * (width - lost + after) * to_side
             else:
                 mean += 0.5 * (before + after) * to_side
-        out[i, 0] = mean
-        out[i, 1] = after * to_side - before * from_side
+        first, last = before * from_side, after * to_side
+        half = 0.5 * (last - first)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, last
         moves = goes_on
 
 
@@ -65,12 +66,10 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     if width <= 0.0:
         return path
     if "release" in values:
-        out = np.empty((path.start.size, 2))
-        held_on(path.start, path.end, width, (1.0 - kept) * width, values["release"] * width, out)
-        return FinPath(out[:, 0] - 0.5 * out[:, 1], out[:, 0] + 0.5 * out[:, 1])
+        lost, let_go = (1.0 - kept) * width, values["release"] * width
+        return through(path, record.steps, lambda _steps, start, end, out: held_on(start, end, width, lost, let_go, out))
     if "off_middle" in values:
-        middle = values["off_middle"] * width
-        path = FinPath(path.start - middle, path.end - middle)
+        path = path.moved(-values["off_middle"] * width)
     beyond = Beyond(width, values.get("deadband_blend", 0.0))
 
     def value(d: FloatArray) -> FloatArray:
@@ -79,7 +78,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     def area(d: FloatArray) -> FloatArray:
         return beyond.area(d) + kept * width * np.maximum(np.abs(d) - width, 0.0)
 
-    return through_map(path, value, area)
+    return through_map(path, record.steps, value, area)
 
 
 WIDTH = Coefficient("width", "rad", 0.0, 0.2, 0.03, step=5e-4, says="half width of the dead zone")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.effects._paths import through
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
@@ -17,14 +18,16 @@ from fieldsid.models.record import Record
 
 @jit
 def delayed(time: FloatArray, start: FloatArray, end: FloatArray, delay: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with start and end of the delayed path: exact area and first moment, piece by piece."""
+    """Fill out (n-1, 4) with line and ends of the delayed path: exact area and first moment, piece by piece."""
     n = start.shape[0]
     source = 0
     for i in range(n):
         low, high = time[i] - delay, time[i + 1] - delay
         h, centre = high - low, 0.5 * (high + low)
         area = moment = 0.0
-        if low < time[0]:
+        first = last = start[0]
+        seen = low < time[0]
+        if seen:
             piece = min(high, time[0]) - low
             area += start[0] * piece
             moment += start[0] * piece * (low + 0.5 * piece - centre)
@@ -39,18 +42,25 @@ def delayed(time: FloatArray, start: FloatArray, end: FloatArray, delay: float, 
             value = start[j] + slope * (middle - time[j])
             area += value * piece
             moment += value * piece * (middle - centre) + slope * piece * piece * piece / 12.0
+            if not seen:
+                first, seen = start[j] + slope * (a - time[j]), True
+            last = start[j] + slope * (b - time[j])
             j += 1
         mean, half = area / h, 6.0 * moment / (h * h)
-        out[i, 0], out[i, 1] = mean - half, mean + half
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, last
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path `delay` seconds later, (n-1,) rad."""
     if values["delay"] <= 0.0:
         return path
-    out = np.empty((path.start.size, 2))
-    delayed(record.time, path.start, path.end, float(values["delay"]), out)
-    return FinPath(out[:, 0].copy(), out[:, 1].copy())
+    delay = float(values["delay"])
+
+    def late(steps: FloatArray, start: FloatArray, end: FloatArray, out: FloatArray) -> None:
+        time = record.time - record.time[0] if steps is record.steps else np.concatenate([[0.0], np.cumsum(steps)])
+        delayed(time, start, end, delay, out)
+
+    return through(path, record.steps, late)
 
 
 EFFECT = Effect(

@@ -7,9 +7,7 @@ Source: Van Amerongen 1982 (the steering machine).
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldsid.effects._paths import line_of_two_pieces
+from fieldsid.effects._paths import line_of_two_pieces, through
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
@@ -19,7 +17,7 @@ from fieldsid.models.record import Record
 
 @jit
 def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, up: float, down: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with start and end of the path of a fin that turns at `up` and `down` rad/s at most."""
+    """Fill out (n-1, 4) with line and ends of the path of a fin that turns at `up` and `down` rad/s at most."""
     fin = start[0]
     for i in range(start.shape[0]):
         h = steps[i]
@@ -38,15 +36,15 @@ def rate_limited(steps: FloatArray, start: FloatArray, end: FloatArray, up: floa
         after = min(max(slope, -down), up)
         last = at_meeting + after * (h - meets)
         out[i, 0], out[i, 1] = line_of_two_pieces(meets / h, fin, at_meeting, last)
+        out[i, 2], out[i, 3] = fin, last
         fin = last
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of a fin that turns at `max_rate` at most, (n-1,) rad."""
-    out = np.empty((path.start.size, 2))
-    rate = float(values["max_rate"])
-    rate_limited(record.steps, path.start, path.end, rate, rate * float(values.get("falling_share", 1.0)), out)
-    return FinPath(out[:, 0].copy(), out[:, 1].copy())
+    up = float(values["max_rate"])
+    down = up * float(values.get("falling_share", 1.0))
+    return through(path, record.steps, lambda steps, start, end, out: rate_limited(steps, start, end, up, down, out))
 
 
 FALLING = Coefficient(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.effects._paths import through
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
@@ -22,7 +23,7 @@ FASTEST_S = 1e-6
 
 @jit
 def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float, falling: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) with start and end of the lagged path: fin = line - lag slope + c exp(-t / lag).
+    """Fill out (n-1, 4) with line and ends of the lagged path: fin = line - lag slope + c exp(-t / lag).
 
     The lag is that of the side the fin moves to at the start of an interval; a held command lets it turn nowhere else.
     """
@@ -41,13 +42,14 @@ def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float,
         else:
             bend = 12.0 / (x * x) * (1.0 - (1.0 - gone) * (1.0 + x) - 0.5 * x * gone)
         half = 0.5 * (slope * h + c * bend)
-        out[i, 0], out[i, 1] = mean - half, mean + half
-        fin = start[i] + slope * (h - lag) + c * (1.0 - gone)
+        last = start[i] + slope * (h - lag) + c * (1.0 - gone)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, fin, last
+        fin = last
 
 
 @jit
 def swung(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, inertia: float, out: FloatArray) -> None:
-    """Fill out (n-1, 2) as `lagged` does for inertia delta'' + lag delta' + delta = command, inertia in s^2.
+    """Fill out (n-1, 4) as `lagged` does for inertia delta'' + lag delta' + delta = command, inertia in s^2.
 
     e, the fin less the line it follows, has no command: its integrals follow from its own equation, its end from the
     exponential of that.
@@ -73,8 +75,9 @@ def swung(steps: FloatArray, start: FloatArray, end: FloatArray, lag: float, ine
         moment = -inertia * (h * v - e + first) - lag * h * e + lag * area - 0.5 * h * area
         mean = start[i] + slope * (0.5 * h - lag) + area / h
         half = 0.5 * slope * h + 6.0 * moment / (h * h)
-        out[i, 0], out[i, 1] = mean - half, mean + half
-        fin, speed = start[i] + slope * (h - lag) + e, v + slope
+        last = start[i] + slope * (h - lag) + e
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, fin, last
+        fin, speed = last, v + slope
 
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
@@ -82,12 +85,11 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     lag = float(values["lag"])
     if lag <= FASTEST_S:
         return path
-    out = np.empty((path.start.size, 2))
     if "inertia_share" in values:
-        swung(record.steps, path.start, path.end, lag, float(values["inertia_share"]) * lag * lag, out)
-    else:
-        lagged(record.steps, path.start, path.end, lag, lag * float(values.get("slackening", 1.0)), out)
-    return FinPath(out[:, 0].copy(), out[:, 1].copy())
+        inertia = float(values["inertia_share"]) * lag * lag
+        return through(path, record.steps, lambda steps, start, end, out: swung(steps, start, end, lag, inertia, out))
+    falling = lag * float(values.get("slackening", 1.0))
+    return through(path, record.steps, lambda steps, start, end, out: lagged(steps, start, end, lag, falling, out))
 
 
 def twin(values: Values, axis: Axis) -> dict[str, float] | None:

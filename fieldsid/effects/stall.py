@@ -23,6 +23,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     beyond, drop = Beyond(angle, blend), values.get("stall_drop", 0.0) * angle
     return through_map(
         path,
+        record.steps,
         lambda d: d - lost * beyond.value(d) - drop * np.sign(d) * (np.abs(d) > angle),
         lambda d: 0.5 * d * d - lost * beyond.area(d) - drop * np.maximum(np.abs(d) - angle, 0.0),
     )

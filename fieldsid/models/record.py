@@ -100,7 +100,9 @@ def _jumping(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:
     past = np.concatenate([[0.0], change[:-1]])
     mean = fin[:-1] + change * early - past * late
     half = change * np.minimum(early, 1.0 - early) + past * np.minimum(late, 1.0 - late)
-    return FinPath(mean - half, mean + half)
+    first = np.where(late > 0.0, fin[:-1] - past, fin[:-1])
+    last = np.where(early > 0.0, fin[1:], fin[:-1])
+    return FinPath(mean - half, mean + half, first, last)
 
 
 def first_part(record: Record, samples: int) -> Record:

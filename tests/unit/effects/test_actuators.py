@@ -204,6 +204,46 @@ def test_a_static_map_keeps_its_mean_across_its_kinks(name, values, by_hand, hel
         np.testing.assert_allclose(path.start, by_hand(log.fin[:-1]), atol=1e-15)
 
 
+STEPS = {
+    "delay": None,
+    "servo_lag": lambda fin, u, dt: fin + (u - fin) * -np.expm1(-dt / 0.06),
+    "rate_limit": lambda fin, u, dt: fin + float(np.clip(u - fin, -4.0 * dt, 4.0 * dt)),
+    "backlash": lambda fin, u, _dt: min(max(fin, u - 0.03), u + 0.03),
+    "deadband": lambda _fin, u, _dt: 0.0 if abs(u) <= 0.08 else u - 0.08 * np.sign(u),
+    "stall": lambda _fin, u, _dt: u if abs(u) <= 0.2 else np.sign(u) * (0.2 - 0.3 * (abs(u) - 0.2)),
+}
+VALUES = {"delay": 0.033, "lag": 0.06, "max_rate": 4.0, "gap": 0.06, "width": 0.08, "stall_angle": 0.2, "slope_after": -0.3}
+
+
+ORDER = ("delay", "rate_limit", "servo_lag", "backlash", "deadband", "stall")
+
+
+@pytest.mark.parametrize("names", [(b, a) for i, b in enumerate(ORDER[:4]) for a in ORDER[i + 1 :]], ids="+".join)
+def test_two_parts_of_the_gear_one_behind_the_other_agree_with_small_steps(names):
+    """A jump inside an interval is a line that passes both its ends: a play or a stall behind it must not see that."""
+    fine, time = 500, 5.0 + 0.05 * np.arange(60)
+    log = record(time, np.repeat(np.random.default_rng(8).uniform(-0.35, 0.35, 12), 5), held=True)
+    path = log.commanded
+    for name in names:
+        path = pick_effect(name).fin(path, VALUES, log)
+    fins, expected = dict.fromkeys(names, float(log.fin[0])), []
+    for i, h in enumerate(log.steps):
+        values = np.empty(fine)
+        for j in range(fine):
+            t = log.time[i] + h * (j + 0.5) / fine - (VALUES["delay"] if "delay" in names else 0.0)
+            u = float(log.fin[max(int(np.searchsorted(log.time, t, side="right")) - 1, 0)])
+            for name in names:
+                step = STEPS[name]
+                u = fins[name] = u if step is None else step(fins[name], u, h / fine)
+            values[j] = u
+        expected.append(fine_line(values)[0])
+    # what lies between the ends of a lagged step is an exponential, not straight pieces
+    tolerance = 1e-3 if names[0] == "servo_lag" else 4e-4
+    np.testing.assert_allclose(path.mean, expected, atol=tolerance)
+    last = fins[names[-1]]
+    assert path.last[-1] == pytest.approx(last, abs=tolerance)
+
+
 def test_a_path_that_hardly_moves_is_mapped_like_one_that_rests():
     log = record([0.0, 1.0, 2.0], [0.2, 0.2 + 3e-7, 0.2 + 6e-6], held=False)
     path = through("stall", log, stall_angle=0.1, slope_after=0.5)

@@ -82,7 +82,7 @@ def test_a_servo_of_second_order_is_its_equation_integrated_finely(lag, share):
     path = FinPath(start, start + 0.02 * rng.standard_normal(12))
     log, inertia, fine = record(), share * lag * lag, 4000
     steps = log.steps[:12]
-    out = np.empty((12, 2))
+    out = np.empty((12, 4))
     from fieldsid.effects.servo_lag import swung
 
     swung(steps, path.start, path.end, lag, inertia, out)
@@ -100,7 +100,7 @@ def test_a_servo_of_second_order_is_its_equation_integrated_finely(lag, share):
             track[k + 1] = fin
         mean = np.trapezoid(track, time) / h
         half = 6.0 * np.trapezoid(track * (time - 0.5 * h), time) / h**2
-        np.testing.assert_allclose(out[i], [mean - half, mean + half], atol=2e-6)
+        np.testing.assert_allclose(out[i], [mean - half, mean + half, track[0], track[-1]], atol=2e-6)
 
 
 @pytest.mark.parametrize("sweep", [0.0, 0.012, -0.02])
