@@ -38,6 +38,8 @@ FAR = 4.0
 off, a textbook's shape tells little, and the first of two effects less."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
+TRIM_TURNS = 2
+"""Times a search begins anew under the trim's other law: a first effect may have asked for the one that the second does not."""
 LARGEST, PAIR = 4, 2
 """Effects a hypothesis has at most, and those whose parts were all tried on the way to it."""
 
@@ -56,6 +58,7 @@ class Search:
     family: str = ""
     turned: bool = False
     trim_of_fin: bool | None = None
+    trims_turned: int = 0
     told: Noise = field(init=False)
     is_noiseless: bool = False
     """Whether the logs show so little noise that the base errs by a hundred times it."""
@@ -284,7 +287,7 @@ class Search:
         return current
 
     def _turn(self) -> bool:
-        """Begin anew under the other noise, or the other law of the trim, where that fits the likeliest better, each once.
+        """Begin anew under the other noise, once, or the other law of the trim where that fits the likeliest better.
 
         What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
         coloured sensors lets the heading wander for free. What was found stays among what is tried, judged anew.
@@ -295,9 +298,10 @@ class Search:
         judged = None if self.turned else judge(trial.problem, trial.x, self.floor, self.told, other)
         if judged is not None and judged.likelihood > found.judged.likelihood + WORTH:
             self.turned, self.family, again = True, other, hypothesis_of(judged, self.validation)
-        elif self.trim_of_fin is None:
+        elif self.trims_turned < TRIM_TURNS:
             again = other_trim(found, self.tried, self.told, self.floor)
             if again is not None:
+                self.trims_turned += 1
                 self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
                 self.free.clear()
                 self.flown_from.clear()

@@ -99,7 +99,9 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
 
 
 @pytest.mark.parametrize(
-    ("seed", "index"), [(132, 75), (132, 84), (136, 100)], ids=("far off", "many ends", "play behind a slow fin")
+    ("seed", "index"),
+    [(132, 75), (132, 84), (136, 100), (138, 102)],
+    ids=("far off", "many ends", "play behind a slow fin", "another trim for one than for both"),
 )
 def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, index: int) -> None:
     case = make_case(index, seed)
