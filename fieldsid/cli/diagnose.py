@@ -197,7 +197,8 @@ def _render_next(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None
     if fly:
         to.print()
         command = f": `{fly['command']}`" if "command" in fly else ""
-        to.print(Text(f"next: {fly['maneuver']}, {fly['why']}{command}"))
+        note = f"; {fly['note']}" if "note" in fly else ""
+        to.print(Text(f"next: {fly['maneuver']}, {fly['why']}{note}{command}"))
     if found.effects:
         unseen = " --validate RUN" if body["validation_runs"] else ""
         model = body["model"] or "MODEL"

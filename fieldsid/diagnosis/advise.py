@@ -16,6 +16,8 @@ from fieldsid.planning.discriminate import separate
 from fieldsid.planning.envelope import LARGEST_FIN, Envelope
 
 MOST_RIVALS = 3
+DECIDES = 3.0
+"""Log odds below which a maneuver is not worth a dive: 20 to 1 for the right one."""
 
 
 def next_maneuver(search: Search, verdict: Verdict, found: Hypothesis, skipped: Mapping[str, str]) -> dict[str, Any] | None:
@@ -48,7 +50,11 @@ def _deciding(search: Search, rivals: list[Hypothesis]) -> dict[str, Any]:
     except FieldsidError as error:
         # nothing inside the limits separates them: what the effects themselves declare is still worth flying
         return {**_declared(names), **command, "note": error.what}
-    return {**found.plain(), **command, "why": f"expected log odds {found.expected_log_odds:.0f} for the right one"}
+    odds = found.expected_log_odds
+    if odds < DECIDES:
+        tried = f"no maneuver inside the fin angles flown is expected to give log odds of more than {odds:.1f} for the right one"
+        return {**_declared(names), **command, "expected_log_odds": odds, "note": tried}
+    return {**found.plain(), **command, "why": f"expected log odds {odds:.0f} for the right one"}
 
 
 def _declared(names: list[str]) -> dict[str, Any]:
