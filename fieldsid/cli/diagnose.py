@@ -33,7 +33,6 @@ KnownModel = Annotated[
 FigureFile = Annotated[Path | None, typer.Option("--figure", metavar="PNG", help="Draw the candidates.", show_default=False)]
 
 
-@compiling_first()
 def command(
     runs: RunFiles,
     axis: AxisOption,
@@ -60,7 +59,7 @@ def command(
     known = _known(model, axis)
     logs = read_runs([*runs, *(validate or [])], mapping=mapping)
     training, unseen = logs[: len(runs)], logs[len(runs) :]
-    with trying("diagnosing") as report:
+    with compiling_first(), trying("diagnosing") as report:
         found = diagnose(training, axis, unseen, known=known.effects if known else (), report=report)
     inputs = [*files_of(logs), *([model] if model else [])]
     body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model)

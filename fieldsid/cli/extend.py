@@ -40,7 +40,6 @@ Keep = Annotated[bool, typer.Option("--keep", help="Keep the addition even where
 Undo = Annotated[bool, typer.Option("--undo", help="Go back: give the model that this one was extended from.")]
 
 
-@compiling_first()
 def command(
     model: ModelFile,
     runs: LearnedRuns = None,
@@ -104,7 +103,7 @@ def _extended(
     refuse_existing(target, force=force)
     logs = read_runs([*runs, *validate], mapping=mapping)
     training, unseen = logs[: len(runs)], logs[len(runs) :]
-    with trying("extending") as report:
+    with compiling_first(), trying("extending") as report:
         found = extend(known, names, training, unseen, report=report)
     kept = found.pays or keep
     if kept:

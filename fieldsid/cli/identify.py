@@ -44,7 +44,6 @@ Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01,
 Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor of svf_rls.")]
 
 
-@compiling_first()
 def command(
     runs: RunFiles,
     axis: AxisOption,
@@ -76,7 +75,7 @@ def command(
     from fieldsid.vehicle import find_vehicle, load_vehicle
 
     known = read_runs(runs, mapping=mapping, start=start, end=end)
-    with progress("fitting", 1 if joint else len(known)) as step:
+    with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
         fits = identify(
             known,
             axis,

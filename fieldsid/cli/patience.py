@@ -35,7 +35,7 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def compiling_first() -> Iterator[None]:
-    """Decorate a command that fits: the first one on a machine compiles on two cores, and says so on a terminal."""
+    """Be inside what fits: the first time on a machine that compiles on two cores, and says so on a terminal."""
     from fieldsid.fitting.ahead import compiling_ahead
 
     console = messages()

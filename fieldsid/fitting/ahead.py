@@ -54,8 +54,9 @@ def compile_motion() -> None:
     result = problem.linearise(x, 0)
     problem.residual(x, 0)
     middle(records[0], noise_vector(STIRRED), 1.0, 0.0, result.sensitivity)
-    for effect in all_effects(Axis.YAW).values():
-        more = problem.with_effects((effect,))
+    effects = all_effects(Axis.YAW).values()
+    for own in (*((e,) for e in effects), tuple(e for e in effects if e.fin is not None)):
+        more = problem.with_effects(own)
         more.linearise(more.start(), 0)
 
 
