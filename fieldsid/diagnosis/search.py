@@ -36,6 +36,8 @@ and the smallest inconsistency of its sensors would weigh more than all that the
 FAR = 4.0
 """Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
 off, a textbook's shape tells little, and the first of two effects less."""
+MUCH = 2.0
+"""Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 TRIM_TURNS = 2
@@ -226,13 +228,19 @@ class Search:
             self.tried[frozenset(child.names)] = child
 
     def _improve(self, key: frozenset[str], names: Sequence[frozenset[str]]) -> None:
-        """Put children under another law of the speed, and into other forms, where that has more evidence."""
+        """Put children under another law of the speed, and into other forms, where that has more evidence.
+
+        Where none has any as it is, and much is left, what is missing may be any child in another form.
+        """
+        parent = self.tried[key]
+        helps = {n: fits(parent, self.tried[n]) or likelier(parent, self.tried[n]) for n in names}
+        lost = not any(helps.values()) and self.error(parent) > MUCH
+        names = [frozenset(c.names) for c in self._children(key)] if lost else names
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
-            fitted = fits(self.tried[key], self.tried[name])
-            if fitted:
+            if fits(parent, self.tried[name]):
                 self._other_law(name)
-            if fitted or likelier(self.tried[key], self.tried[name]):
+            if lost or helps.get(name):
                 self._reshape(name)
             return self.tried[name], self.shaped.get(name)
 

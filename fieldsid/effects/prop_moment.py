@@ -44,6 +44,9 @@ def terms(values: Values, record: Record) -> Terms:
     return Terms(moment=moment + trimmed * (record.speed**2 - 1.0) if trimmed else moment)
 
 
+SQUARE = Coefficient("prop_square", "rad/s^2 per unit squared", -1e3, 1e3, 0.0, says="moment per square of the logged thrust")
+TRIMMED = Coefficient("prop_trimmed", "1/m^2", -2.0, 2.0, 0.0, says="trim moment per (m/s)^2, from 1 m/s on")
+
 EFFECT = Effect(
     name="prop_moment",
     says="the propeller's thrust turns the hull",
@@ -60,22 +63,16 @@ EFFECT = Effect(
     needs=("thrust",),
     terms=terms,
     forms=(
-        Form(
-            "a part goes with the square of the thrust",
-            (
-                Coefficient(
-                    "prop_square", "rad/s^2 per unit squared", -1e3, 1e3, 0.0, says="moment per square of the logged thrust"
-                ),
-            ),
-        ),
+        Form("a part goes with the square of the thrust", (SQUARE,)),
         Form(
             "it builds up behind the thrust",
             (Coefficient("build_up", "s", 0.0, 20.0, 1.0, scan=(0.5, 2.0, 6.0), step=1e-3, says="time it builds up in"),),
             axes=(Axis.YAW,),
         ),
+        Form("the rudder is trimmed against it", (TRIMMED,), axes=(Axis.YAW,), needs=("surge",)),
         Form(
-            "the rudder is trimmed against it",
-            (Coefficient("prop_trimmed", "1/m^2", -2.0, 2.0, 0.0, says="trim moment per (m/s)^2, from 1 m/s on"),),
+            "a part goes with the square of the thrust, and the rudder is trimmed against it",
+            (SQUARE, TRIMMED),
             axes=(Axis.YAW,),
             needs=("surge",),
         ),

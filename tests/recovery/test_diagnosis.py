@@ -112,9 +112,10 @@ def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, ind
     assert over < 1.3
 
 
-def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named() -> None:
+@pytest.mark.parametrize("index", [131, 8], ids=("linear", "square"))
+def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named(index: int) -> None:
     """Neither law of the trim holds then: a part goes with the square of the speed, and one does not."""
-    case = make_case(131, 135)
+    case = make_case(index, 135)
     assert case.effects == ("prop_moment",)
     assert not case.details["bent_fin"]
     found = diagnosed(case)

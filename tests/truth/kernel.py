@@ -34,7 +34,7 @@ def moments(y, q, t, event, thrust):
     """Sum of the moments that are neither damping, stiffness nor fin, in rad/s^2."""
     deep = y[DEPTH] - q.depth_reference
     m = event + q.thrust_moment * thrust + q.roll_moment * y[ROLL] + q.depth_moment * deep
-    m += q.thrust_square * (thrust - q.nominal_thrust) ** 2 + q.roll_rate_moment * y[ROLL_RATE] + q.depth_square * deep**2
+    m += q.thrust_square * (thrust - q.reference_thrust) ** 2 + q.roll_rate_moment * y[ROLL_RATE] + q.depth_square * deep**2
     m += q.speed_moment * (y[SURGE] ** 2 - q.speed_reference**2) - q.cross_moment * y[CROSS]
     if q.drift != 0.0:
         m += q.drift * t if q.drift_tau <= 0.0 else q.drift * q.drift_tau * (1.0 - math.exp(-max(t, 0.0) / q.drift_tau))

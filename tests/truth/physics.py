@@ -93,6 +93,7 @@ class Physics(NamedTuple):
     roll_by_turn: float = 0.0
     nominal_speed: float = 1.5
     nominal_thrust: float = 50.0
+    reference_thrust: float = 50.0
     surge_tau: float = 4.0
     surge_loss: float = 0.0
     # the pilot

@@ -56,7 +56,7 @@ class Scene:
         updates = {k: v for k, v in updates.items() if k not in ("thrust_swing", "roll_push", "depth_spread")}
         times = updates.pop("authority_times", 1.0)
         trim, bend = (0.0, self.base.trim / self.base.authority) if self.notes.get("bent_fin") else (self.base.trim, 0.0)
-        trim += updates.pop("trim", 0.0)
+        trim += updates.pop("trim", 0.0) + updates.pop("fin_trim", 0.0) * self.scatter[leg.group]
         authority = self.base.authority * ratio**2 * self.scatter[leg.group] * times
         damping = self.base.damping * ratio**self.law
         kp, kd = gains(damping, self.base.stiffness, authority, self.base.kp)
@@ -107,7 +107,8 @@ def draw_vehicle(rng, pitching):
     speed, thrust = rng.uniform(1.0, 1.9), float(np.exp(rng.uniform(np.log(10.0), np.log(90.0))))
     base = Physics(
         damping=damping, stiffness=stiffness, authority=authority, trim=authority * rng.uniform(-0.03, 0.03),
-        nominal_speed=speed, nominal_thrust=thrust, surge_tau=rng.uniform(2.0, 6.0), kp=rng.uniform(0.6, 1.1),
+        nominal_speed=speed, nominal_thrust=thrust, reference_thrust=thrust,
+        surge_tau=rng.uniform(2.0, 6.0), kp=rng.uniform(0.6, 1.1),
         roll_omega=rng.uniform(0.6, 1.6), roll_zeta=rng.uniform(0.15, 0.5), roll_by_turn=rng.uniform(0.0, 0.1),
         cross_damping=rng.uniform(0.5, 2.0), cross_rate=rng.uniform(0.2, 0.8),
     )  # fmt: skip

@@ -119,8 +119,8 @@ def prop_moment(rng, k):
 
     def apply(s, u, _i):
         # trimmed away by the fin in yaw, which goes with the speed as the thrust does, by a weight in pitch
-        held = k.thrust * (u * u if k.stiffness == 0.0 else 1.0)
-        return {"thrust_moment": size * s, "trim": -size * s * held, "thrust_swing": swing}
+        held = {"trim": -size * s * k.thrust} if k.pitching else {"fin_trim": -size * s * k.thrust * u * u}
+        return {"thrust_moment": size * s, "thrust_swing": swing} | held
 
     return apply
 

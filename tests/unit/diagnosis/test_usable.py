@@ -43,6 +43,10 @@ def test_a_form_is_tried_on_its_own_axes_and_with_its_own_signals_alone(axis, ro
     assert tried == {"prop_square"} | more
 
 
+def test_each_form_has_its_own_numbers():
+    assert len({frozenset(c.name for c in f.coefficients) for f in PROP.forms}) == len(PROP.forms)
+
+
 def test_an_effect_all_of_whose_forms_can_be_tried_is_the_one_declared():
     (kept,), _ = usable([PROP], [run(Axis.YAW, "thrust", "surge")])
     assert kept is PROP
