@@ -16,7 +16,7 @@ from fieldsid.models.axis import Axis
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.models.effect import Coefficient, Effect
+    from fieldsid.models.effect import Coefficient, Effect, Form
 
 command = typer.Typer(help="List the physical effects, show one, start one of your own.")
 
@@ -79,7 +79,7 @@ def _described(effect: Effect) -> dict[str, Any]:
         "axes": effect.axes,
         "equation": effect.equation,
         "coefficients": [_coefficient(c) for c in effect.coefficients],
-        "forms": [{"says": f.says, "coefficients": [_coefficient(c) for c in f.coefficients]} for f in effect.forms],
+        "forms": [_form(effect, f) for f in effect.forms],
         "needs": effect.needs,
         "extra_states": effect.extra_states,
         "telltale": effect.telltale,
@@ -87,6 +87,15 @@ def _described(effect: Effect) -> dict[str, Any]:
         "mistaken_for": effect.mistaken_for,
         "source": effect.source,
         "origin": effect.origin,
+    }
+
+
+def _form(effect: Effect, form: Form) -> dict[str, Any]:
+    return {
+        "says": form.says,
+        "axes": [a for a in effect.axes if a in form.axes],
+        "needs": [*effect.needs, *form.needs],
+        "coefficients": [_coefficient(c) for c in form.coefficients],
     }
 
 
@@ -105,12 +114,19 @@ def _render_list(to: Console, known: Iterable[Effect]) -> None:
     to.print("`sysid effects show NAME` tells the equation, the telltale and what excites it.")
 
 
+def _form_in_words(effect: Effect, form: Form) -> str:
+    """Return what a form says, with its axes and signals where they are not the effect's."""
+    axes = [a for a in effect.axes if a in form.axes]
+    own = [*([] if len(axes) == len(effect.axes) else axes), *(f"needs {role}" for role in form.needs)]
+    return form.says + (f" ({', '.join(own)})" if own else "")
+
+
 def _render_one(to: Console, effect: Effect) -> None:
     facts = [
         ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
         ("equation", effect.equation),
         ("telltale", effect.telltale),
-        *(("or in the form", f.says) for f in effect.forms),
+        *(("or in the form", _form_in_words(effect, f)) for f in effect.forms),
         ("excited by", ", ".join(effect.excited_by)),
         ("mistaken for", ", ".join(effect.mistaken_for) or "-"),
         ("log must have", ", ".join(effect.needs) or "nothing more"),

@@ -35,3 +35,12 @@ def test_show_of_a_mistyped_name_gives_the_near_one(run_cli):
     answer = run_cli("effects", "show", "servo_lagg")
     assert answer.code == 2
     assert "did you mean `servo_lag`" in answer.err
+
+
+def test_show_says_where_a_form_is_tried_and_what_it_needs(run_cli):
+    out = " ".join(run_cli("effects", "show", "prop_moment").out.split())
+    assert "it builds up behind the thrust (yaw)" in out
+    assert "the rudder is trimmed against it (yaw, needs surge)" in out
+    forms = run_cli("effects", "show", "prop_moment", "--json").json["forms"]
+    assert [f["axes"] for f in forms] == [["yaw", "pitch"], ["yaw"], ["yaw"], ["yaw"]]
+    assert forms[2]["needs"] == ["thrust", "surge"]
