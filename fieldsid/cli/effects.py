@@ -90,10 +90,14 @@ def _described(effect: Effect) -> dict[str, Any]:
     }
 
 
+def _axes(effect: Effect, form: Form) -> list[Axis]:
+    return [a for a in effect.axes if a in form.axes]
+
+
 def _form(effect: Effect, form: Form) -> dict[str, Any]:
     return {
         "says": form.says,
-        "axes": [a for a in effect.axes if a in form.axes],
+        "axes": _axes(effect, form),
         "needs": [*effect.needs, *form.needs],
         "coefficients": [_coefficient(c) for c in form.coefficients],
     }
@@ -116,7 +120,7 @@ def _render_list(to: Console, known: Iterable[Effect]) -> None:
 
 def _form_in_words(effect: Effect, form: Form) -> str:
     """Return what a form says, with its axes and signals where they are not the effect's."""
-    axes = [a for a in effect.axes if a in form.axes]
+    axes = _axes(effect, form)
     own = [*([] if len(axes) == len(effect.axes) else axes), *(f"needs {role}" for role in form.needs)]
     return form.says + (f" ({', '.join(own)})" if own else "")
 

@@ -7,17 +7,17 @@ from collections.abc import Collection
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import SETTLED, judge, refine
-from fieldsid.fitting.descent import descend
+from fieldsid.diagnosis.ways import followed
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.starts import carried, ground_of, promises_of, shortened
+from fieldsid.fitting.starts import carried, ground_of, promises_of
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 
 DOUBTFUL = 1.5
 """Error over the noise floor from which a hypothesis may be at another end than its best."""
-POINTS, ROUNDS, COARSE = 6, 6, 1e-3
-"""Scan points that are followed, for how many rounds, and the share of the cost a round must gain."""
+POINTS, ROUNDS = 6, 6
+"""Scan points that are followed, and for how many rounds."""
 
 
 def begun_again(h: Hypothesis, known: Collection[str], told: Noise, family: str, floor: Noise, beside: Beside) -> Hypothesis:
@@ -43,12 +43,10 @@ def _start(h: Hypothesis, effect: Effect, *, plain: bool) -> tuple[Problem, Floa
     trial = h.judged.trial
     rest = trial.problem.with_effects([e for e in h.effects if e is not effect])
     x = carried(trial.problem.layout, trial.x, rest.layout)
-    free = refine(rest, x, trial.weights) if plain else None
-    ground = ground_of(rest, x, h.judged.noise) if free is None else ground_of(rest, free.x, free.weights)
-    found = []
-    for point in promises_of(ground, effect)[:POINTS]:
-        promise = shortened(ground, point)
-        end = descend(promise.problem, promise.start, ground.noise, rounds=ROUNDS, tolerance=COARSE)
-        found.append((end.cost, promise.problem, end.x))
-    _, problem, start = min(found, key=lambda end: end[0])
-    return problem, start
+    noise = h.judged.noise
+    if plain:
+        free = refine(rest, x, trial.weights)
+        x, noise = free.x, free.weights
+    ground = ground_of(rest, x, noise)
+    best = followed(ground, promises_of(ground, effect)[:POINTS], rounds=ROUNDS)
+    return best.problem, best.start

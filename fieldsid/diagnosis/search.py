@@ -14,7 +14,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with
 from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import Way, brought, by_effect, ways
-from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, likelier, pays
+from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, helps, likelier, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.noise import at_least, floor_below, floor_of
 from fieldsid.fitting.problem import Problem
@@ -233,14 +233,14 @@ class Search:
         Where none has any as it is, and much is left, what is missing may be any child in another form.
         """
         parent = self.tried[key]
-        helps = {n: fits(parent, self.tried[n]) or likelier(parent, self.tried[n]) for n in names}
-        lost = not any(helps.values()) and self.error(parent) > MUCH
+        lost = self.error(parent) > MUCH and not any(helps(parent, self.tried[n]) for n in names)
         names = [frozenset(c.names) for c in self._children(key)] if lost else names
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
-            if fits(parent, self.tried[name]):
+            child = self.tried[name]
+            if fits(parent, child):
                 self._other_law(name)
-            if lost or helps.get(name):
+            if lost or helps(parent, child):
                 self._reshape(name)
             return self.tried[name], self.shaped.get(name)
 

@@ -50,7 +50,7 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, beside: B
         promises = sorted(beside.each(partial(_foremost, ground), left), key=lambda points: points[0].cost)
         kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p[0].cost > worth]
         if plain and most is not None:
-            going = sorted(beside.each(partial(_followed, ground), kept), key=lambda p: p.cost)[:most]
+            going = sorted(beside.each(partial(followed, ground), kept), key=lambda p: p.cost)[:most]
         else:
             going = beside.each(partial(shortened, ground), [points[0] for points in kept])
         found += [Way(p, ground, plain) for p in going]
@@ -92,12 +92,12 @@ def _foremost(ground: Ground, effect: Effect) -> list[Promise]:
     return promises_of(ground, effect)[:POINTS]
 
 
-def _followed(ground: Ground, points: Sequence[Promise]) -> Promise:
+def followed(ground: Ground, points: Sequence[Promise], rounds: int = FOLLOWED) -> Promise:
     """Return the best of some scan points after a few rounds of descent: only there is a promise worth what it has kept."""
     tried = []
     for point in points:
         promise = shortened(ground, point)
-        found = descend(promise.problem, promise.start, ground.noise, rounds=FOLLOWED, tolerance=1e-3)
+        found = descend(promise.problem, promise.start, ground.noise, rounds=rounds, tolerance=1e-3)
         tried.append(replace(promise, cost=found.cost, start=found.x))
     return min(tried, key=lambda p: p.cost)
 

@@ -50,3 +50,8 @@ def likelier(without: Hypothesis, with_: Hypothesis) -> bool:
     own = any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
     learned = float(with_.by_run.sum() - without.by_run.sum()) > (LEARNED if own else 0.0)
     return learned and with_.score - without.score > WORTH
+
+
+def helps(without: Hypothesis, with_: Hypothesis) -> bool:
+    """Whether an addition has evidence at all, on the runs fitted to alone or on all of them."""
+    return fits(without, with_) or likelier(without, with_)
