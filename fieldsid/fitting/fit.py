@@ -31,6 +31,11 @@ from fieldsid.registry import members, pick
 SHORTEST = 40
 STILL = 1e-4
 """Range in rad below which a fin does not move: a servo's own step is larger."""
+DRAG_EXPONENT = 2.0
+THRUST_EXPONENTS = (0.0, 3.0)
+"""What a straight run's thrust can go with: the same command at every speed, up to a drag that steepens."""
+TELLING_SPEEDS = 0.1
+"""Spread of the runs' log speed from which their thrusts say how thrust goes with speed."""
 AUTO = "auto"
 
 
@@ -190,7 +195,7 @@ def model_of(problem: Problem, solution: Solution) -> Model:
 
 
 def trained(problem: Problem) -> dict[str, float]:
-    """Return what the data reached: speeds, largest fin and rate, seconds, longest held fin."""
+    """Return what the data reached: speeds, largest fin and rate, seconds, longest held fin, helpers' means, thrust law."""
     records = problem.records
     speeds = [r.speed for r in records if np.isfinite(r.speed)]
     rates = [float(np.max(np.abs(r.rate[r.rate_ok]))) for r in records if r.rate_ok.any()]
@@ -203,9 +208,24 @@ def trained(problem: Problem) -> dict[str, float]:
         "held_s": max(longest_hold(r) for r in records),
     }
     roles = {role for r in records for role in r.signals}
-    return known | {
-        f"{role}_mean": float(np.mean([r.signals[role].mean() for r in records if role in r.signals])) for role in sorted(roles)
-    }
+    means = {f"{o}_mean": float(np.mean([r.signals[o].mean() for r in records if o in r.signals])) for o in sorted(roles)}
+    return known | means | (_thrust_law(records) if "thrust" in roles else {})
+
+
+def _thrust_law(records: Sequence[Record]) -> dict[str, float]:
+    """Return how the thrust went with the speed u from run to run: thrust_at_1_m_s u^thrust_exponent.
+
+    The exponent is that of the runs' means where their speeds tell, and the two of a hull's drag where they do not.
+    """
+    runs = [r for r in records if "thrust" in r.signals and r.speed > 0]
+    if not runs:
+        return {}
+    thrust, speed = np.array([r.signals["thrust"].mean() for r in runs]), np.array([r.speed for r in runs])
+    mean, exponent = float(np.mean(thrust)), DRAG_EXPONENT
+    if np.ptp(np.log(speed)) > TELLING_SPEEDS and np.all(thrust * mean > 0):
+        slope = np.polynomial.Polynomial.fit(np.log(speed), np.log(np.abs(thrust)), 1).convert().coef[1]
+        exponent = float(np.clip(slope, *THRUST_EXPONENTS))
+    return {"thrust_at_1_m_s": mean / float(np.mean(speed**exponent)), "thrust_exponent": exponent}
 
 
 def longest_hold(record: Record) -> float:

@@ -15,11 +15,10 @@ import numpy.typing as npt
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core, Effect
+from fieldsid.models.effect import Core
 from fieldsid.models.model import Model
-from fieldsid.models.signal_path import combined_terms
 from fieldsid.models.simulate import effects_of
-from fieldsid.turning.plant import EXPONENT, as_trained
+from fieldsid.turning.plant import EXPONENT, straight_moment
 from fieldsid.turning.source import Source, draw_values
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -156,13 +155,14 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
     authority = column(names.authority) * ratio
     coupled = cored("cross_damping")
     shared = {n: np.array([v[n] for v in values]) for n in ("lag", "delay", "max_rate") if n in model.values}
+    trim = column(names.trim) * model.law.trim_factor(speed) + straight_moment(model, parts, values, np.array([speed]))[:, 0]
     return LinearPlant(
         axis=model.axis,
         speed=speed,
         damping=column(names.damping) * scale**exponents,
         stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness),
         authority=authority,
-        offset=(column(names.trim) * model.law.trim_factor(speed) + _helpers_moment(model, parts, values, speed)) / authority,
+        offset=trim / authority,
         quadratic=cored("quadratic"),
         beyond_square=cored("beyond_square"),
         crossflow=cored("crossflow"),
@@ -172,14 +172,6 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
         cross_quadratic=cored("cross_quadratic"),
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
     )
-
-
-def _helpers_moment(model: Model, parts: Sequence[Effect], values: Sequence[Mapping[str, float]], speed: float) -> FloatArray:
-    """Return the moment (d,) rad/s^2 of thrust, depth and speed on a straight run as the model's own were."""
-    record = as_trained(model, speed)
-    own = [e for e in parts if e.terms is not None and {"thrust", "depth", "surge"} & set(e.needs)]
-    moments = [combined_terms(record, own, v).moment for v in values]
-    return np.array([0.0 if m is None else float(np.mean(m)) for m in moments])
 
 
 def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -> Sequence[FloatArray]:

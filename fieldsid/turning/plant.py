@@ -42,7 +42,10 @@ class Scaled:
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """One model, d draws of its values; draw 0 is the estimate itself. Arrays (d, 1); `fin` by rate sign, (d, 1) rad."""
+    """One model, d draws of its values; draw 0 is the estimate itself. Arrays (d, 1); `fin` by rate sign, (d, 1) rad.
+
+    `moment` (d, s) is at the speeds that turns are entered at.
+    """
 
     model: Model
     effects: tuple[Effect, ...]
@@ -100,10 +103,13 @@ class Plant:
 ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "length", "moment", "damping_more", "sway_seen")
 
 
-def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: float, exponents: FloatArray) -> Plant:
+def plant_of(
+    model: Model, draws: Sequence[Mapping[str, float]], fin_limit: float, exponents: FloatArray, entry: FloatArray
+) -> Plant:
     """Return the plant of a model for draws of its values (the first its own), at a fin command of +/-fin_limit rad.
 
-    `exponents` (d,) are the damping exponents of the draws. Raises what the effects' hooks raise.
+    `exponents` (d,) are the damping exponents of the draws, `entry` (s,) the speeds in m/s that turns are entered at: a
+    propeller keeps the thrust it had there. Raises what the effects' hooks raise.
     """
     names = NAMES[model.axis]
     parts = effects_of(model)
@@ -111,7 +117,9 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
     values = [starts | {EXPONENT: float(e)} | dict(d) for d, e in zip(draws, exponents, strict=True)]
     sign = float(np.sign(model.base[names.authority])) or 1.0
     steady = as_trained(model, _known(model.law.reference))
+    own = [e for e in parts if not follows_the_run(e)]
     terms = [combined_terms(steady, parts, v) for v in values]
+    free = [combined_terms(steady, own, v) for v in values]
 
     def column(numbers: Sequence[float]) -> FloatArray:
         return np.array(numbers, dtype=np.float64)[:, None]
@@ -126,7 +134,7 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
         core=_scaled_core(parts, values),
         length=column([_core(parts, v, 1.0).length for v in values]),
         fin={s: column(settled_fins(parts, values, s * sign * fin_limit, steady.speed)) for s in (1.0, -1.0)},
-        moment=column([_mean(t.moment, 0.0) for t in terms]),
+        moment=straight_moment(model, parts, values, entry) + column([_mean(t.moment, 0.0) for t in free]),
         damping_more=column([_mean(t.damping, 0.0) for t in terms]),
         factors=(
             column([_mean(t.damping_factor, 1.0) for t in terms]),
@@ -137,11 +145,35 @@ def plant_of(model: Model, draws: Sequence[Mapping[str, float]], fin_limit: floa
     )
 
 
+def straight_moment(
+    model: Model, parts: Sequence[Effect], values: Sequence[Mapping[str, float]], speeds: FloatArray
+) -> FloatArray:
+    """Return the moment (d, s) rad/s^2 of thrust, depth and speed on straight runs at speeds (s,) in m/s, fin at zero."""
+    own = [e for e in parts if follows_the_run(e)]
+    out = np.zeros((len(values), speeds.size))
+    if own:
+        for j, speed in enumerate(speeds):
+            record = as_trained(model, float(speed))
+            out[:, j] = [_mean(combined_terms(record, own, v).moment, 0.0) for v in values]
+    return out
+
+
+def follows_the_run(effect: Effect) -> bool:
+    """Return whether an effect's terms follow signals that a straight run has."""
+    return effect.terms is not None and bool({"thrust", "depth", "surge"} & set(effect.needs))
+
+
 def as_trained(model: Model, speed: float) -> Record:
-    """Return a straight run at a speed with the fin at zero, thrust and depth as they were on average where the model is from."""
+    """Return a straight run at a speed in m/s with the fin at zero, at the thrust and depth of the runs the model is from.
+
+    The thrust goes with the speed as it did from run to run there.
+    """
     time, fin = _step(0.0)
-    means = {role: model.trained.get(f"{role}_mean", 0.0) for role in ("thrust", "depth")}
-    signals = {role: np.full(time.size, mean) for role, mean in means.items() if np.isfinite(mean)}
+    known = model.trained
+    thrust, depth = known.get("thrust_mean", 0.0), known.get("depth_mean", 0.0)
+    if "thrust_at_1_m_s" in known:
+        thrust = known["thrust_at_1_m_s"] * speed ** known["thrust_exponent"]
+    signals = {r: np.full(time.size, v) for r, v in (("thrust", thrust), ("depth", depth)) if np.isfinite(v)}
     return command_record(model.axis, time, fin, speed=speed, signals=signals)
 
 

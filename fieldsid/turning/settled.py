@@ -44,7 +44,7 @@ def settled_turns(
         used = np.flatnonzero(weight[index])
         if not used.size:
             continue
-        plant, slowing = _plant_and_slowing(model, rudder, surge, draws, rng, float(np.median(entry[used])))
+        plant, slowing = _plant_and_slowing(model, rudder, surge, draws, rng, entry[used])
         for side, total in sums.items():
             turn = steady_turn(plant, slowing, entry[used], SIDES[side])
             after = turn_transient(plant, slowing, entry[used], SIDES[side], rudder)
@@ -74,10 +74,11 @@ class _Sums:
 
 
 def _plant_and_slowing(
-    model: Model, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator, speed: float
+    model: Model, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator, entry: FloatArray
 ) -> tuple[Plant, Slowing]:
     values, exponents = draw_values(model, draws, rng)
-    plant = plant_of(model, values, rudder, exponents)
-    kept = steady_turn(plant.one(), no_slowing(1), np.array([speed]), 1.0)
-    curvature = float(np.abs(kept.rate[0, 0]) / kept.surge[0, 0])
+    plant = plant_of(model, values, rudder, exponents, entry)
+    kept = steady_turn(plant.one(), no_slowing(1), entry, 1.0)
+    middle = int(np.argsort(entry)[entry.size // 2])
+    curvature = float(np.abs(kept.rate[0, middle]) / kept.surge[0, middle])
     return plant, draw_slowing(surge, curvature if np.isfinite(curvature) else FALLBACK_CURVATURE, draws, rng)

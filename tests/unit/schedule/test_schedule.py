@@ -12,6 +12,8 @@ from truth.paper import PITCH, YAW
 
 from fieldsid.errors import ArtifactError, ModelError, UsageError
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.schedule.controller import KINDS, Gains, least_damping
 from fieldsid.schedule.design import Wish, design_gains
 from fieldsid.schedule.make import design_schedule
@@ -20,7 +22,7 @@ from fieldsid.schedule.plant import FinLimits, LinearPlant, plants_at
 from fieldsid.schedule.record import load_schedule, save_schedule
 from fieldsid.schedule.response import depth_response, overshoot, settling, steady_error, step_response
 from fieldsid.schedule.verify import checked_speeds, constant_row, verify_schedule
-from fieldsid.turning.source import load_source
+from fieldsid.turning.source import Source, load_source
 
 
 def source_of(folder, rows, names):
@@ -240,3 +242,16 @@ def test_an_unstable_plant_is_refused_for_p_and_held_by_pd():
         design_gains(plant(damping=-0.2), Wish(), 0.26)
     held = design_gains(plant(damping=-0.2), Wish(kind="pd"), 0.26)
     assert least_damping(plant(damping=-0.2), held.gains) > 0.5
+
+
+def test_the_trim_offset_holds_the_propellers_moment_at_each_speeds_thrust():
+    values = {"a22": 1.2, "b2": -1.6, "C0": 0.016, "prop_moment": 0.02}
+    trained = {"thrust_at_1_m_s": 2.0, "thrust_exponent": 2.0}
+    law = SpeedLaw(1.5)
+    model = Model(Axis.YAW, ("prop_moment",), values, {}, tuple(values), np.zeros((4, 4)), law, Noise(0.01, 0.01), trained)
+    source = Source(Axis.YAW, (), (model,), ("made",), None, ())
+    for speed in (1.0, 2.0):
+        offset = float(plants_at(source, speed, FinLimits(), 1, 0)[0][0].offset[0])
+        authority = model.at_speed(speed)["b2"]
+        wanted = (0.016 * law.trim_factor(speed) + 0.02 * 2.0 * speed**2) / authority
+        assert offset == pytest.approx(wanted)

@@ -40,8 +40,9 @@ def model_of(name, sign=-1.0, **base):
 
 
 def turn_of(model, side, speed=1.5, fin=0.3, slowing=None, entry=None):
-    plant = plant_of(model, [dict(model.values)], fin, np.array([model.law.damping_exponent]))
-    return plant, steady_turn(plant, slowing or no_slowing(1), np.array(entry or [speed]), side)
+    speeds = np.array(entry or [speed])
+    plant = plant_of(model, [dict(model.values)], fin, np.array([model.law.damping_exponent]), speeds)
+    return plant, steady_turn(plant, slowing or no_slowing(1), speeds, side)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -144,3 +145,23 @@ def test_without_surge_a_typical_loss_is_taken_and_spread_widely():
     low, high = np.percentile(1.0 - 1.0 / factors, [2.5, 97.5])
     assert low < 0.06
     assert high > 0.4
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_a_propellers_moment_is_that_of_the_thrust_at_each_speed(exponent):
+    """What the simulation settles at when its thrust goes with the speed of the approach as the training runs' did."""
+    values = {"a22": 1.5, "b2": -2.0, "C0": 0.02, "prop_moment": 0.02, "prop_trimmed": -0.03}
+    trained = {"thrust_at_1_m_s": 3.0, "thrust_exponent": exponent}
+    model = Model(
+        Axis.YAW, ("prop_moment",), values, {}, tuple(values), np.zeros((5, 5)), SpeedLaw(1.5), Noise(0.01, 0.01), trained
+    )
+    time = np.arange(0.0, 60.0, 0.05)
+    for speed in (0.8, 1.5, 2.5):
+        thrust = np.full(time.size, 3.0 * speed**exponent)
+        record = command_record(Axis.YAW, time, np.full(time.size, -0.3), speed=speed, signals={"thrust": thrust})
+        wanted = float(simulate(model, record, state=(0.0, 0.0, 0.0)).rate[-1])
+        plant, turn = turn_of(model, 1.0, entry=[0.8, 1.5, 2.5])
+        at = [0.8, 1.5, 2.5].index(speed)
+        assert turn.rate[0, at] == pytest.approx(wanted, rel=1e-6)
+        after = turn_transient(plant, no_slowing(1), np.array([0.8, 1.5, 2.5]), 1.0, 0.3)
+        assert np.isfinite(after.tactical_diameter[at])
