@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.colour import LAGS, ljung_box
 from fieldsid.fitting.predict import Prediction
-from fieldsid.fitting.tails import chi_square_tail
+from fieldsid.fitting.whiteness import LEAST, white_p
 from fieldsid.logs.run import FloatArray
 
 
@@ -52,7 +51,7 @@ def r_squared(measured: FloatArray, simulated: FloatArray) -> float:
 
 def whiteness_p(residual: FloatArray) -> float:
     """Return the probability of a residual at least as coloured as this one if it were white; NaN when too short."""
-    return chi_square_tail(ljung_box(residual), LAGS) if residual.size >= 4 * LAGS else float("nan")
+    return white_p([residual]) if residual.size >= LEAST else float("nan")
 
 
 def _rms(values: FloatArray) -> float:

@@ -29,7 +29,7 @@ BETTER = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Flown:
+class FreeRun:
     """A free run of output error, its errors, and the share of the base's error it falls to."""
 
     trial: Trial
@@ -44,10 +44,10 @@ def freely(search: Search) -> Hypothesis | None:
     without one of its effects is left among what the search has tried.
     """
     base = search.base()
-    best = start = Flown(base.shown, base.errors, 1.0)
-    front, seen = [start], dict[frozenset[str], Flown]()
+    best = start = FreeRun(base.shown, base.errors, 1.0)
+    front, seen = [start], dict[frozenset[str], FreeRun]()
     for _ in range(LARGEST):
-        grown: dict[frozenset[str], Flown] = {}
+        grown: dict[frozenset[str], FreeRun] = {}
         for current in front:
             for new in _tried(search, current.trial):
                 _keep(seen, new)
@@ -65,14 +65,14 @@ def freely(search: Search) -> Hypothesis | None:
     return found
 
 
-def _keep(known: dict[frozenset[str], Flown], new: Flown) -> None:
+def _keep(known: dict[frozenset[str], FreeRun], new: FreeRun) -> None:
     """Keep a free run where none of the same effects is better."""
     key = frozenset(new.trial.names)
     if key not in known or new.fall < known[key].fall:
         known[key] = new
 
 
-def _thinned(search: Search, best: Flown, seen: dict[frozenset[str], Flown]) -> tuple[Flown, list[Flown]]:
+def _thinned(search: Search, best: FreeRun, seen: dict[frozenset[str], FreeRun]) -> tuple[FreeRun, list[FreeRun]]:
     """Return a free run less the effects that the others have made idle, and what it is without each that is left."""
     while True:
         effects = [e for e in best.trial.effects if e.name not in search.known]
@@ -87,7 +87,7 @@ def _thinned(search: Search, best: Flown, seen: dict[frozenset[str], Flown]) -> 
         best = idle
 
 
-def _without(search: Search, trial: Trial, gone: Effect) -> Flown:
+def _without(search: Search, trial: Trial, gone: Effect) -> FreeRun:
     problem = trial.problem.with_effects([e for e in trial.effects if e is not gone])
     x = carried(trial.problem.layout, trial.x, problem.layout)
     return _flown(search, refine(problem, x, trial.weights, ROUNDS, FINE))
@@ -98,20 +98,20 @@ def _hypothesis(search: Search, trial: Trial) -> Hypothesis:
     return replace(hypothesis_of(judged, search.validation), plain=trial)
 
 
-def _flown(search: Search, trial: Trial) -> Flown:
+def _flown(search: Search, trial: Trial) -> FreeRun:
     base = search.base()
     flown = flown_by(bare_model(trial.problem, trial.x, base.judged.noise), trial, search.validation)
     errors = Pair(training_errors(trial), unseen_errors(flown, search.validation))
-    return Flown(trial, errors, _fall(errors, base.errors))
+    return FreeRun(trial, errors, _fall(errors, base.errors))
 
 
-def _tried(search: Search, current: Trial) -> list[Flown]:
+def _tried(search: Search, current: Trial) -> list[FreeRun]:
     """Return the most promising effects' free runs, each from the screen's start and from its declared one."""
     ground = ground_of(current.problem, current.x, current.weights)
     left = [e for e in search.catalogue if e.name not in current.names]
     promises = sorted(search.beside.each(partial(promise_of, ground), left), key=lambda p: p.cost)
 
-    def followed(promise: Promise) -> Flown:
+    def followed(promise: Promise) -> FreeRun:
         search.report("+".join((*current.names, promise.effect.name)))
         screened = refine(promise.problem, shortened(ground, promise).start, current.weights, ROUNDS, FINE)
         return _flown(search, min((screened, _declared(promise, current)), key=lambda t: t.weights.angle * t.weights.rate))

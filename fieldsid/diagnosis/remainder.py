@@ -15,9 +15,9 @@ import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.memory import follows
-from fieldsid.fitting.colour import LAGS, ljung_box
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.tails import chi_square_tail, f_tail, pearson3_tail
+from fieldsid.fitting.whiteness import white_p
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.record import Record
@@ -83,17 +83,7 @@ def _left(problem: Problem, x: FloatArray, run: int, h: Hypothesis) -> Left:
 
 
 def _colour(runs: Sequence[Left]) -> float:
-    smallest = 1.0
-    for channel in range(2):
-        statistic, freedom = 0.0, 0
-        for run in runs:
-            ok = run.record.ok[channel]
-            if ok.sum() > 4 * LAGS:
-                statistic += ljung_box(run.white[channel][ok])
-                freedom += LAGS
-        if freedom:
-            smallest = min(smallest, chi_square_tail(statistic, freedom))
-    return min(1.0, 2.0 * smallest)
+    return min(1.0, 2.0 * min(white_p(run.white[c][run.record.ok[c]] for run in runs) for c in range(2)))
 
 
 def _features(run: Left, width: int) -> dict[str, FloatArray]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.colour import dynamics_of, residuals_of
-from fieldsid.fitting.descent import descend
+from fieldsid.fitting.colour import residuals_of
+from fieldsid.fitting.descent import descend, dynamics_of
 from fieldsid.fitting.noise import estimate_noise, log_likelihood
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import twin_of

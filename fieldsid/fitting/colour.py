@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from fieldsid.fitting.descent import dynamics_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import best_noise
-from fieldsid.fitting.tails import chi_square_tail
-from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, ljung_box
+from fieldsid.fitting.whiteness import WHITE_ENOUGH, white_p
 from fieldsid.fitting.whitening import is_white, whiten
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
-
-__all__ = ["LAGS", "best_noise", "chosen_noise", "dynamics_of", "ljung_box", "residuals_of", "whiteness"]
 
 
 def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:
@@ -21,20 +17,13 @@ def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:
 
 def whiteness(problem: Problem, x: FloatArray, noise: Noise) -> float:
     """Return the p-value of the Ljung-Box statistic of the whitened residuals, the smaller of both channels doubled."""
-    smallest = 1.0
-    for channel in range(2):
-        statistic, freedom = 0.0, 0
-        for run, record in enumerate(problem.records):
-            ok = record.ok[channel]
-            if ok.sum() < 4 * LAGS:
-                continue
-            residual, base = problem.residual(x, run)
-            white, _ = whiten(record, noise, base.damping, base.stiffness, residual[None])
-            statistic += ljung_box(white[0, channel][ok])
-            freedom += LAGS
-        if freedom:
-            smallest = min(smallest, 2.0 * chi_square_tail(statistic, freedom))
-    return min(smallest, 1.0)
+    whites: tuple[list[FloatArray], ...] = ([], [])
+    for run, record in enumerate(problem.records):
+        residual, base = problem.residual(x, run)
+        white, _ = whiten(record, noise, base.damping, base.stiffness, residual[None])
+        for channel, series in enumerate(whites):
+            series.append(white[0, channel][record.ok[channel]])
+    return min(1.0, 2.0 * min(map(white_p, whites)))
 
 
 def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, Noise, tuple[Note, ...]]:

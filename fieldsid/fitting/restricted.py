@@ -17,8 +17,7 @@ from fieldsid.fitting.descent import covariance
 from fieldsid.fitting.kalman import innovations
 from fieldsid.fitting.noise import FAMILIES, estimate_noise
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.tails import chi_square_tail
-from fieldsid.fitting.whiteness import LAGS, WHITE_ENOUGH, ljung_box
+from fieldsid.fitting.whiteness import WHITE_ENOUGH, white_p
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
@@ -135,17 +134,10 @@ def best_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, Nois
 def whitened(lines: list[Line], family: str, found: Mapping[str, tuple[Noise, float]]) -> bool:
     """Whether the innovations of the residuals under a family's noise pass as white."""
     noise = noise_vector(found[family][0])
-    for channel in range(2):
-        statistic, count = 0.0, 0
-        for line in lines:
-            r = line.record
-            ok = r.ok[channel]
-            if ok.sum() < 4 * LAGS:
-                continue
-            white = np.empty((1, *line.residual.shape))
-            innovations(r.even, r.ok, line.damping, line.stiffness, noise, line.stack[:1], white)
-            statistic += ljung_box(white[0, channel][ok])
-            count += LAGS
-        if count and chi_square_tail(statistic, count) < WHITE_ENOUGH:
-            return False
-    return True
+    whites = [np.empty((1, *line.residual.shape)) for line in lines]
+    for line, white in zip(lines, whites, strict=True):
+        innovations(line.record.even, line.record.ok, line.damping, line.stiffness, noise, line.stack[:1], white)
+    return all(
+        white_p(w[0, channel][line.record.ok[channel]] for line, w in zip(lines, whites, strict=True)) >= WHITE_ENOUGH
+        for channel in range(2)
+    )
