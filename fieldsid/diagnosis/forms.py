@@ -12,7 +12,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_r
 from fieldsid.diagnosis.trial import judge
 from fieldsid.diagnosis.worth import asks_for_more, likelier, refines
 from fieldsid.fitting.colour import residuals_of
-from fieldsid.fitting.descent import cost_of, descend
+from fieldsid.fitting.descent import Descent, cost_of, descend
 from fieldsid.fitting.layout import Layout
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried
@@ -24,6 +24,9 @@ from fieldsid.models.record import Record
 LIKELY, GLIMPSE, KEPT, ROUNDS, COARSE = 6, 2, 3, 6, 1e-3
 """Starts of a form that are followed, for how many rounds, how many of them go on, for how many more before the best is
 judged; and the share of the cost a round must gain."""
+TRIFLE = 0.4
+"""Log likelihood under the hypothesis' own noise that a form must have gained by then to be judged: the rest of the way brings
+no more, and what unseen runs say of numbers that are next to nothing is next to nothing."""
 
 
 def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise, beside: Beside) -> Hypothesis:
@@ -40,18 +43,24 @@ def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise, beside: Besi
 
 
 def in_other_forms(h: Hypothesis, told: Noise, family: str, beside: Beside) -> list[Hypothesis]:
-    """Return a hypothesis with every form that one of its effects has besides its own, judged as in the search."""
-    left = residuals_of(h.judged.trial.problem, h.judged.trial.x) if any(e.forms for e in h.effects) else []
+    """Return a hypothesis with every form that gains anything of those its effects have besides their own, judged."""
+    trial, noise = h.judged.trial, h.judged.noise
+    if not any(e.forms for e in h.effects):
+        return []
+    left, before = residuals_of(trial.problem, trial.x), cost_of(trial.problem, trial.x, noise)
 
-    def judged_in(of: tuple[Effect, Form]) -> Hypothesis:
-        problem, start = _begun(h, *of, left)
-        judged = judge(problem, start, h.judged.noise, told, family, rival=h.judged.likelihood)
+    def judged_in(of: tuple[Effect, Form]) -> Hypothesis | None:
+        problem, begun = _begun(h, *of, left)
+        if 0.5 * (before - begun.cost) < TRIFLE:
+            return None
+        judged = judge(problem, begun.x, noise, told, family, rival=h.judged.likelihood)
         return hypothesis_of(judged, h.validation)
 
-    return beside.each(judged_in, [(effect, form) for effect in h.effects for form in effect.forms])
+    tried = beside.each(judged_in, [(effect, form) for effect in h.effects for form in effect.forms])
+    return [other for other in tried if other is not None]
 
 
-def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:
+def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, Descent]:
     """Return the form's problem and the best of its starts after a few rounds under the hypothesis' noise.
 
     The edges of an actuator are sought again with the form's own numbers: a cost with edges has many ends.
@@ -66,7 +75,7 @@ def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]
     likely = sorted(starts, key=lambda x: cost_of(problem, x, noise))[:LIKELY]
     found = [descend(problem, x, noise, rounds=GLIMPSE, tolerance=COARSE) for x in likely]
     best = sorted(found, key=lambda d: d.cost)[:KEPT]
-    return problem, min((descend(problem, d.x, noise, rounds=ROUNDS, tolerance=COARSE) for d in best), key=lambda d: d.cost).x
+    return problem, min((descend(problem, d.x, noise, rounds=ROUNDS, tolerance=COARSE) for d in best), key=lambda d: d.cost)
 
 
 def _points(

@@ -36,8 +36,9 @@ and the smallest inconsistency of its sensors would weigh more than all that the
 FAR = 4.0
 """Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
 off, a textbook's shape tells little, and the first of two effects less."""
-MUCH = 2.0
-"""Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
+MUCH, LITTLE = 2.0, 0.75
+"""Error over the floor from which something is missing even where no effect is of much help in the textbook's form, and the share
+of it that one of little help leaves: one of two alike leaves less."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 TRIM_TURNS = 2
@@ -202,9 +203,7 @@ class Search:
         Where that is a better end, its leading children are judged from there too.
         """
         child, parent = next(iter(self._children(key)), None), self.tried[key]
-        if child is None:
-            return
-        again = self._judged_from(parent, child)
+        again = self._judged_from(parent, child) if child else parent.judged
         if again.likelihood > parent.judged.likelihood + SETTLED:
             self.tried[key] = parent = with_free_run(hypothesis_of(again, self.validation), self.floor)
             for late in self._children(key)[:LEADING]:
@@ -230,10 +229,11 @@ class Search:
     def _improve(self, key: frozenset[str], names: Sequence[frozenset[str]]) -> None:
         """Put children under another law of the speed, and into other forms, where that has more evidence.
 
-        Where none has any as it is, and much is left, what is missing may be any child in another form.
+        Where none is of much help as it is, and much is left, what is missing may be any child in another form.
         """
-        parent = self.tried[key]
-        lost = self.error(parent) > MUCH and not any(helps(parent, self.tried[n]) for n in names)
+        parent, error = self.tried[key], self.error(self.tried[key])
+        of_help = [n for n in names if helps(parent, self.tried[n]) and self.error(self.tried[n]) < LITTLE * error]
+        lost = error > MUCH and not of_help
         names = [frozenset(c.names) for c in self._children(key)] if lost else names
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
@@ -395,5 +395,5 @@ def search(
     known: Sequence[str] = (), report: Callable[[str], None] = lambda _text: None,
 ) -> Search:  # fmt: skip
     """Return a search ready to go; known effects are part of its base."""
-    floor = floor_of([*records, *validation])
-    return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor, tuple(known), report=report)
+    runs, unseen, floor = tuple(records), tuple(validation), floor_of([*records, *validation])
+    return Search(runs, unseen, axis, tuple(catalogue), floor, tuple(known), report=report)

@@ -24,7 +24,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
         path,
         record.steps,
         lambda d: d + more * np.abs(d) + bend * d * d,
-        lambda d: 0.5 * d * d * (1.0 + more * np.sign(d)) + bend / 3.0 * d**3,
+        lambda d: 0.5 * d * d * (1.0 + more * np.sign(d)) + bend / 3.0 * d * d * d,
     )
 
 

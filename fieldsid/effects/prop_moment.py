@@ -9,36 +9,20 @@ both. In pitch `speed_moment` says both. Source: Carlton 2018, Marine Propellers
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
-from fieldsid.models.jit import jit
+from fieldsid.models.lag import lagged
 from fieldsid.models.record import Record
 
 FASTEST_S = 1e-6
 """A lag below this changes nothing."""
 
 
-@jit
-def behind(steps: FloatArray, values: FloatArray, lag: float, out: FloatArray) -> None:
-    """Fill out (n,) with a signal (n,) seen through a first-order lag in s, straight between samples, from rest on it."""
-    out[0] = values[0]
-    for i in range(steps.shape[0]):
-        h = steps[i]
-        slope = (values[i + 1] - values[i]) / h
-        line = values[i] - slope * lag
-        out[i + 1] = line + slope * h + (out[i] - line) * np.exp(-h / lag)
-
-
 def terms(values: Values, record: Record) -> Terms:
     """Return the moment of the propeller, (n,) rad/s^2."""
     thrust, lag = record["thrust"], float(values.get("build_up", 0.0))
     if lag > FASTEST_S:
-        late = np.empty(thrust.size)
-        behind(record.steps, thrust, lag, late)
-        thrust = late
+        thrust = lagged(record.steps, thrust, lag)
     moment = values["prop_moment"] * thrust + values.get("prop_square", 0.0) * thrust * thrust
     trimmed = float(values.get("prop_trimmed", 0.0))
     return Terms(moment=moment + trimmed * (record.speed**2 - 1.0) if trimmed else moment)

@@ -39,7 +39,7 @@ EFFECT = Effect(
     equation="delta = sign(d) * (stall_angle + slope_after * (|d| - stall_angle)) for |d| > stall_angle, else d",
     coefficients=(
         ANGLE,
-        Coefficient("slope_after", "1", -1.0, 0.95, 0.0, says="slope of the lift beyond it, as a share of the slope before"),
+        Coefficient("slope_after", "1", -1.0, 0.99, 0.0, says="slope of the lift beyond it, as a share of the slope before"),
     ),
     telltale="large commands give less turn than simulated while small ones fit, whatever the rate",
     excited_by=("stairs", "square_pulses", "multisine", "zigzag", "turning_circle"),

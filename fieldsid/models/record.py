@@ -13,6 +13,7 @@ from fieldsid.errors import DataError, EffectError
 from fieldsid.logs.run import FloatArray, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.cross import cross_speed
 from fieldsid.models.effect import FinPath
 from fieldsid.models.smoothing import smoothed
 
@@ -135,15 +136,17 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     if axis is Axis.YAW and angle_ok.any():
         angle = angle.copy()
         angle[angle_ok] = np.unwrap(angle[angle_ok])
-    roles = {**ROLES, "cross": names.cross}
+    held = _held_fin(run.signals[column])
     signals = {
-        role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0)) for role, c in roles.items() if run.has(c)
+        role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0)) for role, c in ROLES.items() if run.has(c)
     }
+    if run.has(names.cross):
+        signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
     return Record(
         name=run.name,
         axis=axis,
         time=run.time,
-        fin=_held_fin(run.signals[column]),
+        fin=held,
         fin_is_held=not measured,
         fin_is_measured=measured,
         angle=angle,

@@ -3,10 +3,15 @@
     min_z  sum_i w_i (v_i - z_i)^2 + (T/h)^4 sum_i (z_(i-1) - 2 z_i + z_(i+1))^2
 which passes what is slower than T and leaves out what is faster, without phase. T is the one of least generalised
 cross-validation error; the trace of the smoother comes from one random vector of fixed seed.
-Sources: Whittaker 1923, On a new method of graduation; Craven and Wahba 1979; Girard 1989, Numer. Math. 56 (the trace).
+What is known to move the signal may be given as columns: the smoother then only has to follow what they leave, where that
+validates better, and passes less noise.
+Sources: Whittaker 1923, On a new method of graduation; Craven and Wahba 1979; Girard 1989, Numer. Math. 56 (the trace);
+Green and Silverman 1994, Nonparametric Regression and Generalized Linear Models, chapter 4 (columns beside a smoother).
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -23,14 +28,18 @@ HELD_S = 1.0
 """A value repeated for no longer than this was held by the log until the sensor's next one."""
 NEIGHBOURS, WILD, LARGE = 9, 8.0, 0.1
 """Values a running median is taken over; spreads, and share of the signal's own range, beyond which one is wild."""
+LINE = 2
 ENOUGH = 20_000
 """Samples from whose first part a longer signal's T is found."""
 
 
-def smoothed(time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0) -> FloatArray:
+def smoothed(
+    time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0, beside: Sequence[FloatArray] = ()
+) -> FloatArray:  # fmt: skip
     """Return a signal (n,) without its noise and its gaps (NaN), at times (n,) s; T is at least `fastest_s` s.
 
-    Values that a log repeats until the sensor's next one count once, and wild ones not at all.
+    Values that a log repeats until the sensor's next one count once, and wild ones not at all. `beside` are rival sets of
+    columns (n, k) that the signal may be a sum of, but for what is smoothed.
     """
     ok = np.isfinite(values)
     full = np.interp(time, time[ok], values[ok])
@@ -39,13 +48,30 @@ def smoothed(time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0) ->
     seen[np.flatnonzero(seen)[_wild(full[seen])]] = False
     if seen.sum() < FEWEST or not step > 0.0:
         return full
-    line = np.polynomial.Polynomial.fit(time[seen], full[seen], 1)(time)
-    rest, weight = full - line, seen.astype(np.float64)
-    if not np.any(rest[seen] != 0.0):
+    straight = np.column_stack([np.ones(time.size), (time - time[0]) / float(np.ptp(time))])
+    line = _fitted(straight, full, seen)
+    if not np.any(full[seen] != line[seen]):
         return full
-    part = slice(0, ENOUGH)
-    stiffness = _best_stiffness(rest[part], weight[part], _stiffnesses(step, fastest_s))
-    return np.asarray(line + _solved(weight, stiffness, (weight * rest)[:, None])[:, 0])
+    weight, part = seen.astype(np.float64), slice(0, ENOUGH)
+    trends, left = [line], [straight.shape[1]]
+    if beside:
+        # of all that is left beside the columns of each set, not of its slow part alone: sets differ in little else
+        sums = [_fitted(np.column_stack([straight, columns]), full, seen) for columns in beside]
+        best = min(range(len(sums)), key=lambda i: float(np.sum((full - sums[i])[seen] ** 2)))
+        trends, left = [line, sums[best]], [straight.shape[1], straight.shape[1] + beside[best].shape[1]]
+    found = [
+        _best_stiffness((full - trend)[part], weight[part], _stiffnesses(step, fastest_s), spent)
+        for trend, spent in zip(trends, left, strict=True)
+    ]
+    (stiffness, _), trend = min(zip(found, trends, strict=True), key=lambda pair: pair[0][1])
+    return np.asarray(trend + _solved(weight, stiffness, (weight * (full - trend))[:, None])[:, 0])
+
+
+def _fitted(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the least-squares sum (n,) of columns (n, k) to values (n,) where seen."""
+    size = np.linalg.norm(columns[seen], axis=0)
+    scaled = columns / np.where(size > 0.0, size, 1.0)
+    return np.asarray(scaled @ np.linalg.lstsq(scaled[seen], values[seen], rcond=1e-9)[0])
 
 
 def _fresh(values: FloatArray, ok: npt.NDArray[np.bool_], step: float) -> npt.NDArray[np.bool_]:
@@ -73,16 +99,22 @@ def _stiffnesses(step: float, fastest_s: float) -> FloatArray:
     return np.asarray((np.geomspace(shortest, max(SLOWEST_S, shortest), count) / step) ** 4)
 
 
-def _best_stiffness(values: FloatArray, weight: FloatArray, stiffnesses: FloatArray) -> float:
-    """Return the stiffness of least generalised cross-validation error."""
+def _best_stiffness(
+    values: FloatArray, weight: FloatArray, stiffnesses: FloatArray, spent: int
+) -> tuple[float, float]:  # fmt: skip
+    """Return the stiffness of least generalised cross-validation error, and that error.
+
+    `spent` are the columns that were fitted before, of which the smoother passes the straight line's two itself.
+    """
     probe = np.random.default_rng(0).choice([-1.0, 1.0], values.size)
     sides = np.column_stack([weight * values, weight * probe])
     count, errors = float(weight.sum()), []
     for stiffness in stiffnesses:
         z = _solved(weight, float(stiffness), sides)
-        free = count - float(probe @ (weight * z[:, 1]))
+        free = count - float(probe @ (weight * z[:, 1])) - (spent - LINE)
         errors.append(float(np.sum(weight * (values - z[:, 0]) ** 2)) / max(free, 1e-9 * count) ** 2)
-    return float(stiffnesses[int(np.argmin(errors))])
+    best = int(np.argmin(errors))
+    return float(stiffnesses[best]), errors[best]
 
 
 def _solved(weight: FloatArray, stiffness: float, sides: FloatArray) -> FloatArray:
