@@ -2,37 +2,25 @@
 
 In a frame that drifts with the water the hull still has its log's heading; what is left is the moment of the flow
 across it, once per turn of the compass. In its other forms it goes twice as well, as the moment of a flow square across
-a long hull does, or its direction turns by current_turn rad/s.
+a long hull does, or its direction turns by current_turn rad/s; it is the stated one in the middle of a run.
 Source: Fossen 2011, section 8.3 (ocean current forces and moments).
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Form, Motion, Stage, Values
-from fieldsid.models.record import Record
+from fieldsid.models.effect import Coefficient, Core, Effect, Form, Stage, Values
 
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients; the speed's share is left to the data."""
-    if "current_turn" in values:
-        return Core()
-    return Core(heading_sin=values["current_sin"], heading_cos=values["current_cos"])
-
-
-def twice(motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return the part of the moment, (n,) rad/s^2, that goes twice per turn of the compass."""
-    return np.asarray(values["current_sin2"] * np.sin(2.0 * motion.angle) + values["current_cos2"] * np.cos(2.0 * motion.angle))
-
-
-def turning(motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return the moment, (n,) rad/s^2, of a current that has its stated direction in the middle of the run."""
-    time = record.time
-    seen = motion.angle - values["current_turn"] * (time - 0.5 * (time[0] + time[-1]))
-    return np.asarray(values["current_sin"] * np.sin(seen) + values["current_cos"] * np.cos(seen))
+    return Core(
+        heading_sin=values["current_sin"],
+        heading_cos=values["current_cos"],
+        heading_sin2=values.get("current_sin2", 0.0),
+        heading_cos2=values.get("current_cos2", 0.0),
+        heading_turn=values.get("current_turn", 0.0),
+    )
 
 
 EFFECT = Effect(
@@ -57,12 +45,10 @@ EFFECT = Effect(
                 Coefficient("current_sin2", "rad/s^2", -1.0, 1.0, 0.0, says="its part with the sine of twice the heading"),
                 Coefficient("current_cos2", "rad/s^2", -1.0, 1.0, 0.0, says="its part with the cosine of twice the heading"),
             ),
-            moment=twice,
         ),
         Form(
             "its direction turns",
             (Coefficient("current_turn", "rad/s", -0.1, 0.1, 0.0, scan=(-0.01, 0.01), says="how fast its direction turns"),),
-            moment=turning,
         ),
     ),
 )

@@ -104,7 +104,7 @@ class Pushes:
         return sens
 
     def _directions(self, slots: tuple[int, ...]) -> tuple[list[Push], FloatArray, FloatArray, FloatArray]:
-        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 11), initial states (P, 3)."""
+        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 14), initial states (P, 3)."""
         count = len(slots)
         rows: list[Push] = []
         which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
@@ -125,7 +125,7 @@ class Pushes:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _moves_start(self, d_c: FloatArray) -> float:
-        """Return how the start of the cross state moves with the core's constants (11,), the rate before the run held."""
+        """Return how the start of the cross state moves with the core's constants (14,), the rate before the run held."""
         x, before = self.start[CROSS], self.values.get("rate_before", 0.0)
         return self._settles(d_c[RATE] * before + d_c[DAMPING] * x + d_c[SQUARE] * x * abs(x))
 
@@ -166,7 +166,7 @@ class Pushes:
         return self._of_effect(name)
 
     def _by_exponent(self, factor: float, exponent: float) -> tuple[Push, FloatArray]:
-        """Return what the exponent of the speed law does to the damping and the fin's push on the cross state, and (11,)."""
+        """Return what the exponent of the speed law does to the damping and the fin's push on the cross state, and (14,)."""
         up, down = (self._core(self.values | {"damping_exponent": exponent + s}) for s in (EXPONENT, -EXPONENT))
         of_damping, by_fin = self._damping(factor), (up.cross_fin - down.cross_fin) / (2 * EXPONENT)
         mean = self.arrays.fin.mean
@@ -243,7 +243,7 @@ class Pushes:
         return (_columns(slopes) if slopes else None), (up - down) / (high - low)
 
     def _entered(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
-        """Return the drives that an effect enters, by their place, and the core's constants (11,), at these values."""
+        """Return the drives that an effect enters, by their place, and the core's constants (14,), at these values."""
         effects, record = self.layout.effects, self.record
         fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
         terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)

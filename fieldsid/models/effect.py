@@ -3,11 +3,12 @@
 Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The core integrates
     angle' = p
     p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - crossflow F(w, p)
-         + heading_sin sin(angle) + heading_cos cos(angle) + righting_sin (angle - sin angle)
-         + righting_cos (cos angle - 1) + x
+         + heading_sin sin(seen) + heading_cos cos(seen) + heading_sin2 sin(2 seen) + heading_cos2 cos(2 seen)
+         + righting_sin (seen - sin seen) + righting_cos (cos seen - 1) + x
     x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p + cross_fin delta
-with p the rate and x the cross state (sway or heave, scaled so that its moment is +x). A run starts with x where some
-steady rate before it had left it; no motion within that rate leaves it further from zero.
+with p the rate, seen = angle - heading_turn (t - the middle of the run), and x the cross state (sway or heave, scaled so
+that its moment is +x). A run starts with x where some steady rate before it had left it; no motion within that rate leaves
+it further from zero.
 """
 
 from __future__ import annotations
@@ -70,15 +71,13 @@ class Form:
     """A shape of an effect that is not the textbook's, in a few words, and the coefficients it takes besides.
 
     The effect's hooks take the textbook's shape where the values lack them. suggest gives the start values of the shared
-    ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids. moment is
-    a hook the effect has in this form only: the core is slower with one. axes and needs are those of the form, where it has
-    fewer axes than the effect or needs more signals.
+    ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids. axes and
+    needs are those of the form, where it has fewer axes than the effect or needs more signals.
     """
 
     says: str
     coefficients: tuple[Coefficient, ...]
     suggest: Suggest | None = None
-    moment: MomentHook | None = None
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
 
@@ -139,6 +138,9 @@ class Core:
     cross_fin: float = 0.0
     cross_quadratic: float = 0.0
     beyond_square: float = 0.0
+    heading_sin2: float = 0.0
+    heading_cos2: float = 0.0
+    heading_turn: float = 0.0
 
     def plus(self, other: Core) -> Core:
         """Return the sum of two sets of coefficients; `length` is taken from whichever sets it."""
@@ -244,9 +246,8 @@ class Effect:
 
 
 def in_form(effect: Effect, form: Form) -> Effect:
-    """Return an effect with the coefficients of one of its forms among its own, and its hook."""
-    coefficients = (*effect.coefficients, *form.coefficients)
-    return replace(effect, coefficients=coefficients, forms=(), moment=form.moment or effect.moment)
+    """Return an effect with the coefficients of one of its forms among its own."""
+    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=())
 
 
 def form_of(effect: Effect, known: Collection[str]) -> Form | None:

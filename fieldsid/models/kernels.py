@@ -1,7 +1,9 @@
 """The compiled core: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
 
     y' = p
-    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) + hs sin y + hc cos y + rs (y - sin y) + rc (cos y - 1) + x
+    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) + x
+         + hs sin z + hc cos z + hs2 sin 2z + hc2 cos 2z + rs (z - sin z) + rc (cos z - 1)
+    z = y - ht (t - the middle of the run)
     x' = -e g x - (D/g) x|x| - f g^2 p + q
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
 a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
@@ -20,16 +22,16 @@ from fieldsid.models.jit import jit
 DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
 CONSTANTS = (
     "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
-    "cross_damping", "cross_rate", "cross_quadratic", "beyond_square",
+    "cross_damping", "cross_rate", "cross_quadratic", "beyond_square", "heading_sin2", "heading_cos2", "heading_turn",
 )  # fmt: skip
 DIVERGED = 1e4
 SLOWEST = 0.01
 """Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
 FAINTEST = 1e-150
-AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, FLOW, BY_LENGTH, SIN, COS = range(14)
+AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, FLOW, BY_LENGTH, SIN, COS, ARC, BY_TURN = range(16)
 """What is kept of each stage of a step: the state and the share of the interval; the derivatives of p' by y and by p, of -x'
 by x and by the cross factor; and what the derivatives of the constants multiply."""
-STAGED = 14
+STAGED = 16
 
 
 @jit
@@ -90,7 +92,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
     n = steps.shape[0] + 1
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
-    turning = _any(c, 3, 7)
+    turning, late = _turns(c), -0.5 * steps.sum()
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
@@ -109,8 +111,10 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
                     w = drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part
                     f -= c[1] * crossflow(w / c[2], ps)[0]
                 if turning:
-                    sin, cos = np.sin(ys), np.cos(ys)
-                    f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
+                    seen = ys - c[13] * (late + part * steps[i])
+                    sin, cos = np.sin(seen), np.cos(seen)
+                    f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0)
+                    f += 2.0 * c[11] * sin * cos + c[12] * (1.0 - 2.0 * sin * sin)
                 ky, kp, kx = ps, f, -(e + hold * abs(xs)) * xs - f_cross * ps + q
                 ty += _weight(stage) * ky
                 tp += _weight(stage) * kp
@@ -122,6 +126,13 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
             _spoil(out, i + 1)
             return
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        late += steps[i]
+
+
+@jit
+def _turns(c: FloatArray) -> bool:
+    """Whether any of the constants (14,) goes with the sine or the cosine of the angle."""
+    return _any(c, 3, 7) or _any(c, 11, 13)
 
 
 @jit
@@ -182,18 +193,18 @@ def tangents(
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
     d_drive (K, n-1, 8) holds derivatives of the drives; which (P,) is the row of each parameter in it, -1 for
-    none; d_c (P, 11) those of the constants; d_start (P, 3) those of the initial state. All parameters go through one
+    none; d_c (P, 14) those of the constants; d_start (P, 3) those of the initial state. All parameters go through one
     linear map a step, see `_map_row`.
     """
     n, count = steps.shape[0] + 1, d_c.shape[0]
     s, has_c = d_start.copy(), np.zeros(count, dtype=np.bool_)
     stages, rows, push, pull = np.zeros((STAGED, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
-    turning, flowing, raised = _any(c, 3, 7), c[1] != 0.0, c[10] != 0.0
+    turning, flowing, raised, late = _turns(c), c[1] != 0.0, c[10] != 0.0, -0.5 * steps.sum()
     crossing = _is_crossing(drive, c, start, d_drive, d_c, d_start)
     for j in range(count):
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
         has_c[j] = _any(d_c[j], 0, d_c.shape[1])
-        turning, flowing = turning or _any(d_c[j], 3, 7), flowing or d_c[j, 1] != 0.0
+        turning, flowing = turning or _turns(d_c[j]), flowing or d_c[j, 1] != 0.0
         raised = raised or d_c[j, 10] != 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
@@ -223,10 +234,15 @@ def tangents(
                     by_p -= c[1] * by_rate
                     stages[FLOW, stage], stages[BY_LENGTH, stage] = flow, c[1] * by_alpha * alpha / c[2]
                 if turning:
-                    sin, cos = np.sin(ys), np.cos(ys)
-                    f += c[3] * sin + c[4] * cos + c[5] * (ys - sin) + c[6] * (cos - 1.0)
-                    by_y += c[3] * cos - c[4] * sin + c[5] * (1.0 - cos) - c[6] * sin
-                    stages[SIN, stage], stages[COS, stage] = sin, cos
+                    clock = late + part * steps[i]
+                    seen = ys - c[13] * clock
+                    sin, cos = np.sin(seen), np.cos(seen)
+                    sin2, cos2 = 2.0 * sin * cos, 1.0 - 2.0 * sin * sin
+                    f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0) + c[11] * sin2 + c[12] * cos2
+                    slope = c[3] * cos - c[4] * sin + 2.0 * (c[11] * cos2 - c[12] * sin2) + c[5] * (1.0 - cos) - c[6] * sin
+                    by_y += slope
+                    stages[SIN, stage], stages[COS, stage], stages[ARC, stage] = sin, cos, seen - sin
+                    stages[BY_TURN, stage] = slope * clock
                 square = xs * abs(xs)
                 stages[AT_Y, stage], stages[AT_P, stage], stages[AT_X, stage], stages[PART, stage] = ys, ps, xs, part
                 stages[BY_Y, stage], stages[BY_P, stage], stages[BY_X, stage] = by_y, by_p, damp + 2.0 * hold * abs(xs)
@@ -263,13 +279,15 @@ def tangents(
                         to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
                 if has_c[j]:
                     for l in range(4):
-                        ys, ps, xs = stages[AT_Y, l], stages[AT_P, l], stages[AT_X, l]
+                        ps, xs = stages[AT_P, l], stages[AT_X, l]
                         e = -d_c[j, 0] * stages[DRAG, l] - d_c[j, 10] * stages[BY_POWER, l]
                         if flowing:
                             e += d_c[j, 2] * stages[BY_LENGTH, l] - d_c[j, 1] * stages[FLOW, l]
                         if turning:
-                            e += d_c[j, 3] * stages[SIN, l] + d_c[j, 4] * stages[COS, l]
-                            e += d_c[j, 5] * (ys - stages[SIN, l]) + d_c[j, 6] * (stages[COS, l] - 1.0)
+                            sin, cos = stages[SIN, l], stages[COS, l]
+                            e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * stages[ARC, l] + d_c[j, 6] * (cos - 1.0)
+                            e += 2.0 * d_c[j, 11] * sin * cos + d_c[j, 12] * (1.0 - 2.0 * sin * sin)
+                            e -= d_c[j, 13] * stages[BY_TURN, l]
                         to_y += push[0, l] * e
                         to_p += push[1, l] * e
                         if crossing:
@@ -287,5 +305,6 @@ def tangents(
                 _spoil(sens[j].T, i + 1)
             return
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        late += steps[i]
         for j in range(count):
             sens[j, 0, i + 1], sens[j, 1, i + 1] = s[j, 0], s[j, 1]

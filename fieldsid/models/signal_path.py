@@ -39,7 +39,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """Arrays of the core: drive (n-1, 8), constants (11,), pieces per interval; what they came from: fin path, terms, core."""
+    """Arrays of the core: drive (n-1, 8), constants (14,), pieces per interval; what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
@@ -128,7 +128,7 @@ def _flow(end: str, record: Record) -> FloatArray:
 
 
 def constants_of(core: Core) -> FloatArray:
-    """Return a core's coefficients as the vector (11,) that the kernel takes; the fin's push on the cross state is a drive."""
+    """Return a core's coefficients as the vector (14,) that the kernel takes; the fin's push on the cross state is a drive."""
     return np.array([getattr(core, name) for name in kernels.CONSTANTS])
 
 

@@ -12,8 +12,8 @@ from fieldsid.models.linear_core import accumulate
 from fieldsid.models.signal_path import pieces_for
 
 N, H = 80, 0.05
-C = dict(zip(kernels.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3), strict=True))
-LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0])
+C = dict(zip(kernels.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4), strict=True))
+LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0])
 
 
 def drive(seed=4):
@@ -31,16 +31,18 @@ def oracle(rows, c, start):
     """Interval by interval with DOP853: inputs are smooth inside each."""
     xi = (np.arange(800) + 0.5) / 800 - 0.5
     path, y = [np.array(start)], np.array(start)
-    for a, k, m0, m1, g, q, w0, w1 in rows:
+    for i, (a, k, m0, m1, g, q, w0, w1) in enumerate(rows):
 
-        def slope(t, s, a=a, k=k, m0=m0, m1=m1, g=g, q=q, w0=w0, w1=w1):
+        def slope(t, s, i=i, a=a, k=k, m0=m0, m1=m1, g=g, q=q, w0=w0, w1=w1):
             part = t / H
+            seen = s[0] - c["heading_turn"] * ((i + part) * H - 0.5 * (N - 1) * H)
             flow = (w0 + (w1 - w0) * part) / c["length"] + xi * s[1]
             drag = 32.0 * np.mean(flow * np.abs(flow) * xi)
             p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["crossflow"] * drag + s[2]
             p -= c["quadratic"] * np.sign(s[1]) * 0.2**2 * (abs(s[1]) / 0.2) ** (2.0 + c["beyond_square"])
-            p += c["heading_sin"] * np.sin(s[0]) + c["heading_cos"] * np.cos(s[0])
-            p += c["righting_sin"] * (s[0] - np.sin(s[0])) + c["righting_cos"] * (np.cos(s[0]) - 1.0)
+            p += c["heading_sin"] * np.sin(seen) + c["heading_cos"] * np.cos(seen)
+            p += c["heading_sin2"] * np.sin(2.0 * seen) + c["heading_cos2"] * np.cos(2.0 * seen)
+            p += c["righting_sin"] * (seen - np.sin(seen)) + c["righting_cos"] * (np.cos(seen) - 1.0)
             held = c["cross_damping"] * g + c["cross_quadratic"] / g * abs(s[2])
             return [s[1], p, -held * s[2] - c["cross_rate"] * g * g * s[1] + q]
 
@@ -88,3 +90,21 @@ def test_the_linear_core_leaves_the_residual_of_the_general_one(a, k):
     left = measured - out[:, :2].T
     assert square[0, 0] == pytest.approx(float(np.sum((weight * left) ** 2)), rel=1e-10)
     np.testing.assert_allclose(square[7, :2], np.sum(np.where(weight > 0, left, 0.0) ** 2, axis=1), rtol=1e-10)
+
+
+def test_the_tangents_of_every_constant_are_its_central_differences():
+    steps, c, start, rows = np.full(N - 1, H), np.array(list(C.values())), np.array([0.1, -0.05, 0.02]), drive()
+    count = c.size
+    out, sens = np.empty((N, 3)), np.empty((count, 2, N))
+    kernels.tangents(
+        steps, rows, c, start, 2, np.zeros((1, N - 1, 8)), np.full(count, -1.0), np.eye(count), np.zeros((count, 3)), out, sens
+    )
+    for j, name in enumerate(kernels.CONSTANTS):
+        ends = []
+        for side in (1.0, -1.0):
+            moved, path = c.copy(), np.empty((N, 3))
+            moved[j] += side * 1e-5
+            kernels.simulate(steps, rows, moved, start, 2, path)
+            ends.append(path[:, :2].T)
+        wanted = (ends[0] - ends[1]) / 2e-5
+        np.testing.assert_allclose(sens[j], wanted, atol=2e-6 * (1.0 + np.abs(wanted).max()), err_msg=name)
