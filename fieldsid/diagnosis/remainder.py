@@ -22,6 +22,8 @@ from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.record import Record
 
+TEMPER = 0.2
+"""Power of the p-value of colour: the disturbance has one time constant, and a sea with a swell in it is no less a sea."""
 WINDOW_S = 2.0
 HISTORY_S = 3.0
 GROWTH_S, LEAST_BLOCKS = 1.0, 20
@@ -42,8 +44,8 @@ class Remainder:
 
     @property
     def p(self) -> float:
-        """The smallest of the three p-values, allowing for there being three."""
-        return min(1.0, 3.0 * min(self.colour, self.relation, self.bursts))
+        """The smallest of the three p-values, allowing for there being three, and for seas of any spectrum."""
+        return min(1.0, 3.0 * min(float(self.colour**TEMPER), self.relation, self.bursts))
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,9 @@ BESIDE_MUCH = ((0.97, BESIDE[0][1]),)
 """The same where what is left is beyond any sea: most of a base that is far off is explained by whatever bends."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
+FILTER_S = 1.0
+"""Time constant of coloured sensors, in s, below which their colour is their own, and no error: a motion that is missing lasts as
+long as a maneuver."""
 FAINT, STORM = 2.0, 4.0
 """Error over the noise floor below which only what moves with the vehicle is told from the sea, since gusts come in bursts
 too; and the error above which no sea is taken for granted."""
@@ -45,10 +48,9 @@ class Verdict:
 
 def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     """Return the verdict on the hypothesis a search ended at."""
-    error = search.error(found)
-    visible = error > VISIBLE
+    error, floor = search.error(found), shown_floor(search.floor, found.judged.noise)
+    visible = (found.judging.over(floor) if found.judged.noise.coloured_time < FILTER_S else error) > VISIBLE
     if frozenset(found.names) == search.root:
-        floor = shown_floor(search.floor, found.judged.noise)
         sea = max(found.judging.over(floor), found.train.over(floor))
         p = 3.0 * left.relation if max(error, found.train.over(search.floor)) < FAINT else left.p
         odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
