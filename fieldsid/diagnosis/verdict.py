@@ -22,6 +22,8 @@ BEYOND_CHANCE = 2e-2
 BESIDE = ((0.7, 1e-6), (0.5, 1e-3), (0.3, BEYOND_CHANCE))
 """Share of the excess error an effect must explain to be named where what is left is less likely than this p-value: a form
 is never exact, but the less it explains the less it may leave."""
+LEAVES, BESIDE_SOME = 1.6, ((0.85, BESIDE[0][1]),)
+"""Error over the noise floor that a form of the right effect hardly leaves, and the share to be explained beyond it."""
 BESIDE_MUCH = ((0.97, BESIDE[0][1]),)
 """The same where what is left is beyond any sea: most of a base that is far off is explained by whatever bends."""
 VISIBLE = 1.15
@@ -56,8 +58,8 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
         odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
     share = explained(search, found)
-    much = error > STORM and not search.is_noiseless
-    if visible and any(left.p < p and share < enough for enough, p in (*BESIDE, *(BESIDE_MUCH if much else ()))):
+    asked = BESIDE if error <= LEAVES or search.is_noiseless else (*BESIDE, *(BESIDE_SOME if error <= STORM else BESIDE_MUCH))
+    if visible and any(left.p < p and share < enough for enough, p in asked):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:

@@ -1,6 +1,7 @@
 """The rate gyro has an offset: rate_measured = rate + bias, rad/s; the angle is right.
 
-Shows only where the angle is measured beside the rate, or where the trim is known. Source: Fossen 2011, chapter 11
+In its other form it wanders off as the gyro warms up: rate_measured = rate + bias + bias_drift t, t in minutes from the first
+sample. Shows only where the angle is measured beside the rate, or where the trim is known. Source: Fossen 2011, chapter 11
 (strapdown sensors); Groves 2013, chapter 4.
 """
 
@@ -8,17 +9,22 @@ from __future__ import annotations
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
 from fieldsid.models.record import Record
+
+MINUTE_S = 60.0
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
-    return Motion(motion.angle, motion.rate + values["bias"])
+    if "bias_drift" not in values:
+        return Motion(motion.angle, motion.rate + values["bias"])
+    minutes = (record.time - record.time[0]) / MINUTE_S
+    return Motion(motion.angle, motion.rate + values["bias"] + values["bias_drift"] * minutes)
 
 
 def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
-    """Return small moves of the motion (P, 2, n) as the gyro shows them: a constant offset leaves them."""
+    """Return small moves of the motion (P, 2, n) as the gyro shows them: an offset leaves them."""
     return moves
 
 
@@ -35,4 +41,10 @@ EFFECT = Effect(
     source="Groves 2013, chapter 4",
     measure=measure,
     carry=carry,
+    forms=(
+        Form(
+            "it drifts",
+            (Coefficient("bias_drift", "rad/s per minute", -0.2, 0.2, 0.0, says="what the offset grows by in a minute"),),
+        ),
+    ),
 )

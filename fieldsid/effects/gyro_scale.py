@@ -1,7 +1,9 @@
 """The rate gyro has a wrong scale: rate_measured = (1 + scale_error) rate; the angle is right.
 
-In its other form the error grows with the rate: rate_measured = (1 + scale_error + scale_cubic rate^2) rate.
-Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, chapter 4.
+In its other forms the error grows with the rate, rate_measured = (1 + scale_error + scale_cubic rate^2) rate, or differs
+from side to side, rate_measured = (1 + scale_error) rate + scale_side |rate|.
+Source: Groves 2013, Principles of GNSS, Inertial and Multisensor Integrated Navigation Systems, chapter 4 (scale factor
+error, nonlinearity and asymmetry).
 """
 
 from __future__ import annotations
@@ -16,13 +18,14 @@ from fieldsid.models.record import Record
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the gyro shows it; angle as it is, rate (n,) rad/s."""
-    bent = values.get("scale_cubic", 0.0) * motion.rate**2
-    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"] + bent))
+    bent, side = values.get("scale_cubic", 0.0) * motion.rate**2, values.get("scale_side", 0.0) * np.abs(motion.rate)
+    return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"] + bent) + side)
 
 
 def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as the gyro shows them."""
     slope = 1.0 + values["scale_error"] + 3.0 * values.get("scale_cubic", 0.0) * motion.rate**2
+    slope += values.get("scale_side", 0.0) * np.sign(motion.rate)
     return np.asarray(moves * np.stack([np.ones(slope.size), slope]))
 
 
@@ -43,6 +46,10 @@ EFFECT = Effect(
         Form(
             "the error grows with the rate",
             (Coefficient("scale_cubic", "s^2/rad^2", -1e4, 1e4, 0.0, says="share of error per square of the rate"),),
+        ),
+        Form(
+            "the error differs from side to side",
+            (Coefficient("scale_side", "1", -0.5, 0.5, 0.0, says="half the difference of the two sides' scales"),),
         ),
     ),
 )

@@ -1,7 +1,7 @@
 """A rolled hull yaws: r' += roll_moment phi, roll angle phi in rad (positive starboard down), roll_moment in 1/s^2.
 
-Rolled, the elevators and the weight beside the buoyancy have a part in the yaw plane. In its other form the roll rate has
-a part of its own, roll_rate_moment phi'.
+Rolled, the elevators and the weight beside the buoyancy have a part in the yaw plane. In its other forms the roll rate has
+a part of its own, roll_rate_moment phi', or the moment bends with the angle, roll_cubic phi^3.
 Source: Fossen 2011, section 7.5 (6-DOF underwater vehicle, coupled terms linearised in phi).
 """
 
@@ -19,7 +19,7 @@ def terms(values: Values, record: Record) -> Terms:
     moment = values["roll_moment"] * record["roll"]
     if "roll_rate_moment" in values:
         moment = moment + values["roll_rate_moment"] * np.gradient(record["roll"], record.time)
-    return Terms(moment=moment)
+    return Terms(moment=moment + values.get("roll_cubic", 0.0) * record["roll"] ** 3)
 
 
 EFFECT = Effect(
@@ -39,6 +39,10 @@ EFFECT = Effect(
         Form(
             "the roll rate has a part of its own",
             (Coefficient("roll_rate_moment", "1/s", -20.0, 20.0, 0.0, says="yaw moment per rad/s of roll rate"),),
+        ),
+        Form(
+            "it bends with the angle of roll",
+            (Coefficient("roll_cubic", "1/s^2", -1e4, 1e4, 0.0, says="yaw moment per cube of the roll in rad"),),
         ),
     ),
 )

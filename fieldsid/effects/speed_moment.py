@@ -1,18 +1,23 @@
 """A trim moment that grows with speed: q' += speed_moment u^2, u the smoothed surge in m/s, speed_moment in 1/m^2.
 
-Lift of a hull that is not symmetric top to bottom; the trim Cb is then that at zero speed.
+Lift of a hull that is not symmetric top to bottom; the trim Cb is then that at zero speed. In its
+other form it goes with another power of the speed, speed_moment u^speed_power, as where the flow separates.
 Source: Prestero 2001, chapter 4 (body lift moment M_uw u w and fin moment, both ~ u^2).
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
 from fieldsid.models.record import Record
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the moment that goes with speed squared, (n,) rad/s^2."""
+    if "speed_power" in values:
+        return Terms(moment=values["speed_moment"] * np.maximum(record["surge"], 0.0) ** values["speed_power"])
     return Terms(moment=values["speed_moment"] * record["surge"] ** 2)
 
 
@@ -29,4 +34,10 @@ EFFECT = Effect(
     source="Prestero 2001, chapter 4",
     needs=("surge",),
     terms=terms,
+    forms=(
+        Form(
+            "it goes with another power of the speed",
+            (Coefficient("speed_power", "1", 0.5, 4.0, 2.0, step=1e-3, says="power of the speed it goes with"),),
+        ),
+    ),
 )
