@@ -2,7 +2,8 @@
 
 In a frame that drifts with the water the hull still has its log's heading; what is left is the moment of the flow
 across it, once per turn of the compass. In its other forms it goes twice as well, as the moment of a flow square across
-a long hull does, or its direction turns by current_turn rad/s; it is the stated one in the middle of a run.
+a long hull does, its direction turns by current_turn rad/s and is the stated one in the middle of a run, or the moment goes
+with a power of the run's speed: lift of the flow across the hull is in proportion to both.
 Source: Fossen 2011, section 8.3 (ocean current forces and moments).
 """
 
@@ -13,10 +14,11 @@ from fieldsid.models.effect import Coefficient, Core, Effect, Form, Stage, Value
 
 
 def core(values: Values, scale: float) -> Core:
-    """Return the core's coefficients; the speed's share is left to the data."""
+    """Return the core's coefficients; scale is the run's speed over the reference speed."""
+    lift = scale ** values["current_power"] if "current_power" in values else 1.0
     return Core(
-        heading_sin=values["current_sin"],
-        heading_cos=values["current_cos"],
+        heading_sin=values["current_sin"] * lift,
+        heading_cos=values["current_cos"] * lift,
         heading_sin2=values.get("current_sin2", 0.0),
         heading_cos2=values.get("current_cos2", 0.0),
         heading_turn=values.get("current_turn", 0.0),
@@ -45,6 +47,10 @@ EFFECT = Effect(
                 Coefficient("current_sin2", "rad/s^2", -1.0, 1.0, 0.0, says="its part with the sine of twice the heading"),
                 Coefficient("current_cos2", "rad/s^2", -1.0, 1.0, 0.0, says="its part with the cosine of twice the heading"),
             ),
+        ),
+        Form(
+            "it grows with the speed",
+            (Coefficient("current_power", "1", -1.0, 3.0, 1.0, step=1e-3, says="power of the run's speed it goes with"),),
         ),
         Form(
             "its direction turns",

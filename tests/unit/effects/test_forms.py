@@ -21,7 +21,7 @@ NEUTRAL = {
     "falling_share": 1.0, "slackening": 1.0, "off_middle": 0.0, "lift_bend": 0.0, "prop_square": 0.0, "build_up": 0.0,
     "roll_rate_moment": 0.0, "scale_cubic": 0.0, "clock_drift": 0.0, "depth_square": 0.0, "current_sin2": 0.0,
     "current_cos2": 0.0, "current_turn": 0.0, "stall_drop": 0.0, "munk_exponent": 2.0, "prop_trimmed": 0.0,
-    "scale_side": 0.0, "bias_drift": 0.0, "roll_cubic": 0.0, "speed_power": 2.0,
+    "scale_side": 0.0, "bias_drift": 0.0, "roll_cubic": 0.0, "speed_power": 2.0, "current_power": 0.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 GENTLE = {"cross_quadratic": 4.0, "cross_fin": 0.5}
