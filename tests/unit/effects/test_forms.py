@@ -142,3 +142,24 @@ def test_a_fin_that_stays_out_is_its_rule_applied_finely(jump, release):
             shown[k] = np.sign(d) * (abs(d) - (1.0 - jump) * width) if moves else 0.0
         assert path.mean[i] == pytest.approx(shown.mean(), abs=2e-4)
         assert path.end[i] - path.start[i] == pytest.approx(shown[-1] - shown[0], abs=3e-4)
+
+
+def test_a_gyros_other_forms_are_their_equations_and_carry_small_moves_as_they_move():
+    log, rate = record(), np.linspace(-0.4, 0.5, len(record()))
+    motion, moves = Motion(np.zeros(rate.size), rate), np.ones((1, 2, rate.size))
+    sided = pick_effect("gyro_scale")
+    values = {"scale_error": 0.1, "scale_side": -0.3}
+    np.testing.assert_allclose(sided.measure(motion, values, log).rate, np.where(rate > 0, 0.8, 1.4) * rate)
+    np.testing.assert_allclose(sided.carry(moves, motion, values, log)[0, 1], np.where(rate > 0, 0.8, 1.4))
+    drifting = pick_effect("gyro_bias").measure(motion, {"bias": 0.01, "bias_drift": 0.06}, log)
+    np.testing.assert_allclose(drifting.rate - rate, 0.01 + 0.001 * (log.time - log.time[0]))
+
+
+def test_moments_of_roll_speed_and_current_go_with_the_powers_that_their_forms_say():
+    log = record()
+    roll = pick_effect("roll_coupling").terms({"roll_moment": 0.5, "roll_cubic": -2.0}, log).moment
+    np.testing.assert_allclose(roll, 0.5 * log["roll"] - 2.0 * log["roll"] ** 3)
+    speed = pick_effect("speed_moment").terms({"speed_moment": 0.02, "speed_power": 1.3}, log).moment
+    np.testing.assert_allclose(speed, 0.02 * 1.4**1.3)
+    core = pick_effect("current").core({"current_sin": 0.1, "current_cos": -0.2, "current_power": 1.5}, 2.0)
+    assert (core.heading_sin, core.heading_cos) == pytest.approx((0.1 * 2.0**1.5, -0.2 * 2.0**1.5))
