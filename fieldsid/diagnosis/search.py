@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldsid.diagnosis.again import begun_again
 from fieldsid.diagnosis.beside import Beside
+from fieldsid.diagnosis.floor import is_noiseless
 from fieldsid.diagnosis.forms import reshaped
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
@@ -64,7 +65,7 @@ class Search:
     trims_turned: int = 0
     told: Noise = field(init=False)
     is_noiseless: bool = False
-    """Whether the logs show so little noise that the base errs by a hundred times it."""
+    """Whether the logs show so little noise that the base errs by a hundred times it in all that was measured."""
     grown_from: set[frozenset[str]] = field(default_factory=set)
     flown_from: set[frozenset[str]] = field(default_factory=set)
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
@@ -90,7 +91,7 @@ class Search:
             known = [e for e in self.catalogue if e.name in self.known]
             trials = (base_trial(self.records, self.axis, known, groups, self.floor) for groups in laws)
             trial = min(trials, key=lambda t: error_by_law(t, self.axis))
-            self.is_noiseless = at_least(self.floor, TOLD, trial.weights) != self.floor
+            self.is_noiseless = is_noiseless(self.floor, at_least(self.floor, TOLD, trial.weights), self.records)
             self.hear(trial)
             families = (self.family,) if self.family else NOISES
             self.told = at_least(self.floor, TOLD, trial.weights)
