@@ -3,13 +3,14 @@
 A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted
 noise model are white, of even size throughout, and not related to the fin or the motion. Three tests look for what
 is not so: colour (Ljung-Box), relation to fin and motion (F test, the score test of diagnosis/memory.py, and a size that
-grows with them), and bursts or uneven size (windowed energy).
+grows with them), and bursts or uneven size (the largest windowed energy, and the spread of all).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 
@@ -27,6 +28,8 @@ TEMPER = 0.2
 WINDOW_S = 2.0
 HISTORY_S = 3.0
 GROWTH_S, LEAST_BLOCKS = 1.0, 20
+EVEN_S, BLOCKS = 0.5, 8
+"""Blocks of slow innovations, in s, and how many make a window whose energies are to be alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,7 @@ def remainder_of(h: Hypothesis) -> Remainder:
     relation = min(1.0, 3.0 * relation)
     bursts, run, window, ratio = _bursts(runs)
     start = runs[run].record.time[0] + window * WINDOW_S
+    bursts = min(1.0, 2.0 * min(bursts, _unevenness(runs)))
     return Remainder(_colour(runs), relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
 
 
@@ -182,6 +186,23 @@ def _bursts(runs: Sequence[Left]) -> tuple[float, int, int, float]:
                 if p < smallest:
                     smallest, where = p, (i, index, float(energy[index] / average / width))
     return min(1.0, smallest * max(count, 1)), *where
+
+
+def _unevenness(runs: Sequence[Left]) -> float:
+    """Return the p-value of window energies that differ by more than those of a steady disturbance, each run by its own mean.
+
+    Of w blocks with variance one the mean square X has the cumulants (r-1)! (2/w)^(r-1); the sum of (X - 1)^2 over windows
+    is tested by its first three moments (Pearson's type III).
+    """
+    squared = [_blocks(_slow(run, EVEN_S)[0] ** 2, BLOCKS) for run in runs]
+    y = np.concatenate([(x / x.mean() - 1.0) ** 2 for x in squared if x.size > 1 and x.mean() > 0.0] or [np.zeros(0)])
+    if y.size < LEAST_BLOCKS:
+        return 1.0
+    k2, k3, k4, k6 = (factorial(r - 1) * (2.0 / BLOCKS) ** (r - 1) for r in (2, 3, 4, 6))
+    fourth, sixth = k4 + 3.0 * k2**2, k6 + 15.0 * k4 * k2 + 10.0 * k3**2 + 15.0 * k2**3
+    variance, third = fourth - k2**2, sixth - 3.0 * fourth * k2 + 2.0 * k2**3
+    z = float(np.sum(y - k2)) / np.sqrt(y.size * variance)
+    return pearson3_tail(z, third / variance**1.5 / np.sqrt(y.size))
 
 
 def _energy(run: Left, channel: int, *, slow: bool) -> tuple[int, FloatArray] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.diagnosis.remainder import Left, _growth
+from fieldsid.diagnosis.remainder import Left, _growth, _unevenness
 from fieldsid.models.axis import Axis
 from fieldsid.models.simulate import command_record
 
@@ -39,3 +39,30 @@ def test_innovations_that_grow_with_the_motion_are_seen():
 def test_a_run_without_motion_says_nothing():
     rng = np.random.default_rng(3)
     assert _growth([left(rng, 0.0, lively=False)])[0] == 1.0
+
+
+def uneven(rng, burst):
+    """A run whose innovations are `burst` times as large in a quarter of the time, three seconds each."""
+    run = left(rng, 0.0)
+    time = run.record.time
+    size = np.where(np.sin(2.0 * np.pi * time / 12.0 + rng.uniform(0.0, 6.0)) > 0.7, burst, 1.0)
+    return Left(run.record, run.white * size, run.rate)
+
+
+def test_a_steady_disturbance_is_seldom_said_to_be_uneven():
+    rng = np.random.default_rng(4)
+    p = np.array([_unevenness([left(rng, 0.0) for _ in range(3)]) for _ in range(1000)])
+    assert np.mean(p < 0.05) <= 0.06
+    assert np.mean(p < 0.005) <= 0.012
+
+
+def test_a_disturbance_of_another_size_in_every_run_is_even():
+    rng = np.random.default_rng(5)
+    runs = [[Left(r.record, k * r.white, r.rate) for k, r in zip((1.0, 3.0, 0.4), made, strict=True)] for made in
+            ([left(rng, 0.0) for _ in range(3)] for _ in range(200))]  # fmt: skip
+    assert np.mean([_unevenness(r) < 0.05 for r in runs]) <= 0.08
+
+
+def test_bursts_are_seen_where_no_one_of_them_stands_out():
+    rng = np.random.default_rng(6)
+    assert np.median([_unevenness([uneven(rng, 2.5) for _ in range(3)]) for _ in range(20)]) < 1e-3
