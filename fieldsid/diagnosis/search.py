@@ -39,7 +39,7 @@ FAR = 4.0
 off, a textbook's shape tells little, and the first of two effects less."""
 MUCH, LITTLE = 2.0, 0.75
 """Error over the floor from which something is missing even where no effect is of much help in the textbook's form, and the share
-of it that one of little help leaves: one of two alike leaves less."""
+of the base's that one of little help leaves: one of two alike leaves less."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 TRIM_TURNS = 2
@@ -230,11 +230,11 @@ class Search:
     def _improve(self, key: frozenset[str], names: Sequence[frozenset[str]]) -> None:
         """Put children under another law of the speed, and into other forms, where that has more evidence.
 
-        Where none is of much help as it is, and much is left, what is missing may be any child in another form.
+        Where none is of help, of much help to the base, and much is left, what is missing may be any child in another form.
         """
         parent, error = self.tried[key], self.error(self.tried[key])
-        of_help = [n for n in names if helps(parent, self.tried[n]) and self.error(self.tried[n]) < LITTLE * error]
-        lost = error > MUCH and not of_help
+        much = error * (LITTLE if key == self.root else np.inf)
+        lost = error > MUCH and not [n for n in names if helps(parent, self.tried[n]) and self.error(self.tried[n]) < much]
         names = [frozenset(c.names) for c in self._children(key)] if lost else names
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
