@@ -37,9 +37,8 @@ and the smallest inconsistency of its sensors would weigh more than all that the
 FAR = 4.0
 """Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
 off, a textbook's shape tells little, and the first of two effects less."""
-MUCH, LITTLE = 2.0, 0.75
-"""Error over the floor from which something is missing even where no effect is of much help in the textbook's form, and the share
-of the base's that one of little help leaves: one of two alike leaves less."""
+MUCH = 2.0
+"""Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought."""
 TRIM_TURNS = 2
@@ -175,9 +174,7 @@ class Search:
         left = []
         for group, (found, free, later) in zip(groups, self.beside.each(go_all, groups), strict=True):
             key = frozenset(found.names)
-            self.tried[key] = found
-            if free:
-                self.free[key] = free
+            self.tried[key], self.free[key] = found, free
             left += [group[i] for i in later]
         return left
 
@@ -224,17 +221,15 @@ class Search:
         def flown(child: Hypothesis) -> Hypothesis:
             return with_free_run(child, self.floor, parent, self.free.get(frozenset(child.names), ()))
 
-        for child in self.beside.each(flown, children):
-            self.tried[frozenset(child.names)] = child
+        self.tried |= {frozenset(child.names): child for child in self.beside.each(flown, children)}
 
-    def _improve(self, key: frozenset[str], names: Sequence[frozenset[str]]) -> None:
+    def _improve(self, key: frozenset[str], names: Sequence[frozenset[str]], *, every: bool = False) -> None:
         """Put children under another law of the speed, and into other forms, where that has more evidence.
 
-        Where none is of help, of much help to the base, and much is left, what is missing may be any child in another form.
+        Where none has any as it is and much is left, what is missing may be any child in another form: so too where asked for.
         """
-        parent, error = self.tried[key], self.error(self.tried[key])
-        much = error * (LITTLE if key == self.root else np.inf)
-        lost = error > MUCH and not [n for n in names if helps(parent, self.tried[n]) and self.error(self.tried[n]) < much]
+        parent = self.tried[key]
+        lost = every or (self.error(parent) > MUCH and not any(helps(parent, self.tried[n]) for n in names))
         names = [frozenset(c.names) for c in self._children(key)] if lost else names
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
@@ -266,17 +261,25 @@ class Search:
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
-        best = self.base()
+        best = self._grown(self.base())
+        if self.error(best) > MUCH:
+            self._improve(self.root, [], every=True)
+            best = self._grown(self._likeliest())
+        best = begun_again(best, self.known, self.told, self.family, self.floor, self.beside)
+        self.tried[frozenset(best.names)] = best
+        return best
+
+    def _grown(self, best: Hypothesis) -> Hypothesis:
+        """Return where a hypothesis leads to, itself where all its additions were tried."""
         while frozenset(best.names) not in self.grown_from and len(best.names) < len(self.known) + LARGEST:
             current = self._climbed(best)
             if current is None:
-                return self.best()
+                best = self.base()
+                continue
             self._thinned(current)
             best = self._likeliest()
             if not asks_for_more(best, self.floor):
                 break
-        best = begun_again(best, self.known, self.told, self.family, self.floor, self.beside)
-        self.tried[frozenset(best.names)] = best
         return best
 
     def _climbed(self, current: Hypothesis) -> Hypothesis | None:
@@ -344,10 +347,8 @@ class Search:
         """Drop each effect in turn and add the best other one; keep what scores higher and predicts as well."""
         best = found
         for gone in found.effects[:-1]:
-            if gone.name in self.known:
-                continue
             rest = frozenset(n for n in found.names if n != gone.name)
-            if rest not in self.tried:
+            if gone.name in self.known or rest not in self.tried:
                 continue
             children = self.grow(self.tried[rest], most=PROMISING_INSTEAD)
             child = next((c for c in children if pays(self.tried[rest], c)), best)
@@ -376,8 +377,7 @@ class Search:
         x = carried(trial.problem.layout, trial.x, problem.layout)
         judged = judge(problem, x, h.judged.noise, self.told, self.family)
         key = frozenset(judged.trial.names)
-        before = self.tried.get(key)
-        kept = self._keep(judged)
+        before, kept = self.tried.get(key), self._keep(judged)
         if kept is not before:
             self.tried[key] = with_free_run(kept, self.floor)
         return self.tried[key]
