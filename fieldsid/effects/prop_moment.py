@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
-from fieldsid.models.lag import lagged
+from fieldsid.models.lag import behind
 from fieldsid.models.record import Record
 
 FASTEST_S = 1e-6
@@ -22,7 +22,7 @@ def terms(values: Values, record: Record) -> Terms:
     """Return the moment of the propeller, (n,) rad/s^2."""
     thrust, lag = record["thrust"], float(values.get("build_up", 0.0))
     if lag > FASTEST_S:
-        thrust = lagged(record.steps, thrust, lag)
+        thrust = behind(record.steps, thrust, lag)
     moment = values["prop_moment"] * thrust + values.get("prop_square", 0.0) * thrust * thrust
     trimmed = float(values.get("prop_trimmed", 0.0))
     return Terms(moment=moment + trimmed * (record.speed**2 - 1.0) if trimmed else moment)

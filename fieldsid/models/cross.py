@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.lag import lagged
+from fieldsid.models.lag import behind
 from fieldsid.models.smoothing import smoothed
 
 LAGS_S = np.geomspace(0.1, 20.0, 24)
@@ -31,6 +31,6 @@ def _drifts(time: FloatArray, rate: FloatArray, fin: FloatArray) -> list[FloatAr
     """Return for every T the columns (n, 4) that a turning hull's drift is a sum of."""
     steps, since = np.diff(time), time - time[0]
     return [
-        np.column_stack([rate, lagged(steps, rate, lag), lagged(steps, fin, lag), np.exp(-since / lag)])
+        np.column_stack([rate, behind(steps, rate, lag), behind(steps, fin, lag), np.exp(-since / lag)])
         for lag in LAGS_S.tolist()
     ]

@@ -9,7 +9,7 @@ from fieldsid.models.jit import jit
 
 
 @jit
-def lagged(steps: FloatArray, values: FloatArray, lag: float) -> FloatArray:
+def behind(steps: FloatArray, values: FloatArray, lag: float) -> FloatArray:
     """Return a signal (n,), straight between samples `steps` (n-1,) s apart, seen through a first-order lag in s from rest."""
     out = np.empty(values.shape[0])
     out[0] = values[0]

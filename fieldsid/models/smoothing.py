@@ -28,7 +28,6 @@ HELD_S = 1.0
 """A value repeated for no longer than this was held by the log until the sensor's next one."""
 NEIGHBOURS, WILD, LARGE = 9, 8.0, 0.1
 """Values a running median is taken over; spreads, and share of the signal's own range, beyond which one is wild."""
-LINE = 2
 ENOUGH = 20_000
 """Samples from whose first part a longer signal's T is found."""
 
@@ -53,17 +52,16 @@ def smoothed(
     if not np.any(full[seen] != line[seen]):
         return full
     weight, part = seen.astype(np.float64), slice(0, ENOUGH)
-    trends, left = [line], [straight.shape[1]]
+    trends = [(line, 0)]
     if beside:
         # of all that is left beside the columns of each set, not of its slow part alone: sets differ in little else
         sums = [_fitted(np.column_stack([straight, columns]), full, seen) for columns in beside]
         best = min(range(len(sums)), key=lambda i: float(np.sum((full - sums[i])[seen] ** 2)))
-        trends, left = [line, sums[best]], [straight.shape[1], straight.shape[1] + beside[best].shape[1]]
-    found = [
-        _best_stiffness((full - trend)[part], weight[part], _stiffnesses(step, fastest_s), spent)
-        for trend, spent in zip(trends, left, strict=True)
-    ]
-    (stiffness, _), trend = min(zip(found, trends, strict=True), key=lambda pair: pair[0][1])
+        trends.append((sums[best], beside[best].shape[1]))
+    stiffnesses, found = _stiffnesses(step, fastest_s), []
+    for trend, spent in trends:
+        found.append((*_best_stiffness((full - trend)[part], weight[part], stiffnesses, spent), trend))
+    stiffness, _, trend = min(found, key=lambda of: of[1])
     return np.asarray(trend + _solved(weight, stiffness, (weight * (full - trend))[:, None])[:, 0])
 
 
@@ -104,14 +102,14 @@ def _best_stiffness(
 ) -> tuple[float, float]:  # fmt: skip
     """Return the stiffness of least generalised cross-validation error, and that error.
 
-    `spent` are the columns that were fitted before, of which the smoother passes the straight line's two itself.
+    `spent` are the columns that were fitted before, besides the straight line's, which the smoother passes itself.
     """
     probe = np.random.default_rng(0).choice([-1.0, 1.0], values.size)
     sides = np.column_stack([weight * values, weight * probe])
     count, errors = float(weight.sum()), []
     for stiffness in stiffnesses:
         z = _solved(weight, float(stiffness), sides)
-        free = count - float(probe @ (weight * z[:, 1])) - (spent - LINE)
+        free = count - float(probe @ (weight * z[:, 1])) - spent
         errors.append(float(np.sum(weight * (values - z[:, 0]) ** 2)) / max(free, 1e-9 * count) ** 2)
     best = int(np.argmin(errors))
     return float(stiffnesses[best]), errors[best]

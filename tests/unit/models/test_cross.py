@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fieldsid.models.cross import cross_speed
-from fieldsid.models.lag import lagged
+from fieldsid.models.lag import behind
 from fieldsid.models.smoothing import smoothed
 
 NOISE = 0.02
@@ -17,7 +17,7 @@ def turning(rate_hz, *, arm=0.0, quadratic=0.0, seed=1):
     """Time, sway of a hull that turns now and then, its rate, and the fin: v' = -0.8 v - q v|v| - 0.9 r + 0.05 delta."""
     time = np.arange(0.0, 60.0, 1.0 / rate_hz)
     fin = 0.2 * np.sign(np.sin(0.5 * time)) * (np.sin(0.13 * time) > -0.3)
-    rate = lagged(np.diff(time), 0.8 * fin, 1.2)
+    rate = behind(np.diff(time), 0.8 * fin, 1.2)
 
     def slope(t, v):
         return -0.8 * v - quadratic * v * np.abs(v) - 0.9 * np.interp(t, time, rate) + 0.05 * np.interp(t, time, fin)
@@ -75,4 +75,4 @@ def test_the_lag_is_that_of_its_equation():
     want = solve_ivp(
         lambda t, y: (np.interp(t, time, signal) - y) / 0.7, (0.0, time[-1]), [signal[0]], t_eval=time, max_step=0.01, rtol=1e-10
     ).y[0]
-    np.testing.assert_allclose(lagged(np.diff(time), signal, 0.7), want, atol=1e-6)
+    np.testing.assert_allclose(behind(np.diff(time), signal, 0.7), want, atol=1e-6)
