@@ -32,6 +32,27 @@ def terms(values: Values, record: Record) -> Terms:
     return Terms(moment=moment)
 
 
+def slope(name: str, values: Values, record: Record) -> FloatArray:
+    """Return the derivative of the wave's moment by one of its numbers, (n,)."""
+    since, turns = record.time - record.time[0], 2.0 * math.pi
+    if name.startswith("second_"):
+        angle = turns * since / values["second_period"]
+        match name:
+            case "second_sin":
+                return np.asarray(np.sin(angle))
+            case "second_cos":
+                return np.asarray(np.cos(angle))
+        swing = values["second_sin"] * np.cos(angle) - values["second_cos"] * np.sin(angle)
+        return np.asarray(-swing * angle / values["second_period"])
+    bent = 0.5 * since * (since - since[-1])
+    shifted = turns * (since + values.get("sweep", 0.0) * bent) / values["period"]
+    if name == "amplitude":
+        return np.asarray(np.sin(shifted + values["phase"]))
+    by_angle = values["amplitude"] * np.cos(shifted + values["phase"])
+    of_angle = {"phase": 1.0, "period": -shifted / values["period"], "sweep": turns * bent / values["period"]}
+    return np.asarray(by_angle * of_angle[name])
+
+
 def suggest(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
     """Return the wave of each period that stands out of what is left."""
     return [{"period": period, "amplitude": 0.02} for period in swings(records, residuals)]
@@ -119,6 +140,7 @@ EFFECT = Effect(
     mistaken_for=("trim_drift", "roll_coupling", "depth_buoyancy", "step_change"),
     source="Fossen 2011, section 8.2",
     terms=terms,
+    slope=slope,
     suggest=suggest,
     forms=FORMS,
 )

@@ -115,8 +115,10 @@ def with_times(problem: Problem, x: FloatArray, noise: Noise) -> tuple[Problem, 
     return problem, refit_own(problem, x, 0, noise)
 
 
-def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatArray:
+def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise, *, anew: bool = True) -> FloatArray:
     """Return x with a run's own slots (initial state, phases, event times) at their best, the rest untouched.
+
+    anew: its nuisances are sought over their grids too, not only from where they are, at their best under another noise.
 
     Under white noise, a second pass weighs the run by the residual it leaves and the initial state by what the first
     second shows of it: an initial state must not wander off to hide an error of the model.
@@ -125,9 +127,8 @@ def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise) -> FloatA
     alone = Problem((problem.records[run],), _layout_of_one(problem.layout, run))
     keep = [*range(problem.layout.shared), *own]
     free = range(problem.layout.shared, len(keep))
-    found = [
-        descend(alone, start, noise, free=free, rounds=OWN_ROUNDS, tolerance=OWN) for start in scanned_starts(alone, x[keep])
-    ]
+    starts = scanned_starts(alone, x[keep]) if anew else [x[keep]]
+    found = [descend(alone, start, noise, free=free, rounds=OWN_ROUNDS, tolerance=OWN) for start in starts]
     best = min(found, key=lambda d: d.cost)
     out = x.copy()
     if not np.isfinite(best.cost):

@@ -11,7 +11,7 @@ from fieldsid.fitting.layout import START_NAMES, Layout
 from fieldsid.logs.run import FloatArray
 from fieldsid.models import kernels
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Coefficient, Core, Effect, FinPath, Motion, Values
+from fieldsid.models.effect import Core, Effect, FinPath, Motion, Values
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import (
     Assembled,
@@ -230,11 +230,14 @@ class Pushes:
         return by_own * factor if name == self.authority else -by_own * self._over_reference()
 
     def _of_effect(self, name: str) -> tuple[Push | None, FloatArray]:
-        """Central difference of the arrays by an effect's coefficient; they are cheap, and no motion enters."""
-        coefficient = self._coefficient(name)
-        owner = next(e for e in self.layout.effects if any(c.name == name for c in e.coefficients))
+        """Return an effect's own slope where it has one, else the central difference of the arrays: no motion enters them."""
+        owner, coefficient = next((e, c) for e in self.layout.effects for c in e.coefficients if c.name == name)
+        none = np.zeros(len(kernels.CONSTANTS))
         if owner.measure is not None:
-            return None, np.zeros(len(kernels.CONSTANTS))
+            return None, none
+        if owner.slope is not None:
+            slope = owner.slope(name, self.values, self.record)
+            return _columns({MOMENT[0]: slope[:-1], MOMENT[1]: slope[1:]}), none
         step = coefficient.step
         high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
         (above, up), (below, down) = (self._entered(owner, self.values | {name: value}) for value in (high, low))
@@ -256,9 +259,6 @@ class Pushes:
             drives[MOMENT[0]] = drives[MOMENT[0]] + moment[:-1]
             drives[MOMENT[1]] = drives[MOMENT[1]] + moment[1:]
         return drives, self.arrays.constants if owner.core is None else constants_of(core)
-
-    def _coefficient(self, name: str) -> Coefficient:
-        return next(c for e in self.layout.effects for c in e.coefficients if c.name == name)
 
     def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
         """Return what the sensors show, and carry the sensitivities (P, 2, n) through them in place."""

@@ -182,6 +182,8 @@ class Effect:
 
     fin(path, values, record) -> FinPath                    actuator, in rising `order`
     terms(values, record) -> Terms                          hydrodynamics known before integration
+    slope(name, values, record) -> (n,) rad/s^2             optional, where the terms are a moment and no more: its derivative by
+                                                            one of the coefficients; without it differences are taken
     core(values, scale) -> Core                             hydrodynamics inside the core; scale = speed / reference
     moment(motion, values, record) -> (n,) rad/s^2          hydrodynamics evaluated along the last trajectory
     measure(motion, values, record) -> Motion               sensor
@@ -210,6 +212,7 @@ class Effect:
     order: int = 0
     fin: Callable[[FinPath, Values, Record], FinPath] | None = None
     terms: Callable[[Values, Record], Terms] | None = None
+    slope: Callable[[str, Values, Record], FloatArray] | None = None
     core: Callable[[Values, float], Core] | None = None
     moment: MomentHook | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None

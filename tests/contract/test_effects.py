@@ -18,7 +18,7 @@ from fieldsid.models.record import Record
 EFFECTS = all_effects()
 HOOKS = {
     Stage.ACTUATOR: {"fin"},
-    Stage.HYDRODYNAMICS: {"terms", "core", "moment"},
+    Stage.HYDRODYNAMICS: {"terms", "slope", "core", "moment"},
     Stage.SENSOR: {"measure", "carry"},
 }
 MANEUVERS = set(all_maneuvers())
@@ -88,7 +88,7 @@ def untouched(name: str, log: Record) -> np.ndarray | float:
 
 @each_effect
 def test_exactly_the_hooks_of_its_stage_are_given(effect):
-    given = {n for n in ("fin", "terms", "core", "moment", "measure", "carry") if getattr(effect, n) is not None}
+    given = {n for n in ("fin", "terms", "slope", "core", "moment", "measure", "carry") if getattr(effect, n) is not None}
     assert given
     assert given <= HOOKS[effect.stage]
 
@@ -211,6 +211,23 @@ def test_a_path_cut_in_half_steps_keeps_its_area(effect):
     area = effect.fin(coarse.commanded, values, coarse).mean * coarse.steps
     halves = effect.fin(fine.commanded, values, fine).mean * fine.steps
     np.testing.assert_allclose(area, halves.reshape(-1, 2).sum(axis=1), atol=2e-7)
+
+
+@pytest.mark.parametrize(
+    ("effect", "form"),
+    [(e, f) for e in EFFECTS.values() if e.slope for f in (None, *e.forms)],
+    ids=lambda v: getattr(v, "name", "form"),
+)
+def test_an_effects_slopes_are_those_of_its_moment(effect, form):
+    log, coefficients = record(effect.axes[0]), effect.coefficients + (form.coefficients if form else ())
+    values = {c.name: max(c.low, c.start) + 0.1 * (min(c.high, 1.0 + c.start) - c.start) for c in coefficients}
+    values |= {"sweep": 0.004} if "sweep" in values else {}
+    for c in coefficients:
+        above, below = (effect.terms(values | {c.name: values[c.name] + s}, log) for s in (1e-5, -1e-5))
+        assert {n for n in Terms.__dataclass_fields__ if getattr(above, n) is not None} == {"moment"}
+        slope = effect.slope(c.name, values, log)
+        assert np.abs(slope).max() > 0.0
+        np.testing.assert_allclose(slope, (above.moment - below.moment) / 2e-5, atol=1e-6 * np.abs(slope).max())
 
 
 @pytest.mark.parametrize("effect", [e for e in EFFECTS.values() if e.measure], ids=lambda e: e.name)
