@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.trial import judge
-from fieldsid.diagnosis.worth import asks_for_more, likelier, refines
+from fieldsid.diagnosis.worth import WORSE, asks_for_more, likelier, refines, worse_unseen
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.descent import Descent, cost_of, descend
 from fieldsid.fitting.layout import Layout
@@ -29,35 +30,53 @@ TRIFLE = 0.4
 no more, and what unseen runs say of numbers that are next to nothing is next to nothing."""
 
 
-def reshaped(h: Hypothesis, told: Noise, family: str, floor: Noise, beside: Beside) -> Hypothesis:
-    """Return a hypothesis with its effects in other forms, the best one first, as long as that pays and something is left."""
-    while asks_for_more(h, floor):
-        best = max(in_other_forms(h, told, family, beside), key=lambda other: other.score, default=h)
-        if not likelier(h, best):
-            break
-        best = with_free_run(best, floor)
-        if not refines(h, best):
-            break
-        h = best
-    return h
+@dataclass(frozen=True, slots=True)
+class Shaping:
+    """How hypotheses are put into other forms: the noise they are judged under, the noise floor, and who helps."""
 
+    told: Noise
+    family: str
+    floor: Noise
+    beside: Beside
 
-def in_other_forms(h: Hypothesis, told: Noise, family: str, beside: Beside) -> list[Hypothesis]:
-    """Return a hypothesis with every form that gains anything of those its effects have besides their own, judged."""
-    trial, noise = h.judged.trial, h.judged.noise
-    if not any(e.forms for e in h.effects):
-        return []
-    left, before = residuals_of(trial.problem, trial.x), cost_of(trial.problem, trial.x, noise)
+    def reshaped(
+        self, h: Hypothesis, *, without: Hypothesis | None = None, effects: Collection[str] | None = None
+    ) -> Hypothesis:  # fmt: skip
+        """Return a hypothesis with its effects in other forms, the best one first, as long as that pays and something is left.
 
-    def judged_in(of: tuple[Effect, Form]) -> Hypothesis | None:
-        problem, begun = _begun(h, *of, left)
-        if 0.5 * (before - begun.cost) < TRIFLE:
-            return None
-        judged = judge(problem, begun.x, noise, told, family, rival=h.judged.likelihood)
-        return hypothesis_of(judged, h.validation)
+        Where it has no evidence over the one `without` its last effect, a form need not lower the error that it has.
+        effects are those whose forms are tried, by default all.
+        """
+        while asks_for_more(h, self.floor):
+            best = max(self.in_other_forms(h, effects), key=lambda other: other.score, default=h)
+            if not likelier(h, best):
+                break
+            best = with_free_run(best, self.floor)
+            if not refines(h, best) and (without is None or likelier(without, h)):
+                break
+            h = best
+        return h
 
-    tried = beside.each(judged_in, [(effect, form) for effect in h.effects for form in effect.forms])
-    return [other for other in tried if other is not None]
+    def in_other_forms(self, h: Hypothesis, effects: Collection[str] | None = None) -> list[Hypothesis]:
+        """Return a hypothesis with every form that gains anything of those its effects have besides their own, judged.
+
+        Where unseen runs are far worse than those fitted to, every form: these may tell next to nothing of what those show.
+        """
+        trial, noise = h.judged.trial, h.judged.noise
+        asked = [(e, form) for e in h.effects if effects is None or e.name in effects for form in e.forms]
+        if not asked:
+            return []
+        left, before = residuals_of(trial.problem, trial.x), cost_of(trial.problem, trial.x, noise)
+        least = -np.inf if worse_unseen(h, self.floor) > WORSE else TRIFLE
+
+        def judged_in(of: tuple[Effect, Form]) -> Hypothesis | None:
+            problem, begun = _begun(h, *of, left)
+            if 0.5 * (before - begun.cost) < least:
+                return None
+            judged = judge(problem, begun.x, noise, self.told, self.family, rival=h.judged.likelihood)
+            return hypothesis_of(judged, h.validation)
+
+        return [other for other in self.beside.each(judged_in, asked) if other is not None]
 
 
 def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, Descent]:

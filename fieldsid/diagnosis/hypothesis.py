@@ -74,6 +74,11 @@ class Hypothesis:
         """The errors a hypothesis is judged by: on unseen runs, on training runs where there are none."""
         return self.unseen_errors if self.validation else self.train
 
+    def worked_out(self) -> Hypothesis:
+        """Return itself with the errors it is judged by known: worked out where it was found, beside others."""
+        _ = self.judging
+        return self
+
     @property
     def own_model(self) -> Model:
         """The model of the generalised least squares, the one its likelihood belongs to."""
@@ -166,7 +171,7 @@ def _contradicts(h: Hypothesis, parent: Hypothesis) -> bool:
 
 def unseen_errors(flown: Flown, validation: Sequence[Record]) -> Errors:
     """Return the errors on unseen runs, each run's own start at its best for them."""
-    left = [left_over(p, refit_own(p, x, 0, floor_of([r]))) for (p, x), r in zip(flown, validation, strict=True)]
+    left = [left_over(p, refit_own(p, x, 0, floor_of([r]), anew=False)) for (p, x), r in zip(flown, validation, strict=True)]
     return errors_of(validation, left)
 
 
@@ -175,7 +180,7 @@ def training_errors(trial: Trial) -> Errors:
     problem = trial.problem
     left = []
     for run, record in enumerate(problem.records):
-        left.append(problem.residual(refit_own(problem, trial.x, run, floor_of([record])), run)[0])
+        left.append(problem.residual(refit_own(problem, trial.x, run, floor_of([record]), anew=False), run)[0])
     return errors_of(problem.records, left)
 
 

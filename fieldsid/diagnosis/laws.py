@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import Trial, judge, refine
 from fieldsid.diagnosis.worth import WORTH, asks_for_more
@@ -71,8 +72,8 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
 
 
 def other_trim(
-    found: Hypothesis, tried: Mapping[frozenset[str], Hypothesis], told: Noise, floor: Noise
-) -> Hypothesis | None:  # fmt: skip
+    found: Hypothesis, tried: Mapping[frozenset[str], Hypothesis], told: Noise, floor: Noise, beside: Beside
+) -> Hypothesis | None:
     """Return a hypothesis that has more evidence under the trim's other law than what was found has under this one.
 
     One of the effects found may stand in for that law. Where something is left, it may be hidden by it: what was found is
@@ -82,7 +83,7 @@ def other_trim(
     asked = [tried[k] for k in tried if k < key and len(k) == len(key) - 1]
     if asks_for_more(found, floor):
         asked += [found, max(tried.values(), key=lambda h: h.score)]
-    again = [better_trim(h, told) for h in {frozenset(h.names): h for h in asked}.values()]
+    again = beside.each(lambda h: better_trim(h, told), list({frozenset(h.names): h for h in asked}.values()))
     return max((h for h in again if h is not None and h.score > found.score), key=lambda h: h.score, default=None)
 
 

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fieldsid.diagnosis.again import begun_again
 from fieldsid.diagnosis.beside import Beside
-from fieldsid.diagnosis.floor import is_noiseless
-from fieldsid.diagnosis.forms import reshaped
+from fieldsid.diagnosis.floor import is_noiseless, told_apart
+from fieldsid.diagnosis.forms import Shaping
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
-from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine, smaller_twin
-from fieldsid.diagnosis.ways import Way, brought, by_effect, ways
+from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
+from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
 from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, helps, likelier, pays
 from fieldsid.fitting.colour import residuals_of
-from fieldsid.fitting.noise import at_least, floor_below, floor_of
+from fieldsid.fitting.noise import floor_below, floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried, overlaid
 from fieldsid.logs.run import FloatArray
@@ -26,21 +26,15 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
-NOISES = ("disturbance", "coloured")
-FREE_RUNS = 3
-PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
-"""Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise. Of
-the base, of a hypothesis with effects, and of one that is only tried in another order."""
-TOLD = 0.01
-"""Share of the base's own error below which hypotheses are not told apart. A log that was filtered shows next to no noise,
-and the smallest inconsistency of its sensors would weigh more than all that the base cannot follow."""
 FAR = 4.0
 """Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
 off, a textbook's shape tells little, and the first of two effects less."""
+HOPE = 0.5
+"""Share of the base's error that effects must have left, for a step that does not pay to be gone beyond."""
 MUCH = 2.0
 """Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 LEADING = 3
-"""Children that every way to them is gone for, whatever the first has brought."""
+"""Children that every way to them is gone for, whatever the first has brought, and that are given the free run."""
 TRIM_TURNS = 2
 """Times a search begins anew under the trim's other law: a first effect may have asked for the one that the second does not."""
 LARGEST, PAIR = 4, 2
@@ -88,13 +82,14 @@ class Search:
             self.report("base model")
             laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
             known = [e for e in self.catalogue if e.name in self.known]
-            trials = (base_trial(self.records, self.axis, known, groups, self.floor) for groups in laws)
+            trials = self.beside.each(lambda groups: base_trial(self.records, self.axis, known, groups, self.floor), laws)
             trial = min(trials, key=lambda t: error_by_law(t, self.axis))
-            self.is_noiseless = is_noiseless(self.floor, at_least(self.floor, TOLD, trial.weights), self.records)
+            self.is_noiseless = is_noiseless(self.floor, told_apart(self.floor, trial.weights), self.records)
             self.hear(trial)
             families = (self.family,) if self.family else NOISES
-            self.told = at_least(self.floor, TOLD, trial.weights)
-            judged = max((judge(trial.problem, trial.x, self.floor, self.told, f) for f in families), key=lambda j: j.likelihood)
+            self.told = told_apart(self.floor, trial.weights)
+            judgings = self.beside.each(lambda f: judge(trial.problem, trial.x, self.floor, self.told, f), families)
+            judged = max(judgings, key=lambda j: j.likelihood)
             self.family = judged.family
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
@@ -140,12 +135,13 @@ class Search:
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one that fits the training runs best: a wrong law of speed may hide it elsewhere.
 
-        Only the first of them where a hypothesis has effects and its best child is near the floor.
+        Only the first of them where a hypothesis has effects and its best child is near the floor, or has a pair of them.
         """
         children = self._children(key)
         best = sorted(children, key=lambda h: h.cost - h.by_run.sum())[:1]
-        names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:FREE_RUNS], *best)))
-        return names if key == self.root or any(self.error(h) > FAR for h in children[:1]) else names[:1]
+        names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:LEADING], *best)))
+        early = key == self.root or (len(key) < len(self.known) + PAIR and any(self.error(h) > FAR for h in children[:1]))
+        return names if early else names[:1]
 
     def _flown_before(self, parent: Hypothesis) -> None:
         """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""
@@ -169,7 +165,7 @@ class Search:
                     self._go(parent, way, rival)
                 else:
                     later.append(i)
-            return self.tried[key], self.free.get(key, []), later
+            return self.tried[key].worked_out(), self.free.get(key, []), later
 
         left = []
         for group, (found, free, later) in zip(groups, self.beside.each(go_all, groups), strict=True):
@@ -204,8 +200,9 @@ class Search:
         again = self._judged_from(parent, child) if child else parent.judged
         if again.likelihood > parent.judged.likelihood + SETTLED:
             self.tried[key] = parent = with_free_run(hypothesis_of(again, self.validation), self.floor)
-            for late in self._children(key)[:LEADING]:
-                self._keep(self._judged_from(late, parent))
+            late = self._children(key)[:LEADING]
+            for judged in self.beside.each(lambda child: self._judged_from(child, parent), late):
+                self._keep(judged)
 
     def _judged_from(self, h: Hypothesis, other: Hypothesis) -> Judged:
         """Judge a hypothesis from the numbers of another one where it has them, else from its own."""
@@ -216,7 +213,7 @@ class Search:
     def _free_runs(self, key: frozenset[str]) -> None:
         """Give the best children with evidence the free run of plain output error where that predicts unseen runs better."""
         parent = self.tried[key]
-        children = [c for c in self._children(key)[:FREE_RUNS] if c.score > parent.score]
+        children = [c for c in self._children(key)[:LEADING] if c.score > parent.score]
 
         def flown(child: Hypothesis) -> Hypothesis:
             return with_free_run(child, self.floor, parent, self.free.get(frozenset(child.names), ()))
@@ -231,13 +228,15 @@ class Search:
         parent = self.tried[key]
         lost = every or (self.error(parent) > MUCH and not any(helps(parent, self.tried[n]) for n in names))
         names = [frozenset(c.names) for c in self._children(key)] if lost else names
+        # forms of what the parent has were tried on it: the best child tries them again, and the one that goes on
+        foremost = {*names[:1], *[n for n in names if pays(parent, self.tried[n])][:1]}
 
         def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
             child = self.tried[name]
             if fits(parent, child):
                 self._other_law(name)
             if lost or helps(parent, child):
-                self._reshape(name)
+                self._reshape(name, parent, None if name in foremost else name - key)
             return self.tried[name], self.shaped.get(name)
 
         for name, (child, shaped) in zip(names, self.beside.each(better, names), strict=True):
@@ -252,11 +251,12 @@ class Search:
         if other is not None:
             self.tried[key] = with_free_run(other, self.floor)
 
-    def _reshape(self, key: frozenset[str]) -> None:
+    def _reshape(self, key: frozenset[str], without: Hypothesis | None = None, effects: Collection[str] | None = None) -> None:
         """Put a hypothesis's effects into other forms than the textbook's, unless that was tried from where it is."""
         known = self.tried[key]
         if known.score > self.shaped.get(key, -np.inf) + SETTLED:
-            self.tried[key] = reshaped(known, self.told, self.family, self.floor, self.beside)
+            shaping = Shaping(self.told, self.family, self.floor, self.beside)
+            self.tried[key] = shaping.reshaped(known, without=without, effects=effects)
             self.shaped[key] = self.tried[key].score
 
     def best(self) -> Hypothesis:
@@ -288,7 +288,7 @@ class Search:
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if pays(current, c)), None)
-            if size == 0 or (paying is None and self.error(current) > FAR):
+            if size == 0 or (paying is None and FAR < self.error(current) < HOPE * self.error(self.base())):
                 paying = self._two_at_once(current, children, paying) or paying
             current = (self._swapped(paying) if size else paying) if paying else current
             self.hear(current.judged.trial)
@@ -311,7 +311,7 @@ class Search:
         if judged is not None and judged.likelihood > found.judged.likelihood + WORTH:
             self.turned, self.family, again = True, other, hypothesis_of(judged, self.validation)
         elif self.trims_turned < TRIM_TURNS:
-            again = other_trim(found, self.tried, self.told, self.floor)
+            again = other_trim(found, self.tried, self.told, self.floor, self.beside)
             if again is not None:
                 self.trims_turned += 1
                 self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
@@ -396,5 +396,5 @@ def search(
     known: Sequence[str] = (), report: Callable[[str], None] = lambda _text: None,
 ) -> Search:  # fmt: skip
     """Return a search ready to go; known effects are part of its base."""
-    runs, unseen, floor = tuple(records), tuple(validation), floor_of([*records, *validation])
-    return Search(runs, unseen, axis, tuple(catalogue), floor, tuple(known), report=report)
+    floor = floor_of([*records, *validation])
+    return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor, tuple(known), report=report)

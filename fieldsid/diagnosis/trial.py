@@ -24,6 +24,8 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
+NOISES = ("disturbance", "coloured")
+"""Kinds of noise that hypotheses are compared under."""
 ALTERNATIONS = 3
 POLISH_ROUNDS = 8
 SETTLED = 0.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,6 +18,9 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.effect import Effect, Stage
 from fieldsid.models.record import Record
 
+PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
+"""Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise. Of
+the base, of a hypothesis with effects, and of one that is only tried in another order."""
 GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
 MORE, FOLLOWED = 3, 4
@@ -43,21 +46,32 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, beside: B
     Every way to every effect where most is None. anew: the base itself may have bent its numbers, see `_shifted`. The
     first screen is left out where its ways have been flown.
     """
-    found: list[Way] = []
-    for plain in (False,) if flown else (True, False):
-        ground = _free_ground(parent) if plain else _whitened_ground(parent)
+    grounds = [(_whitened_ground(parent), False)] if flown else [(_free_ground(parent), True), (_whitened_ground(parent), False)]
+    # both screens at once, then all that is to be followed at once: each sharing out costs a copy of the process
+    asked = [(ground, effect) for ground, _ in grounds for effect in left]
+    points = beside.each(lambda of: _foremost(*of), asked)
+    steps: list[_Step] = []
+    for i, (ground, plain) in enumerate(grounds):
+        promises = sorted(points[i * len(left) : (i + 1) * len(left)], key=lambda points: points[0].cost)
         worth = GLIMPSE_PLAIN * ground.cost if plain else GLIMPSE
-        promises = sorted(beside.each(partial(_foremost, ground), left), key=lambda points: points[0].cost)
         kept = promises if most is None else [p for p in promises[: most + plain * MORE] if ground.cost - p[0].cost > worth]
-        if plain and most is not None:
-            going = sorted(beside.each(partial(followed, ground), kept), key=lambda p: p.cost)[:most]
-        else:
-            going = beside.each(partial(shortened, ground), [points[0] for points in kept])
-        found += [Way(p, ground, plain) for p in going]
+        follows = plain and most is not None
+        steps += [_Step(ground, plain, follows, partial(followed if follows else _first_shortened, ground, p)) for p in kept]
         if plain and anew:
-            late = [e for e in left if shifts_time(e)]
-            found += [Way(p, ground, plain) for p in beside.each(partial(_shifted, ground), late)]
-    return found
+            steps += [_Step(ground, plain, False, partial(_shifted, ground, e)) for e in left if shifts_time(e)]
+    taken = list(zip(steps, beside.each(lambda step: step.take(), steps), strict=True))
+    best = sorted((Way(p, s.ground, s.plain) for s, p in taken if s.follows), key=lambda way: way.promise.cost)
+    return best[:most] + [Way(p, s.ground, s.plain) for s, p in taken if not s.follows]
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """What is still to be done for a way: a promise that is followed for some rounds to be ranked by, or one that is kept."""
+
+    ground: Ground
+    plain: bool
+    follows: bool
+    take: Callable[[], Promise]
 
 
 def by_effect(found: Sequence[Way]) -> list[list[Way]]:
@@ -90,6 +104,11 @@ def _whitened_ground(parent: Hypothesis) -> Ground:
 def _foremost(ground: Ground, effect: Effect) -> list[Promise]:
     """Return the scan points of an effect that promise most, the best first."""
     return promises_of(ground, effect)[:POINTS]
+
+
+def _first_shortened(ground: Ground, points: Sequence[Promise]) -> Promise:
+    """Return the first of some scan points, its start drawn back as far as need be."""
+    return shortened(ground, points[0])
 
 
 def followed(ground: Ground, points: Sequence[Promise], rounds: int = FOLLOWED) -> Promise:

@@ -19,6 +19,8 @@ CLEAN = 1.02
 """Error over the noise floor up to which nothing is left."""
 ALIKE = 1.03
 """Hypotheses predict alike within this factor of each other's error."""
+WORSE = 2.0
+"""Error on unseen runs over that on fitted ones above which more is left than a disturbance, which is alike on both."""
 MATTERS_MORE = 0.02
 """What a third and each further effect must bring beyond that: long explanations are the easier to find."""
 
@@ -55,3 +57,8 @@ def likelier(without: Hypothesis, with_: Hypothesis) -> bool:
 def helps(without: Hypothesis, with_: Hypothesis) -> bool:
     """Whether an addition has evidence at all, on the runs fitted to alone or on all of them."""
     return fits(without, with_) or likelier(without, with_)
+
+
+def worse_unseen(h: Hypothesis, floor: Noise) -> float:
+    """Return the error on unseen runs over that on the runs fitted to; 1 where there are no unseen ones."""
+    return h.unseen_errors.over(floor) / max(h.train.over(floor), 1.0) if h.validation else 1.0

@@ -67,11 +67,6 @@ def floor_of(records: Sequence[Record]) -> Noise:
     return Noise(max(angle, SMALLEST_ANGLE), max(rate, SMALLEST_RATE))
 
 
-def at_least(noise: Noise, share: float, errors: Noise) -> Noise:
-    """Return a white noise, raised to a share of the errors of both angle and rate."""
-    return Noise(max(noise.angle, share * errors.angle), max(noise.rate, share * errors.rate))
-
-
 def floor_below(floor: Noise, records: Sequence[Record], residuals: Sequence[FloatArray]) -> Noise:
     """Return a floor (white, both channels), lowered to what the third differences of a model's residuals [(2, n)] show.
 
