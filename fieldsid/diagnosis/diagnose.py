@@ -20,6 +20,7 @@ from fieldsid.diagnosis.search import Search, search
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.verdict import MOSTLY, Verdict, added, explained, probabilities, verdict_of
+from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects
 from fieldsid.errors import DataError, ModelError
@@ -49,23 +50,25 @@ def diagnose(
     records = [record_of(r, axis) for r in training]
     unseen = tuple(record_of(r, axis) for r in validation)
     check([*records, *unseen], axis)
-    learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
-    catalogue, skipped = usable(all_effects(axis).values(), [*learned, *judged])
+    learned, unseen, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
+    catalogue, skipped = usable(all_effects(axis).values(), [*learned, *unseen])
     missing = [n for n in known if n in skipped]
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
-    work = search(learned, judged, axis, catalogue, known=known, report=report)
+    work = search(learned, unseen, axis, catalogue, known=known, report=report)
     found = work.best()
-    left = remainder_of(found)
-    verdict = verdict_of(work, found, left)
+    judged = in_its_weather(found)
+    left = remainder_of(judged)
+    verdict = verdict_of(work, found, left, judged.noise)
     if verdict.word == "unexplained" and work.is_noiseless:
         # from the first base: one begun anew under the other noise is that of a search that has led nowhere
-        first = search(learned, judged, axis, catalogue, known=known, report=report)
+        first = search(learned, unseen, axis, catalogue, known=known, report=report)
         other = freely(first)
         if other is not None and explained(first, other) > MOSTLY:
-            work, found, left, verdict = first, other, remainder_of(other), Verdict("effect", added(first, other))
-    floor = shown_floor(work.floor, found.judged.noise)
-    return _said(work, found, verdict, headline(work, verdict, found, left, floor), floor, skipped, notes)
+            work, found, judged, verdict = first, other, other.judged, Verdict("effect", added(first, other))
+            left = remainder_of(judged)
+    floor = shown_floor(work.floor, judged.noise)
+    return _said(work, found, verdict, headline(work, verdict, found, left, floor, judged.noise), floor, skipped, notes)
 
 
 def _said(
@@ -108,18 +111,19 @@ def _candidates(work: Search, found: Hypothesis, floor: Noise) -> tuple[Candidat
     shown = [*([found] if found is not base else []), *others]
     fair = [h for h in (*shown, base) if h is found or h is base or work.admissible(h)]
     p = dict(zip(map(id, fair), probabilities(fair), strict=True))
+    errors = work.beside.each(lambda h: h.errors, shown[:SHOWN])
     return tuple(
         Candidate(
             effects=added(work, h),
             probability=p.get(id(h), 0.0),
             parameters=dict(h.model.values),
-            errors=h.errors,
+            errors=pair,
             explained=explained(work, h),
             score=h.score - base.score,
             evidence=evidence(work, h, floor),
             confusable_with=confusable(work, h, shown),
         )
-        for h in shown[:SHOWN]
+        for h, pair in zip(shown, errors, strict=False)
     )
 
 

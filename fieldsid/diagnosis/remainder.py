@@ -14,13 +14,14 @@ from math import factorial
 
 import numpy as np
 
-from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.memory import follows
+from fieldsid.diagnosis.trial import Judged
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.tails import chi_square_tail, f_tail, pearson3_tail
 from fieldsid.fitting.whiteness import white_p
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
+from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 TEMPER = 0.2
@@ -60,13 +61,13 @@ class Left:
     rate: FloatArray
 
 
-def remainder_of(h: Hypothesis) -> Remainder:
-    """Return the tests of what a hypothesis leaves on the runs it was fitted to.
+def remainder_of(judged: Judged) -> Remainder:
+    """Return the tests of what a hypothesis leaves on the runs it was fitted to, under its noise.
 
     Not on unseen runs: there the parameters' own errors follow the motion, and would be taken for something missing.
     """
-    runs = _training(h)
-    memory = follows(h.judged.trial, h.judged.noise)
+    runs = _training(judged)
+    memory = follows(judged.trial, judged.noise)
     relation, name = min(_relation(runs), _growth(runs), (memory.p, memory.what))
     relation = min(1.0, 3.0 * relation)
     bursts, run, window, ratio = _bursts(runs)
@@ -75,16 +76,16 @@ def remainder_of(h: Hypothesis) -> Remainder:
     return Remainder(_colour(runs), relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
 
 
-def _training(h: Hypothesis) -> list[Left]:
-    problem = h.judged.trial.problem
-    return [_left(problem, h.judged.trial.x, run, h) for run in range(len(problem.records))]
+def _training(judged: Judged) -> list[Left]:
+    problem, x = judged.trial.problem, judged.trial.x
+    return [_left(problem, x, run, judged.noise) for run in range(len(problem.records))]
 
 
-def _left(problem: Problem, x: FloatArray, run: int, h: Hypothesis) -> Left:
+def _left(problem: Problem, x: FloatArray, run: int, noise: Noise) -> Left:
     record = problem.records[run]
     motion, base = problem.simulate(x, run)
     residual, _ = problem.residual(x, run)
-    white, _ = whiten(record, h.judged.noise, base.damping, base.stiffness, residual[None])
+    white, _ = whiten(record, noise, base.damping, base.stiffness, residual[None])
     return Left(record, white[0], motion.rate)
 
 

@@ -11,7 +11,8 @@ from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.worth import ALIKE
+from fieldsid.diagnosis.worth import ALIKE, WORSE, worse_unseen
+from fieldsid.models.model import Noise
 
 TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
@@ -34,8 +35,6 @@ long as a maneuver."""
 FAINT, STORM = 2.0, 4.0
 """Error over the noise floor below which only what moves with the vehicle is told from the sea, since gusts come in bursts
 too; and the error above which no sea is taken for granted."""
-WORSE = 2.0
-"""Error on unseen runs over that on fitted ones above which a disturbance, alike on both, is not all that is left."""
 MOSTLY = BESIDE[0][0]
 
 
@@ -48,16 +47,21 @@ class Verdict:
     rivals: tuple[Hypothesis, ...] = ()
 
 
-def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
-    """Return the verdict on the hypothesis a search ended at."""
-    error, floor = search.error(found), shown_floor(search.floor, found.judged.noise)
-    visible = (found.judging.over(floor) if found.judged.noise.coloured_time < FILTER_S else error) > VISIBLE
+def verdict_of(search: Search, found: Hypothesis, left: Remainder, noise: Noise) -> Verdict:
+    """Return the verdict on the hypothesis a search ended at, with what is left of it under the noise of sea and sensors.
+
+    Where those are told apart, errors are over the sensors' noise with its colour, else over its white part.
+    """
+    floor = shown_floor(search.floor, noise)
+    least = search.floor if noise == found.judged.noise else floor
+    error = found.judging.over(least)
+    visible = (found.judging.over(floor) if noise.coloured_time < FILTER_S else error) > VISIBLE
     if frozenset(found.names) == search.root:
         sea = max(found.judging.over(floor), found.train.over(floor))
-        p = 3.0 * left.relation if max(error, found.train.over(search.floor)) < FAINT else left.p
-        odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(search, found) > WORSE
+        p = 3.0 * left.relation if max(error, found.train.over(least)) < FAINT else left.p
+        odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(found, least) > WORSE
         return Verdict("unexplained" if visible and odd else "sufficient", ())
-    share = explained(search, found)
+    share = explained(search, found, least)
     asked = BESIDE if error <= LEAVES or search.is_noiseless else (*BESIDE, *(BESIDE_SOME if error <= STORM else BESIDE_MUCH))
     if visible and any(left.p < p and share < enough for enough, p in asked):
         return Verdict("unexplained", ())
@@ -65,13 +69,6 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder) -> Verdict:
     if rivals:
         return Verdict("undecided", added(search, found), rivals)
     return Verdict("effect", added(search, found))
-
-
-def worse_unseen(search: Search, h: Hypothesis) -> float:
-    """Return the error on unseen runs over that on the runs fitted to; 1 where there are no unseen ones."""
-    if not search.validation:
-        return 1.0
-    return h.unseen_errors.over(search.floor) / max(h.train.over(search.floor), 1.0)
 
 
 def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
@@ -101,9 +98,9 @@ def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
     )
 
 
-def explained(search: Search, h: Hypothesis) -> float:
-    """Return the share of the base model's excess over the noise floor that a hypothesis takes away, 0..1."""
-    base, now = search.error(search.base()), search.error(h)
+def explained(search: Search, h: Hypothesis, floor: Noise | None = None) -> float:
+    """Return the share of the base's excess over a noise floor, by default the search's, that a hypothesis takes away, 0..1."""
+    base, now = (x.judging.over(floor or search.floor) for x in (search.base(), h))
     excess = base**2 - 1.0
     return float(np.clip((base**2 - now**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
 

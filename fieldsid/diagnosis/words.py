@@ -7,9 +7,13 @@ from math import isfinite
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.verdict import WORSE, Verdict, explained, worse_unseen
+from fieldsid.diagnosis.verdict import Verdict, explained
+from fieldsid.diagnosis.worth import WORSE, worse_unseen
 from fieldsid.models.effect import effect_named, form_of
 from fieldsid.models.model import Noise
+
+DISTURBED = 1e-5
+"""Disturbance, in rad/s^2, that is worth a word."""
 
 
 def over(search: Search, h: Hypothesis, floor: Noise) -> float:
@@ -32,15 +36,15 @@ def evidence(search: Search, h: Hypothesis, floor: Noise) -> str:
     )
 
 
-def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder, floor: Noise) -> str:
+def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder, floor: Noise, noise: Noise) -> str:
     """Return the verdict as an engineer would say it."""
     error, base = over(search, found, floor), over(search, search.base(), floor)
     runs = "unseen runs" if search.validation else "the runs it was fitted to"
     if verdict.word == "sufficient":
-        tail = f"; a disturbance of {found.judged.noise.disturbance:.2g} rad/s^2 is there" if _disturbed(found) else ""
+        tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "unexplained":
-        worse = worse_unseen(search, search.base())
+        worse = worse_unseen(search.base(), search.floor)
         return (
             f"something is there that is not in the catalogue: error {_sized(search, search.base(), base)}, most of it in "
             f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
@@ -71,8 +75,3 @@ def _sized(search: Search, h: Hypothesis, error: float) -> str:
     errors = h.judging
     parts = [(errors.angle_rms_rad, "rad"), (errors.rate_rms_rad_s, "rad/s")]
     return " and ".join(f"{value:.2g} {unit}" for value, unit in parts if isfinite(value))
-
-
-def _disturbed(h: Hypothesis) -> bool:
-    noise = h.judged.noise
-    return noise.disturbance > 1e-5

@@ -19,6 +19,7 @@ from fieldsid.diagnosis.search import Search, search
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.diagnosis.usable import usable
+from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.diagnosis.worth import MATTERS, WORTH
 from fieldsid.effects import pick_effect
 from fieldsid.errors import DataError, ModelError, UsageError
@@ -102,7 +103,7 @@ def extend(
         added=tuple(e.name for e in new),
         before=before.errors,
         after=after.errors,
-        noise_floor=shown_floor(work.floor, after.judged.noise),
+        noise_floor=shown_floor(work.floor, in_its_weather(after).noise),
         unseen=bool(judged),
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),

@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np  # noqa: E402
 from truth.bank import KINDS, make_case  # noqa: E402
 from truth.remus_cases import remus_case  # noqa: E402
+from truth.scene import GUSTY  # noqa: E402
 
 CHANNELS = {"angle_rad": "angle_rms_rad", "rate_rad_s": "rate_rms_rad_s"}
 
@@ -151,7 +152,7 @@ def table(rows):
     of = {kind: [r for r in seen if r["kind"] == kind] for kind in (*KINDS, "remus")}
     nothing = [r for r in rows if r["kind"] == "none"]
     known = [r for r in seen if r["kind"] in ("single", "imperfect", "pair", "remus") and "over_floor" in r]
-    calm = [r for r in known if r["colour"] != "disturbance"]
+    calm = [r for r in known if r["colour"] not in GUSTY]
     over = np.array([r["over_floor"] for r in known])
     seconds = np.array([r["seconds"] for r in rows])
     lines = [

@@ -10,7 +10,7 @@ import numpy as np
 from truth import kernel
 from truth.basefit import Sample, fit_base, left_over, responses, start_removed
 from truth.logbook import write_log
-from truth.scene import TRAINING, calibrated, draw_scene
+from truth.scene import GUSTY, TRAINING, calibrated, draw_scene
 from truth.simple import fly, replay
 from truth.strengths import LARGEST, PITCH, RESHAPED, YAW, reshaped
 from truth.uncatalogued import CAUSES
@@ -209,7 +209,7 @@ def tune(scene, hidden, i, goal):
 
 def expected_floor(scene):
     """About what the floor will be: sensor noise, and the gust's part in the angle."""
-    gust = scene.notes["gust"] if scene.notes["colour"] == "disturbance" else 0.0
+    gust = scene.notes["gust"] if scene.notes["colour"] in GUSTY else 0.0
     return scene.sigma[0] * np.sqrt(1.0 + gust**2), scene.sigma[1] * (1.0 + 0.3 * min(gust, 1.0))
 
 

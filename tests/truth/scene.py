@@ -16,6 +16,8 @@ from truth.strengths import Setting
 RUN_S = 60.0
 TRAINING, VALIDATION = 3, 2
 DEG = np.pi / 180.0
+GUSTY, BOTH = ("disturbance", "both"), 0.5
+"""Days on which a moment disturbs the hull, and the share of those with coloured sensors that are among them."""
 SCATTER = 0.02
 """Share by which runs of a group miss its speed, in half of the scenes."""
 
@@ -85,7 +87,10 @@ def draw_scene(rng, pitching, wants=()):
     kinds = pick_maneuvers(rng, pitching, wants)
     weather = {"colour": str(rng.choice(["white", "disturbance", "ar1"], p=[0.5, 0.38, 0.12])), "gust": rng.uniform(0.3, 1.5)}
     weather |= {"gust_s": rng.uniform(0.3, 2.0), "swing": rng.uniform(0.1, 0.3) if rng.random() < 0.35 else 0.0}
-    legs, own = [], rng.spawn(1)[0]
+    legs, (own, sky) = [], rng.spawn(2)
+    weather |= {"wander": sky.uniform(0.3, 1.0), "wander_s": np.exp(sky.uniform(np.log(0.3), np.log(3.0)))}
+    if weather["colour"] == "ar1" and sky.random() < BOTH:
+        weather["colour"] = "both"
     spread = SCATTER * float(own.integers(0, 2))
     for kind, group in zip(kinds, groups, strict=True):
         maneuver = draw_maneuver(rng, kind, clock.time, pitching=pitching)
@@ -149,12 +154,12 @@ def draw_maneuver(rng, kind, time, *, pitching):
 def unit_weather(rng, clock, weather):
     """Inputs (9, total) with disturbance and sensor noise of standard deviation one, thrust swing between -1 and 1."""
     out, n, h = calm(clock), clock.total, clock.sample
-    coloured = weather["colour"] == "ar1"
+    wander = weather["wander"] if weather["colour"] in ("ar1", "both") else 0.0
     for row in (kernel.ANGLE_NOISE, kernel.RATE_NOISE):
-        slow = ar1(rng, n, 0.7, 0.5, h) if coloured else np.zeros(n)
-        out[row] = white(rng, n, 0.7 if coloured else 1.0) + slow
+        slow = ar1(rng, n, np.sqrt(wander), weather["wander_s"], h) if wander else 0.0
+        out[row] = white(rng, n, np.sqrt(1.0 - wander)) + slow
     gust = ar1(rng, n, 1.0, weather["gust_s"], h)
-    out[kernel.DISTURBANCE] = gust if weather["colour"] == "disturbance" else 0.0
+    out[kernel.DISTURBANCE] = gust if weather["colour"] in GUSTY else 0.0
     out[kernel.ROLL_PUSH] = ar1(rng, n, 1.0, 1.0, h)
     steps = rng.uniform(-1.0, 1.0, 8)
     out[kernel.THRUST] = np.interp(clock.whole, np.linspace(clock.whole[0], clock.whole[-1], 8), steps)
@@ -163,7 +168,7 @@ def unit_weather(rng, clock, weather):
 
 def calibrated(scene):
     """The scene with the disturbance scaled so that it moves the angle by `gust` times the sensor's noise."""
-    if scene.notes["colour"] != "disturbance":
+    if scene.notes["colour"] not in GUSTY:
         return scene
     moved = []
     for leg in scene.legs:
