@@ -57,9 +57,9 @@ def diagnose(
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
     work = search(learned, unseen, axis, catalogue, known=known, report=report)
     found = work.best()
-    judged = in_its_weather(found)
+    judged = in_its_weather(found.judged)
     left = remainder_of(judged)
-    verdict = verdict_of(work, found, left, judged.noise)
+    verdict = verdict_of(work, found, left, judged)
     if verdict.word == "unexplained" and work.is_noiseless:
         # from the first base: one begun anew under the other noise is that of a search that has led nowhere
         first = search(learned, unseen, axis, catalogue, known=known, report=report)

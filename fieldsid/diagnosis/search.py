@@ -15,6 +15,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with
 from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
 from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
+from fieldsid.diagnosis.weather import in_its_weather, other_noise, sensors, wanders
 from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, helps, likelier, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.noise import floor_below, floor_of
@@ -53,7 +54,7 @@ class Search:
     known: tuple[str, ...] = ()
     tried: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     family: str = ""
-    turned: bool = False
+    begun: set[str] = field(default_factory=set)
     trim_of_fin: bool | None = None
     trims_turned: int = 0
     told: Noise = field(init=False)
@@ -90,7 +91,8 @@ class Search:
             self.told = told_apart(self.floor, trial.weights)
             judgings = self.beside.each(lambda f: judge(trial.problem, trial.x, self.floor, self.told, f), families)
             judged = max(judgings, key=lambda j: j.likelihood)
-            self.family = judged.family
+            judged = in_its_weather(judged) if wanders(judged) else judged
+            self.family, self.begun = judged.family, self.begun | {judged.family}
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
             self._other_law(self.root)
@@ -200,8 +202,7 @@ class Search:
         again = self._judged_from(parent, child) if child else parent.judged
         if again.likelihood > parent.judged.likelihood + SETTLED:
             self.tried[key] = parent = with_free_run(hypothesis_of(again, self.validation), self.floor)
-            late = self._children(key)[:LEADING]
-            for judged in self.beside.each(lambda child: self._judged_from(child, parent), late):
+            for judged in self.beside.each(lambda child: self._judged_from(child, parent), self._children(key)[:LEADING]):
                 self._keep(judged)
 
     def _judged_from(self, h: Hypothesis, other: Hypothesis) -> Judged:
@@ -265,7 +266,7 @@ class Search:
         if self.error(best) > MUCH:
             self._improve(self.root, [], every=True)
             best = self._grown(self._likeliest())
-        best = begun_again(best, self.known, self.told, self.family, self.floor, self.beside)
+        best = begun_again(best, self.known, self.told, self.family, sensors(self.floor, self.base()), self.beside)
         self.tried[frozenset(best.names)] = best
         return best
 
@@ -288,7 +289,8 @@ class Search:
             children = self.grow(current)
             current = self.tried[frozenset(current.names)]
             paying = next((c for c in children if pays(current, c)), None)
-            if size == 0 or (paying is None and FAR < self.error(current) < HOPE * self.error(self.base())):
+            lost = paying is None and size + 2 <= LARGEST
+            if size == 0 or (lost and FAR < self.error(current) < HOPE * self.error(self.base())):
                 paying = self._two_at_once(current, children, paying) or paying
             current = (self._swapped(paying) if size else paying) if paying else current
             self.hear(current.judged.trial)
@@ -299,17 +301,15 @@ class Search:
         return current
 
     def _turn(self) -> bool:
-        """Begin anew under the other noise, once, or the other law of the trim where that fits the likeliest better.
+        """Begin anew under another noise, once each, or the other law of the trim where that fits the likeliest better.
 
         What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
         coloured sensors lets the heading wander for free. What was found stays among what is tried, judged anew.
         """
-        found = self._likeliest()
-        trial, again = found.judged.trial, None
-        other = next(f for f in NOISES if f != self.family)
-        judged = None if self.turned else judge(trial.problem, trial.x, self.floor, self.told, other)
-        if judged is not None and judged.likelihood > found.judged.likelihood + WORTH:
-            self.turned, self.family, again = True, other, hypothesis_of(judged, self.validation)
+        found, again = self._likeliest(), None
+        judged = other_noise(found, self.floor, self.begun)
+        if judged is not None:
+            self.family, again = judged.family, hypothesis_of(judged, self.validation)
         elif self.trims_turned < TRIM_TURNS:
             again = other_trim(found, self.tried, self.told, self.floor, self.beside)
             if again is not None:
@@ -383,8 +383,8 @@ class Search:
         return self.tried[key]
 
     def error(self, h: Hypothesis) -> float:
-        """Return the free-run error over the noise floor."""
-        return h.judging.over(self.floor)
+        """Return the free-run error over the noise floor, that of sensors that wander where they are known to."""
+        return h.judging.over(sensors(self.floor, self.tried.get(self.root)))
 
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""

@@ -24,8 +24,8 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
-NOISES = ("disturbance", "coloured")
-"""Kinds of noise that hypotheses are compared under."""
+NOISES, BOTH = ("disturbance", "coloured"), "both"
+"""Kinds of noise that hypotheses are compared under, and the two together."""
 ALTERNATIONS = 3
 POLISH_ROUNDS = 8
 SETTLED = 0.5

@@ -11,6 +11,7 @@ from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
+from fieldsid.diagnosis.trial import BOTH, Judged
 from fieldsid.diagnosis.worth import ALIKE, WORSE, worse_unseen
 from fieldsid.models.model import Noise
 
@@ -47,13 +48,13 @@ class Verdict:
     rivals: tuple[Hypothesis, ...] = ()
 
 
-def verdict_of(search: Search, found: Hypothesis, left: Remainder, noise: Noise) -> Verdict:
-    """Return the verdict on the hypothesis a search ended at, with what is left of it under the noise of sea and sensors.
+def verdict_of(search: Search, found: Hypothesis, left: Remainder, judged: Judged) -> Verdict:
+    """Return the verdict on the hypothesis a search ended at, with what is left of it judged in its weather.
 
-    Where those are told apart, errors are over the sensors' noise with its colour, else over its white part.
+    Where sea and sensors are told apart, errors are over the sensors' noise with its colour, else over its white part.
     """
-    floor = shown_floor(search.floor, noise)
-    least = search.floor if noise == found.judged.noise else floor
+    noise, floor = judged.noise, shown_floor(search.floor, judged.noise)
+    least = floor if judged.family == BOTH else search.floor
     error = found.judging.over(least)
     visible = (found.judging.over(floor) if noise.coloured_time < FILTER_S else error) > VISIBLE
     if frozenset(found.names) == search.root:

@@ -44,7 +44,7 @@ def base(wander, gust, family):
 
 @pytest.mark.parametrize("family", ["coloured", "disturbance"])
 def test_both_are_found_where_both_are(family):
-    noise = in_its_weather(base(0.01, GUST, family)).noise
+    noise = in_its_weather(base(0.01, GUST, family).judged).noise
     assert noise.coloured_angle == pytest.approx(0.01, rel=0.3)
     assert noise.coloured_rate == pytest.approx(0.01, rel=0.3)
     assert noise.coloured_time == pytest.approx(WANDER_S, rel=0.5)
@@ -56,7 +56,7 @@ def test_both_are_found_where_both_are(family):
 )
 def test_a_noise_of_one_kind_is_left_as_it_is(wander, gust, family):
     h = base(wander, gust, family)
-    assert in_its_weather(h) is h.judged
+    assert in_its_weather(h.judged) is h.judged
 
 
 def test_nothing_is_missing_where_sensors_wander_in_a_sea():
