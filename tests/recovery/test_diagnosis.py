@@ -99,12 +99,12 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
 
 
 @pytest.mark.parametrize(
-    ("seed", "index"),
-    [(132, 75), (132, 84), (136, 100), (138, 102)],
+    ("seed", "index", "colour"),
+    [(132, 75, None), (132, 84, "ar1"), (136, 100, None), (138, 102, None)],
     ids=("far off", "many ends", "play behind a slow fin", "another trim for one than for both"),
 )
-def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, index: int) -> None:
-    case = make_case(index, seed)
+def test_a_pair_of_which_neither_alone_looks_like_itself_is_found(seed: int, index: int, colour: str | None) -> None:
+    case = make_case(index, seed, colour=colour)
     assert len(case.effects) == 2
     found = diagnosed(case)
     assert set(found.effects) == set(case.effects)

@@ -85,14 +85,14 @@ def cases(n: int, seed: int, *, kind: str | None = None, first: int = 0) -> Iter
         yield make_case(index, seed, kind=kind)
 
 
-def make_case(index: int, seed: int, *, kind: str | None = None) -> Case:
-    """One case by (seed, index); `kind` overrides what the bank would have drawn."""
+def make_case(index: int, seed: int, *, kind: str | None = None, colour: str | None = None) -> Case:
+    """One case by (seed, index); `kind` and the `colour` of its noise override what the bank would have drawn."""
     rng = np.random.default_rng([seed, index])
     drawn = str(rng.choice(KINDS, p=SHARES))
     kind = drawn if kind is None else kind
     pitching = bool(rng.random() < 0.4)
     names = draw_names(rng, kind, pitching)
-    scene = draw_scene(rng, pitching, WANTS.get(names[0], ()) if names else ())
+    scene = draw_scene(rng, pitching, WANTS.get(names[0], ()) if names else (), colour)
     scene.notes["bent_fin"] = not pitching and bool(np.random.default_rng([seed, index, 1]).random() < BENT)
     scene = calibrated(scene)
     hidden = draw_hidden(rng, kind, names, scene)

@@ -75,8 +75,8 @@ def gains(damping, stiffness, authority, omega):
     return min(kp, 4.0), min(max((1.6 * np.sqrt(stiffness + min(kp, 4.0) * b) - damping) / b, 0.0), 3.0)
 
 
-def draw_scene(rng, pitching, wants=()):
-    """A random vehicle with five legs; `wants` are the kinds of maneuver that should be among them."""
+def draw_scene(rng, pitching, wants=(), colour=None):
+    """A random vehicle with five legs; `wants` are kinds of maneuver that should be among them, `colour` that of the noise."""
     clock = Clock(1.0 / rng.choice([20.0, 10.0, 50.0], p=[0.76, 0.12, 0.12]), 0)
     clock = Clock(clock.sample, round(RUN_S / clock.sample))
     base, setting = draw_vehicle(rng, pitching)
@@ -91,6 +91,7 @@ def draw_scene(rng, pitching, wants=()):
     weather |= {"wander": sky.uniform(0.3, 1.0), "wander_s": np.exp(sky.uniform(np.log(0.3), np.log(3.0)))}
     if weather["colour"] == "ar1" and sky.random() < BOTH:
         weather["colour"] = "both"
+    weather["colour"] = colour or weather["colour"]
     spread = SCATTER * float(own.integers(0, 2))
     for kind, group in zip(kinds, groups, strict=True):
         maneuver = draw_maneuver(rng, kind, clock.time, pitching=pitching)
