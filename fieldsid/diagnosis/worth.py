@@ -42,8 +42,12 @@ def asks_for_more(h: Hypothesis, floor: Noise) -> bool:
 
 
 def refines(plain: Hypothesis, formed: Hypothesis) -> bool:
-    """Whether another form of the same effects brings evidence and lowers the error on unseen runs."""
-    return likelier(plain, formed) and formed.judging.mean < REFINES * plain.judging.mean
+    """Whether another form of the same effects brings evidence, lowers an error, and raises none on unseen runs.
+
+    Of unseen and fitted runs either may show what the form is for: what else is still wrong may hide it on the others.
+    """
+    unseen, fitted = formed.judging.mean / plain.judging.mean, formed.train.mean / plain.train.mean
+    return likelier(plain, formed) and unseen < 1.0 and min(unseen, fitted) < REFINES
 
 
 def likelier(without: Hypothesis, with_: Hypothesis) -> bool:

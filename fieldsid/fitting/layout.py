@@ -13,15 +13,13 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
-from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw
 
 START_NAMES = ("angle0", "rate0", "rate_before")
 """What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
 BEFORE, FASTEST = 1.5, 2.0
 """Largest rate before a run over the largest of the records, and in rad/s where no rate was measured."""
 
-GROUP_WIDTH = 0.08
-"""Runs whose speeds differ by less than this share form one speed group."""
 SNAP_WIDTH = 0.12
 """A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}

@@ -1,10 +1,10 @@
 """How the base parameters move with speed: damping as (u/u0)^p, authority by u^2 or by speed group, trim as a fin's offset.
 
-With u0 the reference speed and s = u/u0: a(u) = a22 s^p, k(u) = c23 (hydrostatic, no speed), b(u) = b2 s^e or the
-groups' own values with a power law between them. The trim moment of the yaw is that of a bent fin, C b(u)/b(u0), so that
-the fin angle that holds it is the same at every speed; that of the pitch is a weight out of its place, the same at every
-speed. Runs at several speeds may say otherwise. A model of one run keeps p = 1 and e = 2, the scaling of lift and linear
-lift-type damping (Fossen 2011, section 6.3).
+With u0 the reference speed and s = u/u0: a(u) = a22 s^p, k(u) = c23 (hydrostatic, no speed), b(u) = b2 s^e or the groups'
+own values with a power law between them; a speed within reach of a group is that of its own. The trim moment of the yaw is
+that of a bent fin, C b(u)/b(u0), so that the fin angle that holds it is the same at every speed; that of the pitch is a
+weight out of its place, the same at every speed. Runs at several speeds may say otherwise. A model of one run keeps p = 1
+and e = 2, the scaling of lift and linear lift-type damping (Fossen 2011, section 6.3).
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import numpy as np
 
 from fieldsid.models.axis import Axis
 
+GROUP_WIDTH = 0.08
+"""Runs whose speeds differ by less than this share form one speed group, in which the authority goes with u^2."""
 TRIM_OF_FIN = {Axis.YAW: True, Axis.PITCH: False}
 """Whether the trim moment goes with the authority where runs at several speeds do not say otherwise."""
 
@@ -61,13 +63,14 @@ class SpeedLaw:
         return over_reference(self.authority(speed, 1.0), self.authority(self.reference, 1.0)) if self.trim_of_fin else 1.0
 
     def authority(self, speed: float, at_reference: float) -> float:
-        """Return b(u); between groups log-linear in log u, beyond them by the power law from the nearest."""
+        """Return b(u); between groups log-linear in log u, within reach of one and beyond them by the power law from it."""
         scale = self.scale(speed)
         if not self.points:
             return float(at_reference * scale**self.authority_exponent)
-        speeds = np.array([p[0] for p in self.points])
-        values = np.array([p[1] for p in self.points])
-        u = float(np.clip(scale * self.reference, speeds[0], speeds[-1]))
-        beyond = scale * self.reference / u
-        inside = float(np.interp(np.log(u), np.log(speeds), values / speeds**self.authority_exponent))
-        return float(inside * (u * beyond) ** self.authority_exponent)
+        speeds = np.log([p[0] for p in self.points])
+        over_law = np.array([p[1] for p in self.points]) / np.exp(speeds * self.authority_exponent)
+        u = scale * self.reference
+        # half a group's width on either side is the group's, as it is in the fit; neighbours share what is between them
+        reach = np.minimum(0.5 * GROUP_WIDTH, np.diff(speeds) / 3.0)
+        knots = np.sort(np.concatenate([speeds, speeds[:-1] + reach, speeds[1:] - reach]))
+        return float(np.interp(np.log(u), knots, np.repeat(over_law, 3)[1:-1]) * u**self.authority_exponent)

@@ -33,6 +33,14 @@ def test_a_name_asks_for_a_twelfth_of_the_error_and_a_form_for_less(over, named,
     assert (pays(BASE, found), refines(BASE, found)) == (named, refined)
 
 
+@pytest.mark.parametrize(
+    ("over", "train", "refined"), [(1.19, 1.0, True), (1.19, 1.24, False), (1.21, 1.0, False), (1.16, 1.3, True)]
+)
+def test_a_form_may_show_on_the_runs_fitted_to_where_it_raises_no_error_on_the_others(over, train, refined):
+    plain = hypothesis("stall", over=1.2, train=1.25)
+    assert refines(plain, hypothesis("stall", gain=50.0, over=over, train=train)) == refined
+
+
 @pytest.mark.parametrize(("gain", "paid"), [(5.0, False), (7.0, True)])
 def test_the_error_alone_is_not_enough(gain, paid):
     found = hypothesis("servo_lag", gain=gain, over=1.0)
