@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.run import SIGNALS, FloatArray, Note, Run
+from fieldsid.logs.spikes import spikes_of
 
 PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
 MEASURED = frozenset(SIGNALS) - PROPULSION - {"rudder_rad", "elevator_rad"}
+FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
+"""What the free run is fitted to."""
 MISSING_LIMIT = 0.05
 FROZEN_S = 1.0
 COARSE_LIMIT = 0.3
 """Share of samples equal to the one before, above which a signal is called coarse."""
-SPIKE = 20.0
-"""A spike is off the line through its neighbours by this many times the usual amount."""
 
 LARGEST = {
     "pitch_rad": (1.6, "deg"), "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
@@ -102,19 +103,15 @@ def _coarse(name: str, values: FloatArray) -> list[Note]:
 
 
 def _spikes(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
-    off = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
-    usual = float(np.median(off))
-    if usual == 0.0:
-        usual = float(np.mean(off))
-    limit = SPIKE * usual
-    # A spike stands alone: both neighbours lie on the same side, which no step and no ramp does.
-    left, right = values[1:-1] - values[:-2], values[1:-1] - values[2:]
-    places = np.flatnonzero((off > limit) & (left * right > 0.0) & (np.minimum(np.abs(left), np.abs(right)) > limit))
-    if usual == 0.0 or not places.size:
+    found = spikes_of(values)
+    if not found.places.size:
         return []
-    at = int(places[np.argmax(off[places])])
+    worst = int(np.argmax(found.off))
+    largest, limit, at = float(found.off[worst]), found.limit, float(time[found.places[worst]])
+    left_out = "; no fit uses them" if name in FITTED else ""
     message = (
-        f"{name} has {places.size} spikes, the largest of {off[at]:.3g} {SIGNALS[name]} at {time[at + 1]:.2f} s "
-        f"(limit {limit:.3g}); check the sensor"
+        f"{name} has {found.places.size} spikes, the largest of {largest:.3g} {SIGNALS[name]} at {at:.2f} s "
+        f"(limit {limit:.3g}){left_out}; check the sensor"
     )
-    return [Note("spikes", message, {"signal": name, "value": float(off[at]), "limit": limit, "count": int(places.size)})]
+    data = {"signal": name, "value": largest, "limit": limit, "count": int(found.places.size)}
+    return [Note("spikes", message, data)]

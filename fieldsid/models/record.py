@@ -12,8 +12,10 @@ import numpy.typing as npt
 from fieldsid.errors import DataError, EffectError
 from fieldsid.logs.run import FloatArray, Run
 from fieldsid.logs.segments import no_fin
+from fieldsid.logs.spikes import spikes_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.cross import cross_speed
+from fieldsid.models.depth import depth_along
 from fieldsid.models.effect import FinPath
 from fieldsid.models.smoothing import smoothed
 
@@ -28,9 +30,9 @@ FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 class Record:
     """Samples (n,) of one run on one axis.
 
-    `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held`
-    tells which). `angle_ok` and `rate_ok` mark samples that were measured. `signals` holds helpers without gaps and noise by
-    role (surge, thrust, roll, depth, cross). `speed` is the median of that surge in m/s, NaN when not measured.
+    `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which).
+    `angle_ok` and `rate_ok` mark samples that were measured, spikes left out. `signals` holds helpers without gaps and noise
+    by role (surge, thrust, roll, depth, cross). `speed` is the median of that surge in m/s, NaN when not measured.
     """
 
     name: str
@@ -136,12 +138,17 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     if axis is Axis.YAW and angle_ok.any():
         angle = angle.copy()
         angle[angle_ok] = np.unwrap(angle[angle_ok])
+    angle_ok, rate_ok = _without_spikes(angle, angle_ok), _without_spikes(rate, rate_ok)
     held = _held_fin(run.signals[column])
     signals = {
         role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0)) for role, c in ROLES.items() if run.has(c)
     }
     if run.has(names.cross):
         signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
+    if "depth" in signals and axis is Axis.PITCH and angle_ok.any():
+        pitch = np.interp(run.time, run.time[angle_ok], angle[angle_ok])
+        depth, fastest_s = run.signals[ROLES["depth"]], FASTEST_S["depth"]
+        signals["depth"] = depth_along(run.time, depth, pitch, signals.get("surge"), held, fastest_s=fastest_s)
     return Record(
         name=run.name,
         axis=axis,
@@ -165,6 +172,13 @@ def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         return np.zeros(len(run)), np.zeros(len(run), dtype=bool)
     ok = np.isfinite(values)
     return np.where(ok, values, 0.0), ok
+
+
+def _without_spikes(values: FloatArray, ok: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return where a signal was measured, but for a sensor's spikes: squares would follow a few of them before all else."""
+    out = ok.copy()
+    out[np.flatnonzero(ok)[spikes_of(values[ok]).places]] = False
+    return out
 
 
 def _held_fin(values: FloatArray) -> FloatArray:

@@ -26,3 +26,15 @@ def test_the_speed_of_a_run_between_two_levels_is_that_of_the_speed_without_its_
 
 def test_a_run_without_a_speed_sensor_has_none():
     assert np.isnan(record_of(run_of(np.full(400, np.nan)), Axis.YAW).speed)
+
+
+def test_a_sensors_spikes_count_as_not_measured():
+    rng, n = np.random.default_rng(2), 800
+    time = 0.05 * np.arange(n)
+    heading, rate = 3.0 + 0.05 * time + 0.003 * rng.standard_normal(n), 0.05 + 0.002 * rng.standard_normal(n)
+    heading[[50, 500]] += [0.06, -0.06]
+    rate[[200, 201 + 90]] = [np.nan, 0.2]
+    signals = {"yaw_rad": np.angle(np.exp(1j * heading)), "yaw_rate_rad_s": rate, "rudder_rad": np.where(time < 9.0, 0.1, -0.1)}
+    record = record_of(Run("run", time, signals), Axis.YAW)
+    assert np.flatnonzero(~record.angle_ok).tolist() == [50, 500]
+    assert np.flatnonzero(~record.rate_ok).tolist() == [200, 291]
