@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.fitting.kalman import innovations
-from fieldsid.fitting.scoring import information
+from fieldsid.fitting.scoring import information, innovated
 from fieldsid.fitting.step import bounded_step
 from fieldsid.fitting.whitening import NOISE_FIELDS
 from fieldsid.logs.run import BoolArray, FloatArray
@@ -23,7 +23,8 @@ ENOUGH, BLOCK = 50_000, 1_000
 SMALLEST_ANGLE = 1e-7
 SMALLEST_RATE = 1e-7
 RESOLUTION = 1e-4
-ROUNDS, DAMPING = 30, 1e-3
+ROUNDS, DAMPING, REFUSED = 30, 1e-3, 0.1
+"""Rounds at most, least damping of a step, and what it is at least raised from where one was refused."""
 LEAP = 1.5
 """Longest step of a logarithm: the information says little of what is far away."""
 LEAST = 0.1
@@ -149,16 +150,21 @@ def estimate_noise(
         if float(score @ moved) < WORTH:
             break
         trial = x + moved
-        new = slope.at(trial)
+        new = slope.at(trial, value)
         if new[0] > value:
-            gained, x = new[0] - value, trial
+            gained, expected, x = new[0] - value, float(score @ moved - 0.5 * moved @ fisher @ moved), trial
             value, score, fisher = new
-            damping = max(0.1 * damping, DAMPING)
+            damping = max(damping * _next_damping(gained / expected), DAMPING)
             if gained < WORTH:
                 break
         else:
-            damping *= 10.0
+            damping = max(damping, REFUSED) * 6.0
     return Noise(*slope.vector(x).tolist()), value
+
+
+def _next_damping(kept: float) -> float:
+    """Return what the damping goes on with after a step that has kept this share of what it promised."""
+    return 0.1 if kept > 0.5 else 1.0 if kept > 0.25 else 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,20 +184,26 @@ class _Slope:
         noise[self.place] = np.exp(x)
         return noise
 
-    def at(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number."""
-        count = x.size
-        score, fisher, total = np.zeros(count), np.zeros((count, count)), 0.0
-        noise = self.vector(x)
-        for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True):
-            value, slope, curvature = information(r, max(a, 1e-3), max(k, 0.0), noise, self.place, e)
-            total, score, fisher = total + value, score + slope, fisher + curvature
+    def at(self, x: FloatArray, least: float = -np.inf) -> tuple[float, FloatArray, FloatArray]:
+        """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number.
+
+        Where the likelihood is not above the least one asked for nothing else is worked out.
+        """
+        count, noise = x.size, self.vector(x)
+        runs = [
+            (r, max(a, 1e-3), max(k, 0.0), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)
+        ]
+        here = [innovated(r, a, k, noise, e) for r, a, k, e in runs]
+        total = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
+        if not (np.isfinite(total) and total > least):
+            return -np.inf, np.zeros(count), np.eye(count)
+        parts = [information(r, a, k, noise, self.place, e, h) for (r, a, k, e), h in zip(runs, here, strict=True)]
+        score, fisher = np.sum([s for s, _ in parts], axis=0), np.sum([f for _, f in parts], axis=0)
         if self.likelihood is not None:
-            total = self.likelihood(noise)
             score = np.array(
                 [(self.likelihood(self.vector(x + d)) - total) / GRADIENT_STEP for d in GRADIENT_STEP * np.eye(count)]
             )
-        known = np.isfinite(total) and np.isfinite(score).all() and np.isfinite(fisher).all()
+        known = np.isfinite(score).all() and np.isfinite(fisher).all()
         return (total, score, fisher) if known else (-np.inf, np.zeros(count), np.eye(count))
 
 
@@ -216,8 +228,9 @@ def _resolution(records: Sequence[Record]) -> tuple[float, float]:
     return max(RESOLUTION * angle, SMALLEST_ANGLE), max(RESOLUTION * rate, SMALLEST_RATE)
 
 
-WOKEN = 0.5
-"""Share of its rough size a part starts at where the given start has next to none: from nothing there is no slope."""
+WOKEN, AWAKE = 0.5, 0.1
+"""Share of its rough size a part starts at where the given start has next to none: from nothing there is no slope. And what
+the sensors' wander is more than next to none from, over their white noise."""
 
 
 def _rough_start(
@@ -238,8 +251,8 @@ def _rough_start(
         "rate": start.rate if known else floor.rate,
         "disturbance": max(start.disturbance, WOKEN * (a * extra + 1e-6)),
         "disturbance_time": start.disturbance_time,
-        "coloured_angle": max(start.coloured_angle, WOKEN * spare),
-        "coloured_rate": max(start.coloured_rate, WOKEN * extra),
+        "coloured_angle": start.coloured_angle if start.coloured_angle > AWAKE * floor.angle else WOKEN * spare,
+        "coloured_rate": start.coloured_rate if start.coloured_rate > AWAKE * floor.rate else WOKEN * extra,
         "coloured_time": start.coloured_time,
     }
 

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from fieldsid.fitting.kalman import transition
 from fieldsid.fitting.noise import log_likelihood
-from fieldsid.fitting.scoring import information
+from fieldsid.fitting.scoring import information, innovated
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.whitening import noise_vector, whiten
 from fieldsid.models.axis import Axis
@@ -95,7 +95,8 @@ def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
 
 
 def informed(log: Record, noise: np.ndarray, place: np.ndarray, residual: np.ndarray):
-    return information(log, A, K, noise, place, residual)
+    here = innovated(log, A, K, noise, residual)
+    return here.likelihood, *information(log, A, K, noise, place, residual, here)
 
 
 PLACES = {"disturbance": np.array([0, 1, 2, 3]), "coloured": np.array([0, 1, 4, 5, 6]), "both": np.arange(7)}
