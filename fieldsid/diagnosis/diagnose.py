@@ -29,7 +29,7 @@ from fieldsid.fitting.predict import predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
-from fieldsid.models.record import Record, record_of
+from fieldsid.models.record import Record, left_out, record_of
 
 SHOWN = 8
 
@@ -51,6 +51,7 @@ def diagnose(
     unseen = tuple(record_of(r, axis) for r in validation)
     check([*records, *unseen], axis)
     learned, unseen, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
+    notes = (*notes, *left_out([*training, *validation], axis))
     catalogue, skipped = usable(all_effects(axis).values(), [*learned, *unseen])
     missing = [n for n in known if n in skipped]
     if missing:

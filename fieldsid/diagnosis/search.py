@@ -137,13 +137,13 @@ class Search:
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one that fits the training runs best: a wrong law of speed may hide it elsewhere.
 
-        Only the first of them where a hypothesis has effects and its best child is near the floor, or has a pair of them.
+        Only the first of them where it leaves nothing, or a hypothesis has effects and is near the floor with it, or has a pair.
         """
         children = self._children(key)
         best = sorted(children, key=lambda h: h.cost - h.by_run.sum())[:1]
         names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:LEADING], *best)))
         early = key == self.root or (len(key) < len(self.known) + PAIR and any(self.error(h) > FAR for h in children[:1]))
-        return names if early else names[:1]
+        return names if early and any(asks_for_more(h, self.floor) for h in children[:1]) else names[:1]
 
     def _flown_before(self, parent: Hypothesis) -> None:
         """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""

@@ -24,6 +24,8 @@ def in_its_weather(own: Judged) -> Judged:
         return own
     problem = own.trial.problem
     other = judge(problem, own.trial.x, own.noise, own.floor, next(f for f in NOISES if f != own.family))
+    if not (wanders(own) or wanders(other)):
+        return own
     # from what one kind alone has taken of both there may be no way back: from each of them
     both = max((judge(problem, j.trial.x, j.noise, own.floor, BOTH) for j in (own, other)), key=lambda j: j.likelihood)
     return both if both.likelihood > own.likelihood + WORTH else own

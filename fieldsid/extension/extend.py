@@ -29,7 +29,7 @@ from fieldsid.fitting.predict import predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
-from fieldsid.models.record import Record, record_of
+from fieldsid.models.record import Record, left_out, record_of
 
 SAME = 1e-3
 """Log likelihoods that differ by less are one optimum."""
@@ -109,7 +109,8 @@ def extend(
         judged_on=tuple(r.name for r in (judged or learned)),
     )
     model = refitted_model(after)
-    return Extension(model, gain, after.score - before.score, (*notes, *_times_between(model, judged)))
+    notes = (*notes, *_times_between(model, judged), *left_out([*training, *validation], parent.axis))
+    return Extension(model, gain, after.score - before.score, notes)
 
 
 def _times_between(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import DataError, EffectError
-from fieldsid.logs.run import FloatArray, Run
+from fieldsid.logs.run import FloatArray, Note, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.logs.spikes import spikes_of
 from fieldsid.models.axis import NAMES, Axis
@@ -179,6 +179,13 @@ def _without_spikes(values: FloatArray, ok: npt.NDArray[np.bool_]) -> npt.NDArra
     out = ok.copy()
     out[np.flatnonzero(ok)[spikes_of(values[ok]).places]] = False
     return out
+
+
+def left_out(runs: Sequence[Run], axis: Axis) -> tuple[Note, ...]:
+    """Return what reading some runs has said of spikes that no fit on an axis uses."""
+    fitted = (NAMES[axis].angle, NAMES[axis].rate)
+    said = [(r.name, n) for r in runs for n in r.notes if n.code == "spikes" and n.data["signal"] in fitted]
+    return tuple(Note(n.code, f"{name}: {n.message}", {**n.data, "run": name}) for name, n in said)
 
 
 def _held_fin(values: FloatArray) -> FloatArray:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fieldsid.logs.doctor import examine
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.record import record_of
+from fieldsid.models.record import left_out, record_of
 
 
 def run_of(surge):
@@ -35,6 +38,13 @@ def test_a_sensors_spikes_count_as_not_measured():
     heading[[50, 500]] += [0.06, -0.06]
     rate[[200, 201 + 90]] = [np.nan, 0.2]
     signals = {"yaw_rad": np.angle(np.exp(1j * heading)), "yaw_rate_rad_s": rate, "rudder_rad": np.where(time < 9.0, 0.1, -0.1)}
-    record = record_of(Run("run", time, signals), Axis.YAW)
+    run = Run("run", time, signals)
+    record = record_of(run, Axis.YAW)
     assert np.flatnonzero(~record.angle_ok).tolist() == [50, 500]
     assert np.flatnonzero(~record.rate_ok).tolist() == [200, 291]
+    told = left_out([replace(run, notes=examine(run, {}))], Axis.YAW)
+    assert [(n.code, n.data["run"], n.data["signal"], n.data["count"]) for n in told] == [
+        ("spikes", "run", "yaw_rad", 2),
+        ("spikes", "run", "yaw_rate_rad_s", 1),
+    ]
+    assert left_out([replace(run, notes=examine(run, {}))], Axis.PITCH) == ()
