@@ -108,10 +108,11 @@ def _spikes(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
         return []
     worst = int(np.argmax(found.off))
     largest, limit, at = float(found.off[worst]), found.limit, float(time[found.places[worst]])
-    left_out = "; no fit uses them" if name in FITTED else ""
+    count = int(found.places.size)
+    left_out = f"; no fit uses {'it' if count == 1 else 'them'}" if name in FITTED else ""
     message = (
-        f"{name} has {found.places.size} spikes, the largest of {largest:.3g} {SIGNALS[name]} at {at:.2f} s "
+        f"{name} has {count} spike{'' if count == 1 else 's'}, the largest of {largest:.3g} {SIGNALS[name]} at {at:.2f} s "
         f"(limit {limit:.3g}){left_out}; check the sensor"
     )
-    data = {"signal": name, "value": largest, "limit": limit, "count": int(found.places.size)}
+    data = {"signal": name, "value": largest, "limit": limit, "count": count}
     return [Note("spikes", message, data)]
