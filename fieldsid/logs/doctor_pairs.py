@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from fieldsid.logs.integral import integrated
 from fieldsid.logs.run import FloatArray, Note, Run
 
 WINDOW_S = 1.0
@@ -62,7 +63,7 @@ def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, f
     both = np.isfinite(run[angle]) & np.isfinite(run[rate])
     if both.sum() < 50:
         return None
-    time, turned, swept = run.time[both], run[angle][both], _integral(run.time[both], run[rate][both])
+    time, turned, swept = run.time[both], run[angle][both], integrated(run.time[both], run[rate][both])
     step = float(np.median(np.diff(time)))
     width = max(1, round(WINDOW_S / step))
     if time.size <= 3 * width:
@@ -90,10 +91,6 @@ def _swapped(run: Run) -> list[Note]:
             message = f"{angle} follows {other} (correlation {trust[other]:.2f}), not {own} ({mine:.2f}): two columns are swapped"
             found.append(Note("swapped", message, {"signal": angle, "value": trust.get(own, 0.0), "limit": WEAK}))
     return found
-
-
-def _integral(time: FloatArray, rate: FloatArray) -> FloatArray:
-    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))])
 
 
 def _slope(a: FloatArray, b: FloatArray) -> tuple[float, float]:
@@ -175,7 +172,7 @@ def _speed_and_way(run: Run) -> list[Note]:
     if time.size <= 2 * width:
         return []
     made = np.hypot(x[width:] - x[:-width], y[width:] - y[:-width]) / (time[width:] - time[:-width])
-    said = _integral(time, surge)
+    said = integrated(time, surge)
     said = np.abs(said[width:] - said[:-width]) / (time[width:] - time[:-width])
     # In a turn the straight way is shorter than the path, so the fastest windows decide.
     ratio = float(np.percentile(made, 90)) / max(float(np.percentile(said, 90)), 1e-9)

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from fieldsid.logs.clock import Track, straight
 from fieldsid.logs.frames import unwrapped
+from fieldsid.logs.integral import integrated
 from fieldsid.logs.run import FloatArray, Note
 
 TURN = 2.0 * math.pi
@@ -153,8 +154,7 @@ def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rat
     if rate is None or seen.sum() < 2 or calm.size < 2:
         return None
     own, values = rate.time[seen], rate.values[seen]
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(own))])
-    swept = np.interp(time, own, total)
+    swept = np.interp(time, own, integrated(own, values))
     said, made = np.diff(swept)[calm], turned[calm]
     power = float(said @ said)
     if not (0.0 < power < math.inf):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.integral import integrated
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.lag import behind
 from fieldsid.models.smoothing import smoothed
@@ -25,15 +26,10 @@ def depth_along(
     T of the smoother is at least fastest_s s.
     """
     steps = np.diff(time)
-    path = _integrated(steps, np.sin(pitch) if surge is None else surge * np.sin(pitch))
+    path = integrated(time, np.sin(pitch) if surge is None else surge * np.sin(pitch))
     # a heave behind the pitch rate has moved the hull by what is left of the pitch behind the same lag
     columns = [
-        np.column_stack([path, pitch, behind(steps, pitch, lag), _integrated(steps, behind(steps, fin, lag))])
+        np.column_stack([path, pitch, behind(steps, pitch, lag), integrated(time, behind(steps, fin, lag))])
         for lag in LAGS_S.tolist()
     ]
     return smoothed(time, depth, fastest_s=fastest_s, beside=columns)
-
-
-def _integrated(steps: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the integral (n,) of a signal (n,) that is straight between samples."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * steps * (values[:-1] + values[1:]))])

@@ -140,12 +140,15 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         angle[angle_ok] = np.unwrap(angle[angle_ok])
     angle_ok, rate_ok = _without_spikes(angle, angle_ok), _without_spikes(rate, rate_ok)
     held = _held_fin(run.signals[column])
+    along = axis is Axis.PITCH and run.has(ROLES["depth"]) and bool(angle_ok.any())
     signals = {
-        role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0)) for role, c in ROLES.items() if run.has(c)
+        role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0))
+        for role, c in ROLES.items()
+        if run.has(c) and not (along and role == "depth")
     }
     if run.has(names.cross):
         signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
-    if "depth" in signals and axis is Axis.PITCH and angle_ok.any():
+    if along:
         pitch = np.interp(run.time, run.time[angle_ok], angle[angle_ok])
         depth, fastest_s = run.signals[ROLES["depth"]], FASTEST_S["depth"]
         signals["depth"] = depth_along(run.time, depth, pitch, signals.get("surge"), held, fastest_s=fastest_s)
