@@ -22,8 +22,8 @@ DIGITS = 3.0
 FEW = 0.01
 """Share of the samples up to which spikes are a sensor's fault, and beyond which they are the signal."""
 FEWEST = 20
-ROUNDED = 1e-9
-"""Share of a signal's range below which values differ by rounding only."""
+ROUNDED, BULK = 1e-9, 0.05
+"""Share of a signal's range below which values differ by rounding only; share left out of that range at either end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,8 @@ class Spikes:
     limit: float
 
 
+# a damaged log holds numbers whose differences are none
+@np.errstate(over="ignore", invalid="ignore")
 def spikes_of(values: FloatArray) -> Spikes:
     """Return the spikes of a signal (n,) without gaps; none where it is short, or where they are more than a few."""
     none = Spikes(np.zeros(0, dtype=np.intp), np.zeros(0), float("inf"))
@@ -56,5 +58,7 @@ def spikes_of(values: FloatArray) -> Spikes:
 
 def _last_digit(values: FloatArray) -> float:
     """Return the least difference of two values that differ: the last digit of a log that has few."""
-    apart = np.diff(np.sort(values))
-    return float(apart[apart > ROUNDED * float(np.ptp(values))].min())
+    ordered, ends = np.sort(values), int(BULK * values.size)
+    apart = np.diff(ordered)
+    told = apart[apart > ROUNDED * (ordered[-1 - ends] - ordered[ends])]
+    return float(told.min()) if told.size else 0.0

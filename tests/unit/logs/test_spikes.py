@@ -44,6 +44,17 @@ def test_spikes_of_fifteen_spreads_are_found_and_nothing_else(name):
     assert np.all(found.off > found.limit)
 
 
+@pytest.mark.parametrize("size", [9999.0, 1e20, 1e300, -1.7e308])
+def test_a_value_out_of_all_bounds_is_a_spike(size):
+    values = noisy(zigzag())
+    values[[300, 800]] = [size, -size]
+    assert spikes_of(values).places.tolist() == [300, 800]
+
+
+def test_a_signal_that_is_absurd_throughout_has_none():
+    assert spikes_of(1.7e308 * np.sign(noisy(np.zeros(N)))).places.size == 0
+
+
 def test_white_noise_of_half_a_million_samples_has_none():
     assert spikes_of(np.random.default_rng(1).standard_normal(500_000)).places.size == 0
 
