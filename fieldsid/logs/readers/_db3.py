@@ -15,6 +15,8 @@ from fieldsid.errors import LogError
 from fieldsid.logs.readers._packets import Catch, Link, Slot
 
 MAGIC = b"SQLite format 3\x00"
+DAMAGE = (sqlite3.DatabaseError, MemoryError, UnicodeDecodeError)
+"""What SQLite raises on a damaged file: it believes a damaged length and finds no memory, and quotes damaged text."""
 _LANGUAGES = {"ros2msg": "msg", "ros2idl": "idl"}
 
 
@@ -75,9 +77,9 @@ def _shortened(path: Path, folder: Path, size: int, pages: int) -> Path:
 def _links(path: Path, base: sqlite3.Connection, catch: Catch) -> dict[int, Slot | None]:
     try:
         topics = base.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id").fetchall()
-    except sqlite3.DatabaseError as error:
+    except DAMAGE as error:
         raise LogError(
-            f"`{path}` is not a readable ROS 2 bag: {error}",
+            f"`{path}` is not a readable ROS 2 bag: {_said(error)}",
             found=f"{path.stat().st_size} bytes",
             hint="copy it from the vehicle again",
         ) from error
@@ -92,7 +94,7 @@ def _links(path: Path, base: sqlite3.Connection, catch: Catch) -> dict[int, Slot
 def _definitions(base: sqlite3.Connection) -> dict[str, tuple[Any, str]]:
     try:
         rows = base.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions").fetchall()
-    except sqlite3.DatabaseError:
+    except DAMAGE:
         return {}
     return {kind: (_LANGUAGES.get(encoding, ""), text) for kind, encoding, text in rows}
 
@@ -103,6 +105,10 @@ def _rows(path: Path, base: sqlite3.Connection, catch: Catch, slots: dict[int, S
     try:
         for number, stamp, data in base.execute(query, tuple(slots)):
             slots[number].take(stamp, data)
-    except sqlite3.DatabaseError as error:
+    except DAMAGE as error:
         if not catch.notes:
-            catch.truncated(str(error), path.stat().st_size)
+            catch.truncated(_said(error), path.stat().st_size)
+
+
+def _said(error: BaseException) -> str:
+    return str(error) or "a row claims more bytes than the memory holds"

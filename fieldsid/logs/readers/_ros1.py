@@ -6,8 +6,8 @@ A record is a header (u32 length, then u32 length + `name=value` fields) and dat
 from __future__ import annotations
 
 import mmap
+import struct
 from pathlib import Path
-from struct import Struct
 
 from fieldsid.errors import LogError
 from fieldsid.logs.readers._packets import Catch, Link, Slot
@@ -17,8 +17,11 @@ MAGIC = b"#ROSBAG V"
 MESSAGE_HEADER = 38
 """Bytes of the header of a message: op, conn and time, each with its length."""
 
-_U32 = Struct("<I")
-_STAMP = Struct("<II")
+DAMAGE = (KeyError, struct.error, UnicodeDecodeError)
+"""What a record with a field that is missing, too short or no text raises."""
+
+_U32 = struct.Struct("<I")
+_STAMP = struct.Struct("<II")
 Bytes = bytes | mmap.mmap
 
 
@@ -86,6 +89,12 @@ class _Records:
         return _U32.unpack_from(data, head + conn + 5)[0], sec * 1_000_000_000 + nanosec
 
     def _slow(self, data: Bytes, head: int, size: int, body: int, length: int) -> None:
+        try:
+            self._any(data, head, size, body, length)
+        except DAMAGE:
+            self.catch.damaged("a record", head)
+
+    def _any(self, data: Bytes, head: int, size: int, body: int, length: int) -> None:
         fields = _fields(data, head, size)
         op = fields.get(b"op", (b"", 0))[0]
         if op == b"\x02":
@@ -100,9 +109,6 @@ class _Records:
     def _first_message(
         self, data: Bytes, fields: dict[bytes, tuple[bytes, int]], head: int, size: int, body: int, length: int
     ) -> None:
-        if b"conn" not in fields or b"time" not in fields:
-            self.catch.damaged("a message record", head)
-            return
         if size == MESSAGE_HEADER:
             self.shape = (fields[b"op"][1] - head - 3, fields[b"conn"][1] - head - 5, fields[b"time"][1] - head - 5)
         slot = self.slots.get(_U32.unpack(fields[b"conn"][0])[0])
@@ -134,9 +140,8 @@ class _Records:
 
     def _last_chunk(self, data: Bytes, head: int, size: int, body: int, end: int) -> None:
         """Take what is left of a chunk that the end of the file cuts."""
-        fields = _fields(data, head, size)
-        if fields.get(b"op", (b"", 0))[0] == b"\x05":
-            self._chunk(fields, bytes(data[body:end]), body)
+        if _fields(data, head, size).get(b"op", (b"", 0))[0] == b"\x05":
+            self._slow(data, head, size, body, end - body)
 
     def _cut(self, where: str, size: int, *, inner: bool) -> None:
         if not inner:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from fieldsid.errors import FieldsidError, LogError, MappingError
 from fieldsid.logs import load_run
 from fieldsid.logs.mapping import mapping_of
+from fieldsid.logs.readers.rosbag import caught
 
 TIME = np.arange(300) / 20
 SPIRAL = {
@@ -88,6 +89,30 @@ def test_a_bag_damaged_anywhere_is_read_as_far_as_it_goes_or_refused(spiral, tmp
     except FieldsidError as error:
         parts = (error.what, error.found, error.hint)
     assert all(parts)
+
+
+def test_a_record_of_a_ros1_bag_without_its_fields_is_left_out(tmp_path):
+    path = write(tmp_path / "one", "ros1", [("/a", "std_msgs/msg/Float64", number(k), 0.1 * k) for k in range(30)])
+    raw = path.read_bytes()
+    path.write_bytes(raw.replace(b"message_definition=", b"message_dofinition=", 1))
+    catch = caught(path, None)
+    assert {n.code for n in catch.notes} == {"damaged"}
+    assert "a record at byte" in catch.notes[0].message
+
+
+def test_a_row_of_a_db3_bag_with_a_damaged_length_ends_the_reading(tmp_path):
+    message = joint(["rudder port side"] * 8, [0.1] * 8, 0.0)
+    rows = [("/fins", "sensor_msgs/msg/JointState", message, 0.1 * k) for k in range(60)]
+    whole = file_of(write(tmp_path / "one", "db3", rows))
+    raw = bytearray(whole.read_bytes())
+    row = (EPOCH_NS + 2_000_000_000).to_bytes(8, "big") + b"\x00\x01\x00\x00"  # the stamp, then the message
+    at = raw.index(row) - 12
+    raw[at : at + 16] = b"\xff" * 16
+    whole.write_bytes(bytes(raw))
+    catch = caught(whole, None)
+    assert [n.code for n in catch.notes] == ["truncated"]
+    assert "memory" in catch.notes[0].message
+    assert len(catch.slots["/fins"].stamps) >= 19
 
 
 def write(path, kind, rows, **more):
