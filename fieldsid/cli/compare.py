@@ -41,9 +41,9 @@ def command(
 ) -> Mapping[str, Any]:
     """Compare a model with runs by free simulation, and show where it fails.
 
-    The model is simulated from the run's fin alone; refitted are the initial state and, where a log rounds the jumps of its
-    command to its samples, when between two samples they were made. The error is divided by phase, fin angle, rate, speed,
-    heading, side, depth and time. With `-o` one figure per run is drawn.
+    The model is simulated from the run's fin alone; refitted are the initial state, the speed within the third of a percent it
+    is measured to and, where a log rounds the jumps of its command to its samples, when they were made. The error is divided
+    by phase, fin angle, rate, speed, heading, side, depth and time. With `-o` one figure per run is drawn.
 
     Example: sysid compare models/run7_yaw.yaml runs/zigzag.parquet
     """
@@ -89,7 +89,8 @@ def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
         "angle_fit_percent": c.merit.angle_fit,
         "rate_fit_percent": c.merit.rate_fit,
         "noise_floor": {"angle_rad": c.floor.angle, "rate_rad_s": c.floor.rate},
-        "command_times": _times(c),
+        "command_times": _as_flown(c, "command_between_samples"),
+        "own_speed": _as_flown(c, "own_speed"),
         "judged_by": c.channel,
         "theil": c.metrics.theil,
         "r2": c.metrics.r2,
@@ -111,11 +112,9 @@ def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
     }
 
 
-def _times(c: Comparison) -> dict[str, Any] | None:
-    """Return what a run's command was taken to have done between the samples, and the errors without that."""
-    from fieldsid.fitting.between import said
-
-    note = said(c.shown.record)
+def _as_flown(c: Comparison, code: str) -> dict[str, Any] | None:
+    """Return what a run was taken to have done otherwise than its log has it, and the errors with all of that as logged."""
+    note = next((n for n in c.shown.notes if n.code == code), None)
     if note is None or c.shown.as_logged is None:
         return None
     angle, rate = c.shown.as_logged
@@ -140,9 +139,9 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]], top: int) -> None
     ]
     to.print(table("", ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %"), rows))
     for e in entries:
-        if e["command_times"]:
-            logged = number(e["command_times"]["as_logged"]["rate_rms_rad_s"], 2)
-            to.print(f"{e['command_times']['says']}; rate rms {logged} with the logged times", soft_wrap=True)
+        for flown in filter(None, (e["command_times"], e["own_speed"])):
+            angle, rate = (number(flown["as_logged"][name], 2) for name in ("angle_rms_rad", "rate_rms_rad_s"))
+            to.print(f"{flown['says']}; angle rms {angle}, rate rms {rate} as logged", soft_wrap=True)
     for e in entries:
         _render_where(to, e, top)
     for e in entries:

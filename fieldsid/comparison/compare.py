@@ -46,7 +46,8 @@ class Comparison:
 def compare(model: Model, runs: Sequence[Run]) -> tuple[Comparison, ...]:
     """Return the comparison of a model with each run.
 
-    Its initial state, per-run nuisances and the command's times between samples are refitted, nothing else.
+    Its initial state, per-run nuisances, the command's times between samples and, within its measurement's error, the run's
+    speed are refitted, nothing else.
     Raises DataError for a run without the signals, EffectError for one without a signal that an effect needs,
     ModelError when the model grows without bound.
     """

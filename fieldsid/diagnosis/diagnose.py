@@ -25,7 +25,7 @@ from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.effects import all_effects
 from fieldsid.errors import DataError, ModelError
 from fieldsid.fitting.fit import check
-from fieldsid.fitting.predict import predict
+from fieldsid.fitting.predict import as_flown, predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
@@ -100,7 +100,7 @@ def _said(
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, skipped),
         skipped=skipped,
-        notes=(*notes, *diverged),
+        notes=(*notes, *diverged, *as_flown(model, work.validation)),
     )
 
 

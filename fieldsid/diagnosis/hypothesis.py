@@ -12,11 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-from fieldsid.diagnosis.predictive import Unseen, moves_of, predictive, speed_doubt
+from fieldsid.diagnosis.predictive import Unseen, moves_of, predictive
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, likelihood_at, likelihood_by_run, refine, samples
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.own_speed import at_own_speed, speed_doubt
 from fieldsid.fitting.predict import frozen_problem, refit_own, with_times
 from fieldsid.fitting.problem import Problem
 from fieldsid.logs.run import FloatArray
@@ -170,8 +171,12 @@ def _contradicts(h: Hypothesis, parent: Hypothesis) -> bool:
 
 
 def unseen_errors(flown: Flown, validation: Sequence[Record]) -> Errors:
-    """Return the errors on unseen runs, each run's own start at its best for them."""
-    left = [left_over(p, refit_own(p, x, 0, floor_of([r]), anew=False)) for (p, x), r in zip(flown, validation, strict=True)]
+    """Return the errors on unseen runs, each run's own speed and start at their best for them."""
+    left = []
+    for (flown_problem, start), record in zip(flown, validation, strict=True):
+        floor = floor_of([record])
+        problem, x, _ = at_own_speed(flown_problem, start, floor)
+        left.append(left_over(problem, refit_own(problem, x, 0, floor, anew=False)))
     return errors_of(validation, left)
 
 

@@ -36,8 +36,6 @@ ROUNDED = 1e-14
 """Share of a slot's information below which what is left of it is not told from rounding."""
 SINGULAR = 1e-10
 """What is added to the precision of every combination of parameters, in units of their own."""
-MEASURED, GUESSED = 0.003, 0.01
-"""Share by which the speed of a run is off, where it was measured and where it was not: twice that goes into the authority."""
 ALIKE = 4.0
 """Sum of squares over the noise floor within which residuals ask for the same noise."""
 
@@ -109,14 +107,6 @@ def moves_of(judged: Judged, frozen: Problem, speed: float) -> FloatArray:
         step = STEP * max(abs(values[name]), STEP)
         out[:, j] = (at(values | {name: values[name] + step}) - at(values | {name: values[name] - step})) / (2.0 * step)
     return out
-
-
-def speed_doubt(frozen: Problem, x: FloatArray, speed: float) -> FloatArray:
-    """Return what a one-run problem's shared slots (F,) move by where the run's speed is off by as much as it may be."""
-    layout, names = frozen.layout, NAMES[frozen.layout.axis]
-    share = MEASURED if np.isfinite(speed) else GUESSED
-    powers = {names.damping: layout.groups.exponent, names.authority: 2.0, names.trim: 2.0 * layout.groups.trim_of_fin}
-    return np.array([share * powers.get(n, 0.0) * x[i] for i, n in enumerate(layout.names)])
 
 
 def _under(

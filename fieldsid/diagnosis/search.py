@@ -16,7 +16,7 @@ from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_
 from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
 from fieldsid.diagnosis.weather import in_its_weather, other_noise, sensors, wanders
-from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more, fits, helps, likelier, pays
+from fieldsid.diagnosis.worth import ALIKE, FAR, HOPE, MUCH, WORTH, asks_for_more, fits, helps, likelier, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.noise import floor_below, floor_of
 from fieldsid.fitting.problem import Problem
@@ -27,13 +27,6 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
-FAR = 4.0
-"""Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
-off, a textbook's shape tells little, and the first of two effects less."""
-HOPE = 0.5
-"""Share of the base's error that effects must have left, for a step that does not pay to be gone beyond."""
-MUCH = 2.0
-"""Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought, and that are given the free run."""
 TRIM_TURNS = 2
@@ -148,9 +141,14 @@ class Search:
     def _flown_before(self, parent: Hypothesis) -> None:
         """Judge the children whose free runs were found under the other noise, from there: a free run knows of neither."""
         key = frozenset(parent.names)
-        for name in [n for n in self.free if len(n) == len(key) + 1 and key < n and n not in self.tried]:
+        names = [n for n, free in self.free.items() if free and len(n) == len(key) + 1 and key < n and n not in self.tried]
+
+        def judge_all(name: frozenset[str]) -> Hypothesis:
             for free in self.free[name]:
                 self._judge_child(parent, free.problem, free.x, next(e for e in free.effects if e.name not in key))
+            return self.tried[name].worked_out()
+
+        self.tried |= dict(zip(names, self.beside.each(judge_all, names), strict=True))
 
     def _gone(self, parent: Hypothesis, groups: Sequence[Sequence[Way]], *, every: bool = False) -> list[Way]:
         """Go the ways of each effect; return those left out where one gone before has brought what they promise.
@@ -186,11 +184,9 @@ class Search:
             start = free.x
         self._judge_child(parent, promise.problem, start, promise.effect, rival)
 
-    def _judge_child(
-        self, parent: Hypothesis, problem: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf
-    ) -> None:  # fmt: skip
+    def _judge_child(self, parent: Hypothesis, p: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf) -> None:
         """Judge a start, and the other start that has the same response at one speed."""
-        judged = judge(problem, start, parent.judged.noise, self.told, self.family, rival=rival)
+        judged = judge(p, start, parent.judged.noise, self.told, self.family, rival=rival)
         self._keep(smaller_twin(judged, effect))
 
     def _back_from_child(self, key: frozenset[str]) -> None:

@@ -23,6 +23,8 @@ PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
 the base, of a hypothesis with effects, and of one that is only tried in another order."""
 GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
+MATTERS_PLAIN = 0.05
+"""Share of the plain sum of squares that a way must have taken away once it was followed: what pays takes three times that."""
 MORE, FOLLOWED = 3, 4
 """Effects beyond the `most` that the free run's screen follows for some rounds: far from an effect first order says little."""
 POINTS = 4
@@ -61,7 +63,13 @@ def ways(parent: Hypothesis, left: Sequence[Effect], most: int | None, beside: B
             steps += [_Step(ground, plain, False, partial(_shifted, ground, e)) for e in left if shifts_time(e)]
     taken = list(zip(steps, beside.each(lambda step: step.take(), steps), strict=True))
     best = sorted((Way(p, s.ground, s.plain) for s, p in taken if s.follows), key=lambda way: way.promise.cost)
-    return best[:most] + [Way(p, s.ground, s.plain) for s, p in taken if not s.follows]
+    found = best[:most] + [Way(p, s.ground, s.plain) for s, p in taken if not s.follows]
+    return found if most is None else [w for w in found if not w.plain or w is found[0] or _matters(w)]
+
+
+def _matters(way: Way) -> bool:
+    """Whether a way of the free run, followed as far as it was, has come to what might be worth having."""
+    return way.ground.cost - way.promise.cost > MATTERS_PLAIN * way.ground.cost
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,13 @@ WORSE = 2.0
 """Error on unseen runs over that on fitted ones above which more is left than a disturbance, which is alike on both."""
 MATTERS_MORE = 0.02
 """What a third and each further effect must bring beyond that: long explanations are the easier to find."""
+FAR = 4.0
+"""Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
+off, a textbook's shape tells little, and the first of two effects less."""
+HOPE = 0.5
+"""Share of the base's error that effects must have left, for a step that does not pay to be gone beyond."""
+MUCH = 2.0
+"""Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 
 
 def pays(without: Hypothesis, with_: Hypothesis) -> bool:

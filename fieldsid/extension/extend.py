@@ -22,10 +22,9 @@ from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.diagnosis.worth import MATTERS, WORTH
 from fieldsid.effects import pick_effect
-from fieldsid.errors import DataError, ModelError, UsageError
-from fieldsid.fitting.between import said
+from fieldsid.errors import DataError, UsageError
 from fieldsid.fitting.fit import check
-from fieldsid.fitting.predict import predict
+from fieldsid.fitting.predict import as_flown
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -109,20 +108,8 @@ def extend(
         judged_on=tuple(r.name for r in (judged or learned)),
     )
     model = refitted_model(after)
-    notes = (*notes, *_times_between(model, judged), *left_out([*training, *validation], parent.axis))
+    notes = (*notes, *as_flown(model, judged), *left_out([*training, *validation], parent.axis))
     return Extension(model, gain, after.score - before.score, notes)
-
-
-def _times_between(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
-    """Return what the commands of runs were taken to have done between the samples."""
-    notes = []
-    for record in records:
-        try:
-            note = said(predict(model, record).record)
-        except ModelError:
-            continue
-        notes += [note] if note else []
-    return tuple(notes)
 
 
 def base_from(work: Search, parent: Model) -> Hypothesis:

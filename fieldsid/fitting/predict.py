@@ -9,14 +9,14 @@ from itertools import product
 import numpy as np
 
 from fieldsid.errors import ModelError
-from fieldsid.fitting.between import timed
+from fieldsid.fitting import between, own_speed
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.first_second import first_second
 from fieldsid.fitting.layout import Groups, Layout, Slot, layout_of
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import is_white
-from fieldsid.logs.run import FloatArray
+from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
@@ -33,8 +33,8 @@ OWN_ROUNDS, OWN = 15, 1e-6
 class Prediction:
     """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances.
 
-    `as_logged` is the rms residual (rad, rad/s) with the command's jumps where the log shows them, None where the record
-    has them there.
+    faster is the share by which the run was faster than its log has it, see own_speed.py. `as_logged` is the rms residual
+    (rad, rad/s) with the log's own speed and the command's jumps where it shows them, None where both are as it has them.
     """
 
     record: Record
@@ -43,6 +43,7 @@ class Prediction:
     fin: FloatArray
     state: tuple[float, float, float]
     nuisance: Mapping[str, float]
+    faster: float = 0.0
     as_logged: tuple[float, float] | None = None
 
     @property
@@ -50,12 +51,21 @@ class Prediction:
         """Measured minus simulated, (2, n), zero where nothing was measured."""
         return np.where(self.record.ok, self.record.both - np.stack([self.angle, self.rate]), 0.0)
 
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What the run was taken to have done otherwise than its log has it: when its commands came, and how fast it was."""
+        return tuple(n for n in (between.said(self.record), own_speed.said(self.record, self.faster)) if n is not None)
+
 
 def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
     """Return a model's free run on a record; raises ModelError when it grows without bound."""
+    floor = floor_of([record])
     logged, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
-    problem, x = with_times(logged, x, floor_of([record]))
-    as_logged = None if problem is logged else _rms_as_logged(logged, x)
+    problem, x = with_times(logged, x, floor)
+    as_timed = problem
+    problem, x, faster = own_speed.at_own_speed(problem, x, floor)
+    x = refit_own(problem, x, 0, floor, anew=False)
+    as_logged = None if as_timed is logged and not own_speed.says_much(faster) else _rms_as_logged(logged, x)
     motion, _ = problem.simulate(x, 0)
     if not np.isfinite(motion.rate).all():
         at = float(record.time[np.argmin(np.isfinite(motion.rate))])
@@ -68,7 +78,18 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     fin = fin_path(problem.records[0], problem.layout.effects, values)
     nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
     path = np.append(fin.start, fin.end[-1])
-    return Prediction(problem.records[0], motion.angle, motion.rate, path, problem.state_of(x, 0), nuisance, as_logged)
+    return Prediction(problem.records[0], motion.angle, motion.rate, path, problem.state_of(x, 0), nuisance, faster, as_logged)
+
+
+def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
+    """Return what runs were taken to have done otherwise than their logs have it, those a model diverges on left out."""
+    notes: list[Note] = []
+    for record in records:
+        try:
+            notes += predict(model, record).notes
+        except ModelError:
+            continue
+    return tuple(notes)
 
 
 def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
@@ -108,7 +129,7 @@ def with_times(problem: Problem, x: FloatArray, noise: Noise) -> tuple[Problem, 
     """
     record = problem.records[0]
     x = refit_own(problem, x, 0, noise)
-    better = timed(problem, x, floor_of([record]))
+    better = between.timed(problem, x, floor_of([record]))
     if better is None:
         return problem, x
     problem = Problem((better,), problem.layout)

@@ -9,10 +9,11 @@ import pytest
 from truth.paper import YAW, paper_run
 
 from fieldsid.diagnosis.hypothesis import bare_model, flown_by, left_over
-from fieldsid.diagnosis.predictive import Unseen, _under, _without_own, moves_of, precision, speed_doubt
+from fieldsid.diagnosis.predictive import Unseen, _under, _without_own, moves_of, precision
 from fieldsid.diagnosis.trial import Judged, refine
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.layout import layout_of
+from fieldsid.fitting.own_speed import speed_doubt
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.logs.run import Run

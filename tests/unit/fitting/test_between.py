@@ -11,7 +11,7 @@ from truth.logbook import flown
 from truth.noise import Clock
 from truth.physics import Physics
 
-from fieldsid.fitting import between
+from fieldsid.fitting import between, own_speed
 from fieldsid.fitting.between import correlation_length, jumps_of
 from fieldsid.fitting.fit import fit
 from fieldsid.fitting.predict import predict
@@ -72,6 +72,7 @@ def test_jumps_between_samples_are_timed_to_milliseconds_and_the_error_falls_to_
     shown = predict(TRUE, record)
     with monkeypatch.context() as patch:
         patch.setattr(between, "MOST", 0)
+        patch.setattr(own_speed, "MOST", 0.0)
         held = predict(TRUE, record)
     assert shown.record.early is not None
     np.testing.assert_allclose(shown.record.early[jumps_of(record)], early, atol=0.006)

@@ -1,0 +1,106 @@
+"""A run's own speed: found where the log's is a little off, never moved by more than a measurement may be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from truth import maneuvers
+from truth.logbook import flown
+from truth.noise import Clock
+from truth.physics import Physics
+
+from fieldsid.fitting import own_speed
+from fieldsid.fitting.noise import floor_of
+from fieldsid.fitting.own_speed import MEASURED, MOST, at_own_speed, said
+from fieldsid.fitting.predict import frozen_problem, predict, refit_own
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import record_of
+from fieldsid.models.speed_law import SpeedLaw
+
+SPEED, ANGLE, RATE = 1.5, 0.003, 0.003
+HULL = Physics(damping=0.8, authority=-0.6, nominal_speed=SPEED)
+TRUE = Model(
+    Axis.YAW, (), {"a22": 0.8, "b2": -0.6, "C0": 0.0}, {}, (), np.zeros((0, 0)), SpeedLaw(SPEED), Noise(ANGLE, RATE)
+)  # fmt: skip
+
+
+def logged(faster, *, seed=1, gust=0.0):
+    """A run as flown, in a log whose speed is short by that share."""
+    clock = Clock(0.05, 1200)
+    log = flown(HULL, clock, maneuvers.zigzag(clock.time, 0.3, 0.8), angle_noise=ANGLE, rate_noise=RATE, gust=gust, seed=seed)
+    record = record_of(Run("run", log["time_s"], {k: v for k, v in log.items() if k != "time_s"}), Axis.YAW)
+    return replace(record, speed=SPEED / (1.0 + faster))
+
+
+def errors(shown):
+    return np.sqrt(np.mean(shown.residual**2, axis=1)) / (ANGLE, RATE)
+
+
+@pytest.mark.parametrize("faster", [0.006, -0.004])
+def test_a_speed_that_is_a_little_off_is_found_and_said(faster):
+    record = logged(faster)
+    shown = predict(TRUE, record)
+    assert shown.faster == pytest.approx(faster, abs=0.001)
+    assert (errors(shown) < 1.06).all()
+    assert shown.as_logged is not None
+    assert shown.as_logged[0] > 1.3 * ANGLE
+    note = said(record, shown.faster)
+    assert note is not None
+    assert f"{100 * abs(shown.faster):.2f} % {'faster' if faster > 0 else 'slower'}" in note.message
+
+
+def test_a_speed_that_is_right_is_left_where_it_is():
+    shown = predict(TRUE, logged(0.0))
+    assert abs(shown.faster) < own_speed.WORTH_SAYING
+    assert shown.as_logged is None
+    assert said(shown.record, shown.faster) is None
+
+
+def test_a_speed_is_moved_by_three_errors_of_its_measurement_at_most():
+    shown = predict(TRUE, logged(0.05))
+    assert 2.0 * MEASURED < shown.faster <= MOST * MEASURED
+    assert errors(shown)[0] > 3.0
+
+
+def test_a_speed_that_nobody_measured_stays_so():
+    shown = predict(TRUE, replace(logged(0.006), speed=float("nan")))
+    assert shown.faster == 0.0
+
+
+def test_the_speed_found_is_at_the_minimum_of_what_the_page_says():
+    record = logged(0.006, gust=0.05)
+    floor = floor_of([record])
+    problem, x = frozen_problem(TRUE, record, ())
+    x = refit_own(problem, x, 0, floor)
+    moved, own, faster = at_own_speed(problem, x, floor)
+    weight = own_speed._weights(record, moved.residual(own, 0)[0], floor)[:, None]
+    free = list(problem.layout.of_run(0))
+
+    def cost(v):
+        at = x.copy()
+        at[free] = v[:-1]
+        residual, _ = own_speed._faster(problem, MEASURED * v[-1]).residual(at, 0)
+        return float(np.sum((weight * residual) ** 2) + v[-1] ** 2)
+
+    start = np.append(own[free], faster / MEASURED)
+    best = minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9, "maxiter": 4000})
+    assert faster / MEASURED == pytest.approx(best.x[-1], abs=0.05)
+
+
+def test_what_a_wrong_model_leaves_moves_the_speed_less_than_it_would_alone():
+    wrong = replace(TRUE, values={**TRUE.values, "C0": 0.01})
+    record = logged(0.0)
+    assert errors(predict(wrong, record))[0] > 5.0
+    assert abs(predict(wrong, record).faster) < MOST * MEASURED
+
+
+@pytest.mark.parametrize(("gust", "share_left"), [(0.0, 0.2), (0.003, 0.7), (0.03, 1.1)])
+def test_speeds_are_found_better_than_they_were_measured_unless_gusts_say_more(gust, share_left):
+    shares = MEASURED * np.random.default_rng(5).standard_normal(12)
+    found = np.array([predict(TRUE, logged(share, seed=i, gust=gust)).faster for i, share in enumerate(shares)])
+    assert np.sqrt(np.mean((found - shares) ** 2)) < share_left * MEASURED
