@@ -260,9 +260,9 @@ class Search:
         """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
         best = self._grown(self.base())
         if self.error(best) > MUCH:
-            # what promised nothing in the textbook's form may in another one
-            left = (e for e in self.catalogue if e.forms and e.name not in self.root)
-            untried = [e for e in left if self.root | {e.name} not in self.tried]
+            # where nothing was found, what promised nothing in the textbook's form may in another one
+            nothing = frozenset(best.names) == self.root
+            untried = [e for e in self.catalogue if nothing and e.forms and self.root | {e.name} not in self.tried]
             self._gone(self.base(), by_effect(ways(self.base(), untried, None, self.beside, anew=False, flown=True)))
             self._improve(self.root, [], every=True)
             best = self._grown(self._likeliest())
