@@ -16,6 +16,7 @@ import numpy as np
 
 from fieldsid.diagnosis.memory import follows
 from fieldsid.diagnosis.trial import Judged
+from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.tails import chi_square_tail, f_tail, pearson3_tail
 from fieldsid.fitting.whiteness import white_p
@@ -24,6 +25,8 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
+BEYOND_CHANCE = 2e-2
+"""p-value below which what is left is not a disturbance."""
 TEMPER = 0.2
 """Power of the p-value of colour: the disturbance has one time constant, and a sea with a swell in it is no less a sea."""
 WINDOW_S = 2.0
@@ -74,6 +77,11 @@ def remainder_of(judged: Judged) -> Remainder:
     start = runs[run].record.time[0] + window * WINDOW_S
     bursts = min(1.0, 2.0 * min(bursts, _unevenness(runs)))
     return Remainder(_colour(runs), relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
+
+
+def is_odd(judged: Judged) -> bool:
+    """Whether what a hypothesis leaves is no disturbance of any sea, nor any sensors' wander."""
+    return remainder_of(in_its_weather(judged)).p < BEYOND_CHANCE
 
 
 def _training(judged: Judged) -> list[Left]:

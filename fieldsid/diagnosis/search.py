@@ -13,6 +13,7 @@ from fieldsid.diagnosis.floor import is_noiseless, told_apart
 from fieldsid.diagnosis.forms import Shaping
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
+from fieldsid.diagnosis.remainder import is_odd
 from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
 from fieldsid.diagnosis.weather import in_its_weather, other_noise, sensors, wanders
@@ -259,9 +260,8 @@ class Search:
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
         best = self._grown(self.base())
-        if self.error(best) > MUCH:
-            # where nothing was found, what promised nothing in the textbook's form may in another one
-            nothing = frozenset(best.names) == self.root
+        nothing = frozenset(best.names) == self.root
+        if self.error(best) > MUCH and (nothing or is_odd(best.judged)):  # the textbook's forms may promise nothing
             untried = [e for e in self.catalogue if nothing and e.forms and self.root | {e.name} not in self.tried]
             self._gone(self.base(), by_effect(ways(self.base(), untried, None, self.beside, anew=False, flown=True)))
             self._improve(self.root, [], every=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis
-from fieldsid.diagnosis.remainder import Remainder
+from fieldsid.diagnosis.remainder import BEYOND_CHANCE, Remainder
 from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.trial import BOTH, Judged
 from fieldsid.diagnosis.worth import ALIKE, WORSE, worse_unseen
@@ -19,8 +19,6 @@ TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
 RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
-BEYOND_CHANCE = 2e-2
-"""p-value below which what is left is not a disturbance, where nothing was found."""
 BESIDE = ((0.7, 1e-6), (0.5, 1e-3), (0.3, BEYOND_CHANCE))
 """Share of the excess error an effect must explain to be named where what is left is less likely than this p-value: a form
 is never exact, but the less it explains the less it may leave."""
