@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from cli import trial
 from truth.logbook import flown, write_csv
@@ -37,6 +38,18 @@ def test_what_a_log_rounds_between_its_samples_is_said_with_the_error_as_logged(
     assert f"{times['jumps']} jumps of the command" in " ".join(run_cli("compare", model, rounded).out.split())
     exact = run_cli("compare", trial.model_file(tmp_path), trial.flown(tmp_path, spec="zigzag"), "--json").json["runs"][0]
     assert exact["command_times"] is None
+
+
+def test_a_speed_that_is_a_little_off_is_said_with_the_error_as_logged(run_cli, tmp_path):
+    clock = Clock(0.05, 1200)
+    hull = Physics(damping=1.1, authority=-1.2, nominal_speed=1.4)
+    log = flown(hull, clock, zigzag(clock.time, 0.26, 0.8), angle_noise=0.002, rate_noise=0.002)
+    slow = write_csv(log | {"surge_m_s": np.full(clock.time.size, 1.4 / 1.006)}, tmp_path / "slow.csv")
+    model = save_model(trial.vehicle(Axis.YAW, C0=0.0), tmp_path / "hull.yaml")
+    (run,) = run_cli("compare", model, slow, "--json").json["runs"]
+    assert run["own_speed"]["faster"] == pytest.approx(0.006, abs=0.0015)
+    assert run["angle_rms_rad"] < 0.8 * run["own_speed"]["as_logged"]["angle_rms_rad"]
+    assert "% faster than the 1.392 m/s" in " ".join(run_cli("compare", model, slow).out.split())
 
 
 def test_one_figure_per_run_is_drawn_beside_each_other(run_cli, tmp_path):

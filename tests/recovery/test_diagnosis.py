@@ -131,6 +131,22 @@ def test_a_single_effect_is_found_whatever_law_of_the_trim_or_end_of_the_fit_hid
     assert found.final.validation.angle_rms_rad < 1.06 * case.floor["angle_rad"]
 
 
+def test_an_effect_that_promises_nothing_in_the_textbooks_form_is_found_in_another() -> None:
+    case = make_case(91, 157)
+    assert case.effects == ("prop_moment",)
+    found = diagnosed(case)
+    assert (found.verdict, found.effects) == ("effect", case.effects)
+    assert found.final.validation.angle_rms_rad < 1.15 * case.floor["angle_rad"]
+
+
+def test_an_unseen_run_is_flown_at_its_own_speed_and_that_is_said() -> None:
+    case = make_case(131, 142)
+    found = diagnosed(case)
+    assert (found.verdict, found.effects) == ("effect", case.effects)
+    assert found.final.validation.angle_rms_rad < 1.06 * case.floor["angle_rad"]
+    assert "own_speed" in {n.code for n in found.notes}
+
+
 @pytest.mark.parametrize("kind", ["single", "pair"])
 def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case(kind, 40)
