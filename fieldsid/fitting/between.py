@@ -135,7 +135,7 @@ class _TimedRun:
     def most_gain(self, slopes: FloatArray) -> float:
         """Return the log likelihood, roughly, that times free of bounds gain over one shift, to first order: no less."""
         logged = self.residual(0.0 * self.most)
-        weight = 1.0 / _rms(self.problem.records[0], logged, self.floor)
+        weight = 1.0 / left_rms(self.problem.records[0], logged, self.floor)
         flat = (logged * weight[:, None]).ravel()
         left = []
         for columns in (slopes.sum(axis=0, keepdims=True), slopes):
@@ -160,7 +160,7 @@ class _TimedRun:
         for _ in range(ROUNDS):
             if not np.isfinite(raw).all():
                 break
-            weight = 1.0 / _rms(self.problem.records[0], left, self.floor)
+            weight = 1.0 / left_rms(self.problem.records[0], left, self.floor)
             flat = (columns * weight[:, None]).reshape(columns.shape[0], -1)
             gradient = flat @ (raw * weight[:, None]).ravel() - pull @ (middle - times)
             step = np.linalg.lstsq(flat @ flat.T + normal_pull, gradient, rcond=1e-12)[0]
@@ -191,7 +191,7 @@ class _TimedRun:
         return np.asarray(residual - np.tensordot(move, self.starts, axes=(0, 0)))
 
 
-def _rms(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
+def left_rms(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
     """Return what is left of each channel (2,), at least its noise."""
     return np.array(
         [
@@ -202,7 +202,7 @@ def _rms(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
 
 
 def _in_question(record: Record, residual: FloatArray, floor: Noise) -> bool:
-    over = _rms(record, residual, floor) / np.array([floor.angle, floor.rate])
+    over = left_rms(record, residual, floor) / np.array([floor.angle, floor.rate])
     return bool(np.isfinite(over).all() and over.max() > FAULTLESS)
 
 

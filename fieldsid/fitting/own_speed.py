@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fieldsid.fitting.between import LAGS_S, correlation_length
+from fieldsid.fitting.between import LAGS_S, correlation_length, left_rms
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.products import solved
 from fieldsid.logs.run import FloatArray, Note
@@ -88,7 +88,7 @@ def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> Float
     if not np.isfinite(result.stack).all():
         return None
     slopes = np.zeros((x.size, *result.residual.shape))
-    slopes[list(result.slots)] = result.sensitivity
+    slopes[list(result.slots)] = result.sensitivity * record.ok
     columns = np.concatenate([slopes[shared:], np.tensordot(_moves(problem, x), slopes[:shared], axes=1)[None]])
     weight = _weights(record, result.residual, floor)[:, None]
     flat, left = (columns * weight).reshape(columns.shape[0], -1), (result.residual * weight).ravel()
@@ -100,12 +100,9 @@ def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> Float
 
 def _weights(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
     """Return the weight of each channel (2,): over the rms of what is left of it, correlated samples counted once."""
-    weights, lags = np.zeros(2), round(LAGS_S / float(np.median(record.steps)))
-    for channel, (e, ok, sigma) in enumerate(zip(residual, record.ok, (floor.angle, floor.rate), strict=True)):
-        if ok.any():
-            rms = max(float(np.sqrt(np.mean(e[ok] ** 2))), sigma)
-            weights[channel] = 1.0 / (rms * np.sqrt(correlation_length(e[ok], lags)))
-    return weights
+    lags = round(LAGS_S / float(np.median(record.steps)))
+    lengths = [correlation_length(e[ok], lags) if ok.any() else 1.0 for e, ok in zip(residual, record.ok, strict=True)]
+    return 1.0 / (left_rms(record, residual, floor) * np.sqrt(lengths))
 
 
 def _moves(problem: Problem, x: FloatArray) -> FloatArray:

@@ -54,6 +54,13 @@ def test_a_speed_that_is_a_little_off_is_found_and_said(faster):
     assert f"{100 * abs(shown.faster):.2f} % {'faster' if faster > 0 else 'slower'}" in note.message
 
 
+def test_a_heading_once_a_second_and_no_rate_tell_the_speed_as_well():
+    record = logged(0.006)
+    seen = np.arange(len(record)) % 20 == 0
+    shown = predict(TRUE, replace(record, angle_ok=seen, rate_ok=np.zeros(len(record), dtype=bool)))
+    assert shown.faster == pytest.approx(0.006, abs=0.002)
+
+
 def test_a_speed_that_is_right_is_left_where_it_is():
     shown = predict(TRUE, logged(0.0))
     assert abs(shown.faster) < own_speed.WORTH_SAYING
