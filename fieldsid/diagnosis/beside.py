@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -26,6 +27,10 @@ R = TypeVar("R")
 _IS_COPY = "FIELDSID_IS_COPY"
 MOST = 256
 """Items that are shared out at most: their numbers are bytes."""
+WHOLE = b"that is all"
+"""What ends the answer of a copy that came to its end."""
+_ENDING: list[int] = []
+"""Copies that have answered: giving its memory back takes one as long as making it, and nobody need wait for that."""
 
 
 class Beside:
@@ -43,6 +48,7 @@ class Beside:
         """
         if not 1 < len(items) < MOST or not can_copy():
             return [function(item) for item in items]
+        _see_off()
         left, source, target = _numbers(len(items)), *os.pipe()
         try:
             copy = os.fork()
@@ -60,11 +66,12 @@ class Beside:
                 answer = stream.read()
             except BaseException:
                 os.kill(copy, signal.SIGKILL)
+                os.waitpid(copy, 0)
                 raise
             finally:
                 os.close(left)
-                _, status = os.waitpid(copy, 0)
-        if status == 0:
+        _ENDING.append(copy)
+        if answer.endswith(WHOLE):
             done |= self.loads(answer)
         return [done[i] if i in done else function(item) for i, item in enumerate(items)]
 
@@ -78,7 +85,7 @@ class Beside:
             os.dup2(nowhere, 2)
             answer = self.dumps(dict(_taken(function, items, left)))
             with os.fdopen(target, "wb") as stream:
-                stream.write(answer)
+                stream.write(answer + WHOLE)
             status = 0
         finally:
             os._exit(status)
@@ -92,6 +99,13 @@ class Beside:
     def loads(self, answer: bytes) -> Any:
         """Return what `dumps` was given, the known records and effects in it themselves."""
         return _Reader(BytesIO(answer), self).load()
+
+
+def _see_off() -> None:
+    """Wait for the copies that have answered to be gone, unless somebody else has."""
+    while _ENDING:
+        with suppress(ChildProcessError):
+            os.waitpid(_ENDING.pop(), 0)
 
 
 def _numbers(count: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.advise import next_maneuver
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.freely import freely
 from fieldsid.diagnosis.hypothesis import Hypothesis
@@ -28,7 +30,7 @@ from fieldsid.fitting.fit import check
 from fieldsid.fitting.predict import as_flown, predict
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.model import Noise
+from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out, record_of
 
 SHOWN = 8
@@ -47,8 +49,8 @@ def diagnose(
     known names effects the model has already: they are part of the base. report is told what is being tried.
     Raises DataError when a run cannot be fitted on the axis, EffectError for a user's effect that fails.
     """
-    records = [record_of(r, axis) for r in training]
-    unseen = tuple(record_of(r, axis) for r in validation)
+    both = Beside((), ()).each(lambda run: record_of(run, axis), (*training, *validation))
+    records, unseen = both[: len(training)], tuple(both[len(training) :])
     check([*records, *unseen], axis)
     learned, unseen, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
     notes = (*notes, *left_out([*training, *validation], axis))
@@ -58,7 +60,7 @@ def diagnose(
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
     work = search(learned, unseen, axis, catalogue, known=known, report=report)
     found = work.best()
-    judged = in_its_weather(found.judged)
+    judged = in_its_weather(found.judged, work.beside)
     left = remainder_of(judged)
     verdict = verdict_of(work, found, left, judged)
     if verdict.word == "unexplained" and work.is_noiseless:
@@ -84,8 +86,15 @@ def _said(
     base = work.base()
     named = found if verdict.word in ("effect", "undecided") else base
     candidates = _candidates(work, found, floor)
-    where, diverged = where_of(base, work.validation or work.records)
-    model = refitted_model(named)
+
+    def refitted() -> tuple[Model, tuple[Note, ...]]:
+        model = refitted_model(named)
+        return model, as_flown(model, work.validation)
+
+    parts: tuple[Callable[[], Any], ...] = (
+        refitted, partial(refitted_model, base), partial(where_of, base, work.validation or work.records),
+    )  # fmt: skip
+    (model, flown), base_model, (where, diverged) = work.beside.each(lambda part: part(), parts)
     return Diagnosis(
         axis=work.axis,
         verdict=verdict.word,
@@ -96,11 +105,11 @@ def _said(
         noise_floor=floor,
         candidates=candidates,
         model=model,
-        base_model=refitted_model(base),
+        base_model=base_model,
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, skipped),
         skipped=skipped,
-        notes=(*notes, *diverged, *as_flown(model, work.validation)),
+        notes=(*notes, *diverged, *flown),
     )
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +25,10 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import TRIM_OF_FIN
 
+T = TypeVar("T")
+
+TURNS = 2
+"""Times a search begins anew under the trim's other law: a first effect may have asked for the one that the second does not."""
 ALIKE_SPEEDS = 1.1
 """What the product of both channels' errors must fall by for runs of a group to count as flown at one speed."""
 
@@ -71,20 +77,33 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
     return _better(h, *by_other_law(trial.problem, trial.x), told, family, WORTH if one_speed else 0.0)
 
 
-def other_trim(
-    found: Hypothesis, tried: Mapping[frozenset[str], Hypothesis], told: Noise, floor: Noise, beside: Beside
-) -> Hypothesis | None:
-    """Return a hypothesis that has more evidence under the trim's other law than what was found has under this one.
+@dataclass(slots=True)
+class Trims:
+    """What hypotheses come to under the trim's other law, each judged once, and how often a search has turned to it."""
 
-    One of the effects found may stand in for that law. Where something is left, it may be hidden by it: what was found is
-    tried, and the likeliest of all, which the law may have kept from predicting.
-    """
-    key = frozenset(found.names)
-    asked = [tried[k] for k in tried if k < key and len(k) == len(key) - 1]
-    if asks_for_more(found, floor):
-        asked += [found, max(tried.values(), key=lambda h: h.score)]
-    again = beside.each(lambda h: better_trim(h, told), list({frozenset(h.names): h for h in asked}.values()))
-    return max((h for h in again if h is not None and h.score > found.score), key=lambda h: h.score, default=None)
+    known: dict[tuple[tuple[str, ...], float], Hypothesis | None] = field(default_factory=dict)
+    turned: int = 0
+
+    def asked(
+        self, found: Hypothesis, tried: Mapping[frozenset[str], Hypothesis], floor: Noise, told: Noise, beside: Beside,
+        first: Callable[[], T],
+    ) -> tuple[T, Hypothesis | None]:  # fmt: skip
+        """Return the first question's answer, and a hypothesis with more evidence under the other law than what was found has.
+
+        One of the effects found may stand in for that law. Where something is left, it may be hidden by it: what was found
+        is tried, and the likeliest of all, which the law may have kept from predicting.
+        """
+        key, asked = frozenset(found.names), list[Hypothesis]()
+        if self.turned < TURNS:
+            asked = [tried[k] for k in tried if k < key and len(k) == len(key) - 1]
+            asked += [found, max(tried.values(), key=lambda h: h.score)] if asks_for_more(found, floor) else []
+        keys = {(h.names, h.score): h for h in asked}
+        new = {k: partial(better_trim, h, told) for k, h in keys.items() if k not in self.known}
+        parts: tuple[Callable[[], Any], ...] = (first, *new.values())
+        answer, *again = beside.each(lambda part: part(), parts)
+        self.known |= dict(zip(new, again, strict=True))
+        better = [h for h in (self.known[k] for k in keys) if h is not None and h.score > found.score]
+        return answer, max(better, key=lambda h: h.score, default=None)
 
 
 def better_trim(h: Hypothesis, told: Noise) -> Hypothesis | None:

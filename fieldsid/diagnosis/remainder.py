@@ -14,6 +14,7 @@ from math import factorial
 
 import numpy as np
 
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.memory import follows
 from fieldsid.diagnosis.trial import Judged
 from fieldsid.diagnosis.weather import in_its_weather
@@ -79,9 +80,9 @@ def remainder_of(judged: Judged) -> Remainder:
     return Remainder(_colour(runs), relation, bursts, runs[run].record.name, float(start), float(start + WINDOW_S), ratio, name)
 
 
-def is_odd(judged: Judged) -> bool:
+def is_odd(judged: Judged, beside: Beside) -> bool:
     """Whether what a hypothesis leaves is no disturbance of any sea, nor any sensors' wander."""
-    return remainder_of(in_its_weather(judged)).p < BEYOND_CHANCE
+    return remainder_of(in_its_weather(judged, beside)).p < BEYOND_CHANCE
 
 
 def _training(judged: Judged) -> list[Left]:

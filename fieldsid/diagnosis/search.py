@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import is_noiseless, told_apart
 from fieldsid.diagnosis.forms import Shaping
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
-from fieldsid.diagnosis.laws import base_trial, error_by_law, other_trim, speed_laws, under_other_law
+from fieldsid.diagnosis.laws import Trims, base_trial, error_by_law, speed_laws, under_other_law
 from fieldsid.diagnosis.remainder import is_odd
 from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
@@ -30,8 +31,6 @@ from fieldsid.models.record import Record
 
 LEADING = 3
 """Children that every way to them is gone for, whatever the first has brought, and that are given the free run."""
-TRIM_TURNS = 2
-"""Times a search begins anew under the trim's other law: a first effect may have asked for the one that the second does not."""
 LARGEST, PAIR = 4, 2
 """Effects a hypothesis has at most, and those whose parts were all tried on the way to it."""
 
@@ -50,7 +49,7 @@ class Search:
     family: str = ""
     begun: set[str] = field(default_factory=set)
     trim_of_fin: bool | None = None
-    trims_turned: int = 0
+    trims: Trims = field(default_factory=Trims)
     told: Noise = field(init=False)
     is_noiseless: bool = False
     """Whether the logs show so little noise that the base errs by a hundred times it in all that was measured."""
@@ -85,7 +84,7 @@ class Search:
             self.told = told_apart(self.floor, trial.weights)
             judgings = self.beside.each(lambda f: judge(trial.problem, trial.x, self.floor, self.told, f), families)
             judged = max(judgings, key=lambda j: j.likelihood)
-            judged = in_its_weather(judged) if wanders(judged) else judged
+            judged = in_its_weather(judged, self.beside) if wanders(judged) else judged
             self.family, self.begun = judged.family, self.begun | {judged.family}
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
@@ -261,7 +260,7 @@ class Search:
         """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
         best = self._grown(self.base())
         nothing = frozenset(best.names) == self.root
-        if self.error(best) > MUCH and (nothing or is_odd(best.judged)):  # the textbook's forms may promise nothing
+        if self.error(best) > MUCH and (nothing or is_odd(best.judged, self.beside)):  # the textbook's forms may promise nothing
             untried = [e for e in self.catalogue if nothing and e.forms and self.root | {e.name} not in self.tried]
             self._gone(self.base(), by_effect(ways(self.base(), untried, None, self.beside, anew=False, flown=True)))
             self._improve(self.root, [], every=True)
@@ -306,17 +305,16 @@ class Search:
         What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
         coloured sensors lets the heading wander for free. What was found stays among what is tried, judged anew.
         """
-        found, again = self._likeliest(), None
-        judged = other_noise(found, self.floor, self.begun)
+        found = self._likeliest()
+        noise = partial(other_noise, found, self.floor, self.begun, self.beside)
+        judged, again = self.trims.asked(found, self.tried, self.floor, self.told, self.beside, noise)
         if judged is not None:
             self.family, again = judged.family, hypothesis_of(judged, self.validation)
-        elif self.trims_turned < TRIM_TURNS:
-            again = other_trim(found, self.tried, self.told, self.floor, self.beside)
-            if again is not None:
-                self.trims_turned += 1
-                self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
-                self.free.clear()
-                self.flown_from.clear()
+        elif again is not None:
+            self.trims.turned += 1
+            self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
+            self.free.clear()
+            self.flown_from.clear()
         if again is None:
             return False
         self.tried.clear()

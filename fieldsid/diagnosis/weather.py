@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import TRACE, shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.trial import BOTH, NOISES, Judged, judge
@@ -15,7 +16,7 @@ from fieldsid.diagnosis.worth import WORTH
 from fieldsid.models.model import Noise
 
 
-def in_its_weather(own: Judged) -> Judged:
+def in_its_weather(own: Judged, beside: Beside) -> Judged:
     """Return a hypothesis at its best under sea and sensors together, where that is likelier on the runs fitted to.
 
     Its own numbers go with it: what one kind alone has to take for the other bends them.
@@ -27,11 +28,12 @@ def in_its_weather(own: Judged) -> Judged:
     if not (wanders(own) or wanders(other)):
         return own
     # from what one kind alone has taken of both there may be no way back: from each of them
-    both = max((judge(problem, j.trial.x, j.noise, own.floor, BOTH) for j in (own, other)), key=lambda j: j.likelihood)
+    ends = beside.each(lambda j: judge(problem, j.trial.x, j.noise, own.floor, BOTH), (own, other))
+    both = max(ends, key=lambda j: j.likelihood)
     return both if both.likelihood > own.likelihood + WORTH else own
 
 
-def other_noise(h: Hypothesis, floor: Noise, begun: Collection[str]) -> Judged | None:
+def other_noise(h: Hypothesis, floor: Noise, begun: Collection[str], beside: Beside) -> Judged | None:
     """Return a hypothesis under a kind of noise that no search has begun with, where that is likelier, None where none is.
 
     Both together are asked for where sensors wander by more than a trace.
@@ -43,7 +45,7 @@ def other_noise(h: Hypothesis, floor: Noise, begun: Collection[str]) -> Judged |
             return judged
     if BOTH in begun or not wanders(own):
         return None
-    both = in_its_weather(own)
+    both = in_its_weather(own, beside)
     return None if both is own else both
 
 

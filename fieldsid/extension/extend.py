@@ -102,7 +102,7 @@ def extend(
         added=tuple(e.name for e in new),
         before=before.errors,
         after=after.errors,
-        noise_floor=shown_floor(work.floor, in_its_weather(after.judged).noise),
+        noise_floor=shown_floor(work.floor, in_its_weather(after.judged, work.beside).noise),
         unseen=bool(judged),
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),

@@ -132,6 +132,10 @@ def descend(
         trial[index] = np.clip(x[index] + step, low, high)
         moved = trial[index] - x[index]
         expected = float(2 * gradient @ moved - moved @ normal @ moved)
+        if 0.0 <= expected <= tolerance * cost and damping <= DAMPING_START:
+            # no step was refused: where so little is left to gain it is there, and nobody need look
+            x, cost, done = trial, cost - expected, True
+            break
         # the first step is hardly ever refused: its equations come with its cost
         new, equations = hill.at(trial, whole=count == 1 and expected > tolerance * cost)
         if new < cost:

@@ -102,6 +102,8 @@ class Layout:
     shared: int
     names: tuple[str, ...] = field(init=False)
     """Names of the shared slots."""
+    every: tuple[str, ...] = field(init=False)
+    """Names of all slots."""
     low: FloatArray = field(init=False, compare=False)
     """Lower bounds, (N,)."""
     high: FloatArray = field(init=False, compare=False)
@@ -110,7 +112,8 @@ class Layout:
     """The positions of each run's own slots."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "names", tuple(s.name for s in self.slots[: self.shared]))
+        object.__setattr__(self, "every", tuple(s.name for s in self.slots))
+        object.__setattr__(self, "names", self.every[: self.shared])
         object.__setattr__(self, "low", np.array([s.low for s in self.slots]))
         object.__setattr__(self, "high", np.array([s.high for s in self.slots]))
         own: dict[int, list[int]] = {}

@@ -117,5 +117,5 @@ def lean(problem: Problem, noise: Noise, free: Sequence[int]) -> Lean | None:
     for index, r in enumerate(problem.records):
         path = r.commanded
         weight = r.ok / np.array([[noise.angle], [noise.rate]])
-        runs.append(_Run(index, r.steps, float(r.steps.max()), np.stack([path.start, path.end]), r.both, weight))
+        runs.append(_Run(index, r.steps, r.longest, np.stack([path.start, path.end]), r.both, weight))
     return Lean(problem, tuple(runs), tuple(free))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 
@@ -87,16 +88,17 @@ class Problem:
         """Return speed over reference speed, and speed over the one that the run's authority slot belongs to."""
         g = self.layout.groups
         speed = g.run_speeds[run]
-        if not np.isfinite(speed) or not np.isfinite(g.speeds[g.reference]):
+        if not isfinite(speed) or not isfinite(g.speeds[g.reference]):
             return 1.0, 1.0
         return speed / g.speeds[g.reference], g.over_group(run)
 
     def values_of(self, x: FloatArray, run: int) -> dict[str, float]:
         """Return the effects' coefficients as a run sees them."""
-        layout = self.layout
-        own = {layout.slots[i].name: float(x[i]) for i in layout.of_run(run)}
-        law = {"damping_exponent": layout.groups.exponent}
-        return law | dict(zip(layout.names, x[: layout.shared].tolist(), strict=True)) | own
+        layout, numbers = self.layout, x.tolist()
+        values = {"damping_exponent": layout.groups.exponent} | dict(zip(layout.names, numbers, strict=False))
+        for place in layout.of_run(run):
+            values[layout.every[place]] = numbers[place]
+        return values
 
     def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:
         """Return a run's initial state: angle, rate, and the cross state that the rate before the run has led to."""

@@ -14,30 +14,27 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Core, Effect, FinPath, Motion, Values
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import (
+    CROSS_FACTOR,
+    CROSS_PUSH,
+    MOMENT,
     Assembled,
     Base,
     combined_core,
     combined_terms,
     constants_of,
-    drive_of,
+    cross_factor_of,
+    damping_of,
     fin_path,
     lift,
     measured,
+    moments_of,
     run_core,
 )
+from fieldsid.models.signal_path import DAMPING as OF_DAMPING
 from fieldsid.models.speed_law import over_reference
 
 CROSS = START_NAMES.index("rate_before")
 DAMPING, RATE, SQUARE = (kernels.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate", "cross_quadratic"))
-CROSS_PUSH = kernels.DRIVES.index("cross_push")
-MOMENT = tuple(kernels.DRIVES.index(name) for name in ("moment_start", "moment_end"))
-ENTERED = {
-    "fin": (*MOMENT, CROSS_PUSH),
-    "terms": (*MOMENT, kernels.DRIVES.index("damping"), kernels.DRIVES.index("cross_factor")),
-    "core": (CROSS_PUSH,),
-    "moment": MOMENT,
-}
-"""The drives that an effect's hooks enter, by their place; what else a core pushes are constants."""
 EXPONENT = 1e-4
 """Half width of the central difference by the exponent of the speed law."""
 
@@ -241,9 +238,10 @@ class Pushes:
         step = coefficient.step
         high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
         (above, up), (below, down) = (self._entered(owner, self.values | {name: value}) for value in (high, low))
-        slopes = {place: np.asarray(above[place] - below[place]) / (high - low) for place in above}
-        slopes = {place: slope for place, slope in slopes.items() if slope.any()}
-        return (_columns(slopes) if slopes else None), (up - down) / (high - low)
+        width = high - low
+        changes = {place: value - below[place] for place, value in above.items()}
+        slopes = {place: c / width for place, c in changes.items() if isinstance(c, np.ndarray) or c != 0.0}
+        return (_columns(slopes) if slopes else None), (up - down) / width
 
     def _entered(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
         """Return the drives that an effect enters, by their place, and the core's constants (14,), at these values."""
@@ -251,8 +249,13 @@ class Pushes:
         fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
         terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)
         core = self.arrays.core if owner.core is None else self._core(values)
-        places = {place for hook, entered in ENTERED.items() if getattr(owner, hook) is not None for place in entered}
-        drives = {place: drive_of(place, record, self.base, fin, terms, core) for place in places}
+        drives: dict[int, FloatArray | float] = {}
+        if owner.fin is not None or owner.terms is not None or owner.moment is not None:
+            drives[MOMENT[0]], drives[MOMENT[1]] = moments_of(self.base, fin, terms)
+        if owner.terms is not None:
+            drives[OF_DAMPING], drives[CROSS_FACTOR] = damping_of(self.base, terms), cross_factor_of(terms)
+        if owner.fin is not None or owner.core is not None:
+            drives[CROSS_PUSH] = core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
         if owner.moment is not None:
             path = run_core(record, self.arrays, self.start)
             moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)
@@ -308,10 +311,10 @@ def _constant(columns: slice, factor: float = 1.0) -> Push:
     return push
 
 
-def _columns(slopes: Mapping[int, FloatArray]) -> Push:
+def _columns(slopes: Mapping[int, FloatArray | float]) -> Push:
     def push(part: slice, row: FloatArray) -> None:
         for place, slope in slopes.items():
-            row[:, place] = slope[part]
+            row[:, place] = slope[part] if isinstance(slope, np.ndarray) else slope
 
     return push
 

@@ -51,6 +51,8 @@ class Record:
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
+    longest: float = field(init=False)
+    """The longest of them, in s."""
     even: FloatArray = field(init=False)
     """The same, (n-1,) s, but for a clock's jitter: steps near the median are taken as that. For filters that are fast where
     nothing changes and only say how noise is coloured."""
@@ -60,23 +62,22 @@ class Record:
     """Where they were measured, (2, n)."""
     is_whole: bool = field(init=False)
     """Whether both were measured throughout."""
+    commanded: FinPath = field(init=False)
+    """The fin as logged, as a path over the intervals."""
 
     def __post_init__(self) -> None:
         steps = np.diff(self.time)
         usual = float(np.median(steps)) if steps.size else 0.0
         object.__setattr__(self, "steps", steps)
+        object.__setattr__(self, "longest", float(steps.max()) if steps.size else 0.0)
         object.__setattr__(self, "even", np.where(np.abs(steps - usual) < JITTER * usual, usual, steps))
         object.__setattr__(self, "both", np.stack([self.angle, self.rate]))
         object.__setattr__(self, "ok", np.stack([self.angle_ok, self.rate_ok]))
         object.__setattr__(self, "is_whole", bool(self.ok.all()))
+        object.__setattr__(self, "commanded", self.given(self.early))
 
     def __len__(self) -> int:
         return int(self.time.size)
-
-    @property
-    def commanded(self) -> FinPath:
-        """The fin as logged, as a path over the intervals."""
-        return self.given(self.early)
 
     def given(self, early: FloatArray | None) -> FinPath:
         """Return the path of the fin with its held commands given so much before their samples, (n,) s."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from math import ceil, sqrt
 
 import numpy as np
 
@@ -17,8 +18,14 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Core, Effect, FinPath, Motion, Terms, Values, held
 from fieldsid.models.record import Record
 
-LONGEST_PIECE = 0.3
-"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step)."""
+LONGEST_PIECE, MOST_PIECES = 0.3, 200
+"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step), and most pieces."""
+DAMPING, STIFFNESS, CROSS_FACTOR, CROSS_PUSH = (
+    kernels.DRIVES.index(name) for name in ("damping", "stiffness", "cross_factor", "cross_push")
+)
+MOMENT, FLOW = ((kernels.DRIVES.index(f"{name}_start"), kernels.DRIVES.index(f"{name}_end")) for name in ("moment", "flow"))
+"""The places of the core's drives."""
+NO_CORE = Core()
 MOMENT_ROUNDS = 30
 MOMENT_TOLERANCE = 1e-9
 
@@ -80,7 +87,7 @@ def combined_terms(record: Record, effects: Sequence[Effect], values: Values) ->
 def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
     """Return the sum of the effects' coefficients in the core; scale is the run's speed over the model's reference speed."""
     own = [effect.core(values, scale) for effect in effects if effect.core is not None]
-    return reduce(Core.plus, own) if own else Core()
+    return reduce(Core.plus, own) if own else NO_CORE
 
 
 def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> Assembled:
@@ -88,43 +95,41 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
     core = combined_core(effects, values, scale)
-    drive = np.empty((len(record) - 1, len(kernels.DRIVES)))
-    for place in range(len(kernels.DRIVES)):
-        drive[:, place] = drive_of(place, record, base, fin, terms, core)
+    drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
+    drive[:, DAMPING] = damping = damping_of(base, terms)
+    drive[:, STIFFNESS] = base.stiffness
+    drive[:, MOMENT[0]], drive[:, MOMENT[1]] = moments_of(base, fin, terms)
+    drive[:, CROSS_FACTOR] = cross_factor_of(terms)
+    if core.cross_fin != 0.0:
+        drive[:, CROSS_PUSH] = core.cross_fin * fin.mean
+    if core.crossflow != 0.0:
+        # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
+        cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
+        drive[:, FLOW[0]], drive[:, FLOW[1]] = cross[:-1], cross[1:]
     constants = constants_of(core)
-    return Assembled(drive, constants, _pieces(record, drive, constants), fin, terms, core)
+    return Assembled(drive, constants, _pieces(record, damping, base.stiffness, constants), fin, terms, core)
 
 
-def drive_of(place: int, record: Record, base: Base, fin: FinPath, terms: Terms, core: Core) -> FloatArray | float:
-    """Return one of the core's drives, (n-1,) or the same over every interval."""
-    match kernels.DRIVES[place]:
-        case "damping":
-            damping = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
-            return damping if terms.damping is None else damping + held(terms.damping)
-        case "stiffness":
-            return base.stiffness
-        case "moment_start" | "moment_end" as end:
-            return _moment(end, base, fin, terms)
-        case "cross_factor":
-            return 1.0 if terms.cross_factor is None else held(terms.cross_factor)
-        case "cross_push":
-            return core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
-        case flow:
-            return _flow(flow, record) if core.crossflow != 0.0 else 0.0
+def damping_of(base: Base, terms: Terms) -> FloatArray | float:
+    """Return the damping over each interval, (n-1,), or the one it is over all."""
+    damping = base.damping if terms.damping_factor is None else base.damping * held(terms.damping_factor)
+    return damping if terms.damping is None else damping + held(terms.damping)
 
 
-def _moment(end: str, base: Base, fin: FinPath, terms: Terms) -> FloatArray:
-    side, of_time = (0, slice(None, -1)) if end == "moment_start" else (1, slice(1, None))
-    factor = terms.authority_factor if base.trim_of_fin else None
-    trim = base.trim if factor is None else base.trim * factor[of_time]
-    moment = base.authority * lift(fin, terms)[side] + trim
-    return moment if terms.moment is None else moment + terms.moment[of_time]
+def moments_of(base: Base, fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
+    """Return the moment at both ends of each interval, (n-1,) each."""
+    start, end = (base.authority * side for side in lift(fin, terms))
+    if base.trim_of_fin and terms.authority_factor is not None:
+        trim = base.trim * terms.authority_factor
+        start, end = start + trim[:-1], end + trim[1:]
+    elif base.trim != 0.0:
+        start, end = start + base.trim, end + base.trim
+    return (start, end) if terms.moment is None else (start + terms.moment[:-1], end + terms.moment[1:])
 
 
-def _flow(end: str, record: Record) -> FloatArray:
-    # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
-    cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
-    return cross[:-1] if end == "flow_start" else cross[1:]
+def cross_factor_of(terms: Terms) -> FloatArray | float:
+    """Return the speed over the run's own in the cross state's equation over each interval, (n-1,), or 1."""
+    return 1.0 if terms.cross_factor is None else held(terms.cross_factor)
 
 
 def constants_of(core: Core) -> FloatArray:
@@ -163,7 +168,7 @@ def with_moments(record: Record, assembled: Assembled, effects: Sequence[Effect]
         drive = assembled.drive.copy()
         for effect in own:
             _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
-        current = replace(assembled, drive=drive, pieces=_pieces(record, drive, assembled.constants))
+        current = replace(assembled, drive=drive, pieces=_pieces(record, drive[:, 0], drive[:, 1], assembled.constants))
         new = run_core(record, current, start)
         change = float(np.max(np.abs(new[:, :2] - path[:, :2])))
         path = new
@@ -202,14 +207,17 @@ def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Value
 
 def pieces_for(step: float, *rates: float) -> int:
     """Return the RK4 pieces of an interval of `step` s whose dynamics have these rates (1/s)."""
-    return int(min(max(1, np.ceil(step * max(rates) / LONGEST_PIECE)), 200))
+    return ceil(min(max(1.0, step * max(rates) / LONGEST_PIECE), MOST_PIECES))
 
 
-def _pieces(record: Record, drive: FloatArray, constants: FloatArray) -> int:
-    damping, stiffness = drive[:, 0], drive[:, 1]
-    slow = float(np.sqrt(max(float(stiffness.max()), -float(stiffness.min()), 0.0)))
-    cross = abs(float(constants[7])), float(np.sqrt(abs(float(constants[8]))))
-    return pieces_for(float(record.steps.max()), float(damping.max()), -float(damping.min()), slow, *cross)
+def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray | float, constants: FloatArray) -> int:
+    cross = abs(float(constants[7])), sqrt(abs(float(constants[8])))
+    return pieces_for(record.longest, _largest(damping), sqrt(_largest(stiffness)), *cross)
+
+
+def _largest(values: FloatArray | float) -> float:
+    """Return the largest size of values, or of one."""
+    return max(float(values.max()), -float(values.min())) if isinstance(values, np.ndarray) else abs(values)
 
 
 def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:

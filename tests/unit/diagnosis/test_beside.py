@@ -72,6 +72,28 @@ def test_a_record_that_is_not_known_is_copied():
 
 
 @copies
+def test_work_within_work_does_not_wait_for_the_copy_that_waits_for_it():
+    pause = threading.Event()
+
+    def within(item):
+        pause.wait(0.01)
+        return KNOWN.each(lambda i: i + item, range(3)), "x" * 2**20  # more than a pipe holds
+
+    answers = KNOWN.each(within, range(6))
+    assert [a for a, _ in answers] == [[i, i + 1, i + 2] for i in range(6)]
+
+
+@copies
+def test_copies_that_have_answered_are_seen_off():
+    for _ in range(5):
+        KNOWN.each(str, range(3))
+    assert len(beside._ENDING) == 1
+    beside._see_off()
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@copies
 @pytest.mark.parametrize("how", ["raises", "dies", "cannot be written"])
 def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
     here = os.getpid()

@@ -11,6 +11,7 @@ from truth.noise import Clock, ar1, white
 from truth.paper import YAW, physics_of
 
 from fieldsid.diagnosis import diagnose
+from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import hypothesis_of
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.diagnosis.weather import in_its_weather
@@ -23,6 +24,7 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 
 CLOCK = Clock(0.05, 1200)
+BESIDE = Beside((), ())
 PLAN = pulses(CLOCK.time, 0.26, 0.15, start=2.0, recovery=9.0)
 WHITE, WANDER_S, GUST, GUST_S = 0.003, 2.0, 0.006, 1.5
 
@@ -44,7 +46,7 @@ def base(wander, gust, family):
 
 @pytest.mark.parametrize("family", ["coloured", "disturbance"])
 def test_both_are_found_where_both_are(family):
-    noise = in_its_weather(base(0.01, GUST, family).judged).noise
+    noise = in_its_weather(base(0.01, GUST, family).judged, BESIDE).noise
     assert noise.coloured_angle == pytest.approx(0.01, rel=0.3)
     assert noise.coloured_rate == pytest.approx(0.01, rel=0.3)
     assert noise.coloured_time == pytest.approx(WANDER_S, rel=0.5)
@@ -56,7 +58,7 @@ def test_both_are_found_where_both_are(family):
 )
 def test_a_noise_of_one_kind_is_left_as_it_is(wander, gust, family):
     h = base(wander, gust, family)
-    assert in_its_weather(h.judged) is h.judged
+    assert in_its_weather(h.judged, BESIDE) is h.judged
 
 
 def test_nothing_is_missing_where_sensors_wander_in_a_sea():
