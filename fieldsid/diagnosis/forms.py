@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -31,6 +31,22 @@ no more, and what unseen runs say of numbers that are next to nothing is next to
 
 
 @dataclass(frozen=True, slots=True)
+class Plain:
+    """A hypothesis to be put into other forms: the one `without` its last effect, and the effects whose forms are tried.
+
+    Where it has no evidence over the one without, a form need not lower the error that it has. effects are by default all.
+    """
+
+    h: Hypothesis
+    without: Hypothesis | None = None
+    effects: Collection[str] | None = None
+
+    def takes(self, formed: Hypothesis) -> bool:
+        """Whether a form that is likelier is worth having."""
+        return refines(self.h, formed) or not (self.without is None or likelier(self.without, self.h))
+
+
+@dataclass(frozen=True, slots=True)
 class Shaping:
     """How hypotheses are put into other forms: the noise they are judged under, the noise floor, and who helps."""
 
@@ -39,44 +55,63 @@ class Shaping:
     floor: Noise
     beside: Beside
 
-    def reshaped(
-        self, h: Hypothesis, *, without: Hypothesis | None = None, effects: Collection[str] | None = None
-    ) -> Hypothesis:  # fmt: skip
-        """Return a hypothesis with its effects in other forms, the best one first, as long as that pays and something is left.
+    def reshaped(self, asked: Sequence[Plain]) -> list[Hypothesis]:
+        """Return hypotheses with their effects in other forms, the best one first, as long as that pays and something is left.
 
-        Where it has no evidence over the one `without` its last effect, a form need not lower the error that it has.
-        effects are those whose forms are tried, by default all.
+        The forms of all are judged at once: one hypothesis has many, another none.
         """
-        while asks_for_more(h, self.floor):
-            best = max(self.in_other_forms(h, effects), key=lambda other: other.score, default=h)
-            if not likelier(h, best):
-                break
-            best = with_free_run(best, self.floor)
-            if not refines(h, best) and (without is None or likelier(without, h)):
-                break
-            h = best
-        return h
+        asked, left = list(asked), [i for i, plain in enumerate(asked) if asks_for_more(plain.h, self.floor)]
+        while left:
+            best = zip(left, self._best_forms([asked[i] for i in left]), strict=True)
+            likely = [(i, form) for i, form in best if form is not None and likelier(asked[i].h, form)]
+            formed = self.beside.each(lambda of: with_free_run(of[1], self.floor).worked_out(), likely)
+            taken = {i: form for (i, _), form in zip(likely, formed, strict=True) if asked[i].takes(form)}
+            for i, form in taken.items():
+                asked[i] = replace(asked[i], h=form)
+            left = [i for i, form in taken.items() if asks_for_more(form, self.floor)]
+        return [plain.h for plain in asked]
 
-    def in_other_forms(self, h: Hypothesis, effects: Collection[str] | None = None) -> list[Hypothesis]:
-        """Return a hypothesis with every form that gains anything of those its effects have besides their own, judged.
+    def _best_forms(self, asked: Sequence[Plain]) -> list[Hypothesis | None]:
+        """Return of each hypothesis its likeliest form, besides its own, that gains anything, None where none does."""
+        grounds = [_Ground.under(plain.h, self.floor) for plain in asked]
+        forms = [
+            (ground, e, form)
+            for ground, plain in zip(grounds, asked, strict=True)
+            for e in plain.h.effects
+            if plain.effects is None or e.name in plain.effects
+            for form in e.forms
+        ]
+        judged = list(zip(forms, self.beside.each(lambda of: self._judged_in(*of), forms), strict=True))
+        found = [[h for (g, _, _), h in judged if g is ground and h is not None] for ground in grounds]
+        return [max(of_one, key=lambda h: h.score, default=None) for of_one in found]
 
-        Where unseen runs are far worse than those fitted to, every form: these may tell next to nothing of what those show.
-        """
-        trial, noise = h.judged.trial, h.judged.noise
-        asked = [(e, form) for e in h.effects if effects is None or e.name in effects for form in e.forms]
-        if not asked:
-            return []
-        left, before = residuals_of(trial.problem, trial.x), cost_of(trial.problem, trial.x, noise)
-        least = -np.inf if worse_unseen(h, self.floor) > WORSE else TRIFLE
+    def _judged_in(self, ground: _Ground, effect: Effect, form: Form) -> Hypothesis | None:
+        h = ground.h
+        problem, begun = _begun(h, effect, form, ground.left)
+        if 0.5 * (ground.cost - begun.cost) < ground.least:
+            return None
+        judged = judge(problem, begun.x, h.judged.noise, self.told, self.family, rival=h.judged.likelihood)
+        return hypothesis_of(judged, h.validation)
 
-        def judged_in(of: tuple[Effect, Form]) -> Hypothesis | None:
-            problem, begun = _begun(h, *of, left)
-            if 0.5 * (before - begun.cost) < least:
-                return None
-            judged = judge(problem, begun.x, noise, self.told, self.family, rival=h.judged.likelihood)
-            return hypothesis_of(judged, h.validation)
 
-        return [other for other in self.beside.each(judged_in, asked) if other is not None]
+@dataclass(frozen=True, slots=True)
+class _Ground:
+    """What a hypothesis leaves of every run (2, n), the cost of that, and the log likelihood a form must gain to be judged.
+
+    Where unseen runs are far worse than those fitted to, none: these may tell next to nothing of what those show.
+    """
+
+    h: Hypothesis
+    left: Sequence[FloatArray]
+    cost: float
+    least: float
+
+    @classmethod
+    def under(cls, h: Hypothesis, floor: Noise) -> _Ground:
+        """Return the ground of a hypothesis over a noise floor."""
+        problem, x = h.judged.trial.problem, h.judged.trial.x
+        least = -np.inf if worse_unseen(h, floor) > WORSE else TRIFLE
+        return cls(h, residuals_of(problem, x), cost_of(problem, x, h.judged.noise), least)
 
 
 def _begun(h: Hypothesis, effect: Effect, form: Form, left: Sequence[FloatArray]) -> tuple[Problem, Descent]:

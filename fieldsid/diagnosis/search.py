@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -11,7 +11,7 @@ import numpy as np
 from fieldsid.diagnosis.again import begun_again
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import is_noiseless, told_apart
-from fieldsid.diagnosis.forms import Shaping
+from fieldsid.diagnosis.forms import Plain, Shaping
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.laws import Trims, base_trial, error_by_law, speed_laws, under_other_law
 from fieldsid.diagnosis.remainder import is_odd
@@ -88,8 +88,8 @@ class Search:
             self.family, self.begun = judged.family, self.begun | {judged.family}
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
-            self._other_law(self.root)
-            self._reshape(self.root)
+            self._other_law([self.root])
+            self._reshape([Plain(self.tried[self.root])])
         return self.tried[self.root]
 
     def hear(self, trial: Trial) -> None:
@@ -228,33 +228,25 @@ class Search:
         # forms of what the parent has were tried on it: the best child tries them again, and the one that goes on
         foremost = {*names[:1], *[n for n in names if pays(parent, self.tried[n])][:1]}
 
-        def better(name: frozenset[str]) -> tuple[Hypothesis, float | None]:
-            child = self.tried[name]
-            if fits(parent, child):
-                self._other_law(name)
-            if lost or helps(parent, child):
-                self._reshape(name, parent, None if name in foremost else name - key)
-            return self.tried[name], self.shaped.get(name)
+        helping = [n for n in names if lost or helps(parent, self.tried[n])]
+        self._other_law([n for n in names if fits(parent, self.tried[n])])
+        self._reshape([Plain(self.tried[n], parent, None if n in foremost else n - key) for n in helping])
 
-        for name, (child, shaped) in zip(names, self.beside.each(better, names), strict=True):
-            self.tried[name] = child
-            if shaped is not None:
-                self.shaped[name] = shaped
+    def _other_law(self, names: Sequence[frozenset[str]]) -> None:
+        """Put hypotheses under the other law of the speed where that has more evidence."""
 
-    def _other_law(self, key: frozenset[str]) -> None:
-        """Put a hypothesis under the other law of the speed where that has more evidence."""
-        known = self.tried[key]
-        other = under_other_law(known, self.told, self.family, asks_for_more=asks_for_more(known, self.floor))
-        if other is not None:
-            self.tried[key] = with_free_run(other, self.floor)
+        def better(name: frozenset[str]) -> Hypothesis:
+            known = self.tried[name]
+            other = under_other_law(known, self.told, self.family, asks_for_more=asks_for_more(known, self.floor))
+            return known if other is None else with_free_run(other, self.floor).worked_out()
 
-    def _reshape(self, key: frozenset[str], without: Hypothesis | None = None, effects: Collection[str] | None = None) -> None:
-        """Put a hypothesis's effects into other forms than the textbook's, unless that was tried from where it is."""
-        known = self.tried[key]
-        if known.score > self.shaped.get(key, -np.inf) + SETTLED:
-            shaping = Shaping(self.told, self.family, self.floor, self.beside)
-            self.tried[key] = shaping.reshaped(known, without=without, effects=effects)
-            self.shaped[key] = self.tried[key].score
+        self.tried |= dict(zip(names, self.beside.each(better, names), strict=True))
+
+    def _reshape(self, asked: Sequence[Plain]) -> None:
+        """Put hypotheses' effects into other forms than the textbook's, unless that was tried from where they are."""
+        asked = [p for p in asked if p.h.score > self.shaped.get(frozenset(p.h.names), -np.inf) + SETTLED]
+        for h in Shaping(self.told, self.family, self.floor, self.beside).reshaped(asked):
+            self.tried[frozenset(h.names)], self.shaped[frozenset(h.names)] = h, h.score
 
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""

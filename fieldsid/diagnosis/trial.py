@@ -88,7 +88,7 @@ def judge(
     noise, likelihood = _noise_at(problem, x, start, floor, family)
     for _ in range(ALTERNATIONS):
         found = descend(problem, x, noise, rounds=POLISH_ROUNDS, tolerance=FINE)
-        new_noise, new = _noise_at(problem, found.x, noise, floor, family)
+        new_noise, new = _noise_at(problem, found.x, noise, floor, family, wake=False)
         if not new > likelihood:
             break
         gained, x, noise, likelihood = new - likelihood, found.x, new_noise, new
@@ -97,8 +97,11 @@ def judge(
     return Judged(Trial(problem, x, white_weights(problem, x)), noise, likelihood, family, floor)
 
 
-def _noise_at(problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str) -> tuple[Noise, float]:
-    return estimate_noise(problem.records, dynamics_of(problem, x), residuals_of(problem, x), family, start, floor=floor)
+def _noise_at(
+    problem: Problem, x: FloatArray, start: Noise, floor: Noise, family: str, *, wake: bool = True
+) -> tuple[Noise, float]:  # fmt: skip
+    residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
+    return estimate_noise(problem.records, dynamics, residuals, family, start, floor=floor, wake=wake)
 
 
 def smaller_twin(judged: Judged, effect: Effect) -> Judged:

@@ -28,9 +28,10 @@ def in_its_weather(own: Judged, beside: Beside) -> Judged:
     if not (wanders(own) or wanders(other)):
         return own
     # from what one kind alone has taken of both there may be no way back: from each of them
-    ends = beside.each(lambda j: judge(problem, j.trial.x, j.noise, own.floor, BOTH), (own, other))
+    least = own.likelihood + WORTH
+    ends = beside.each(lambda j: judge(problem, j.trial.x, j.noise, own.floor, BOTH, rival=least), (own, other))
     both = max(ends, key=lambda j: j.likelihood)
-    return both if both.likelihood > own.likelihood + WORTH else own
+    return both if both.likelihood > least else own
 
 
 def other_noise(h: Hypothesis, floor: Noise, begun: Collection[str], beside: Beside) -> Judged | None:

@@ -30,6 +30,8 @@ LEAP = 1.5
 LEAST = 0.1
 """Share of what the differences show that the white noise is at least: an AR(1) noise of many samples, which has no white
 part, shows half its own increments in them."""
+NONE = 1e-12
+"""Less than any bound."""
 WORTH = 0.02
 """Log likelihood that is not worth another round."""
 GRADIENT_STEP = 1e-4
@@ -125,28 +127,31 @@ def estimate_noise(
     start: Noise,
     likelihood: Callable[[FloatArray], float] | None = None,
     floor: Noise | None = None,
+    *,
+    wake: bool = True,
 ) -> tuple[Noise, float]:
     """Return the noise of a family with the highest likelihood, and that log likelihood.
 
     dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
     noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
-    default what the signals show of it. Fisher scoring on the logarithms of the noise's
-    numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the residuals' the information.
+    default what the signals show of it; wake: whether what the start has next to none of is tried anew. Fisher scoring
+    on the logarithms of the noise's numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the
+    residuals' the information.
     """
     names = FAMILIES[family]
     floor = floor or floor_of(records)
-    rough = _rough_start(records, dynamics, residuals, floor, start)
+    rough = _rough_start(records, dynamics, residuals, floor, start) if wake else {n: getattr(start, n) for n in names}
     off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
     low, high = _bounds(names, floor, _resolution(records))
     place = np.array([NOISE_FIELDS.index(n) for n in names])
     known = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
     slope = _Slope(records, dynamics, residuals, known, place, likelihood)
-    x = np.clip(np.log([rough[n] for n in names]), low, high)
+    x = np.clip(np.log([max(rough[n], NONE) for n in names]), low, high)
     value, score, fisher = slope.at(x)
     damping = DAMPING
     for _ in range(ROUNDS):
-        moved = bounded_step(fisher, score, damping, x, low, high)
-        moved *= min(1.0, LEAP / max(float(np.max(np.abs(moved))), LEAP))
+        # each within its own leap, the others making the best of that: one on its way to nothing would hold them all back
+        moved = bounded_step(fisher, score, damping, x, np.maximum(low, x - LEAP), np.minimum(high, x + LEAP))
         if float(score @ moved) < WORTH:
             break
         trial = x + moved

@@ -133,7 +133,7 @@ def with_times(problem: Problem, x: FloatArray, noise: Noise) -> tuple[Problem, 
     if better is None:
         return problem, x
     problem = Problem((better,), problem.layout)
-    return problem, refit_own(problem, x, 0, noise)
+    return problem, refit_own(problem, x, 0, noise, anew=False)
 
 
 def refit_own(problem: Problem, x: FloatArray, run: int, noise: Noise, *, anew: bool = True) -> FloatArray:
@@ -170,7 +170,7 @@ def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
 
 
 def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
-    """Return starts with every per-run nuisance at the best point of its scan grid, and x itself."""
+    """Return starts with every per-run nuisance at the best points of its scan grid, and x itself, each once."""
     layout = problem.layout
     grids = {
         i: c.scan
@@ -189,7 +189,7 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
         trial[list(grids)] = point
         scored.append((cost_of(problem, trial, noise), tuple(point), trial))
     scored.sort(key=lambda item: item[:2])
-    return [x, *[trial for _, _, trial in scored[:2]]]
+    return [x, *(trial for _, _, trial in scored[:2] if not np.array_equal(trial, x))]
 
 
 def _layout_of_one(layout: Layout, run: int) -> Layout:

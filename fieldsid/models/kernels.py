@@ -145,20 +145,28 @@ def _map_row(row: int, h: float, turn: float, stages: FloatArray, rows: FloatArr
     in_y, in_p, in_x = 1.0 * (row == 0), 1.0 * (row == 1), 1.0 * (row == 2)
     of_y, of_p, of_x = in_y, in_p, in_x
     v_y, v_p, v_x, part = 0.0, 0.0, 0.0, 0.0
-    one, rising, by_a, by_k, of_cross, by_factor = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    one, of_cross, by_factor = 0.0, 0.0, 0.0
     for back in range(4):
         l = 3 - back
         whole = _weight(l) * h / 6.0
         w_y, w_p, w_x = part * v_y + whole * in_y, part * v_p + whole * in_p, part * v_x + whole * in_x
         v_y, v_p, v_x = w_p * stages[BY_Y, l], w_y + w_p * stages[BY_P, l] - w_x * turn, w_p - w_x * stages[BY_X, l]
         of_y, of_p, of_x = of_y + v_y, of_p + v_p, of_x + v_x
-        one, rising = one + w_p, rising + w_p * stages[PART, l]
-        by_a, by_k = by_a - w_p * stages[AT_P, l], by_k - w_p * stages[AT_Y, l]
-        of_cross, by_factor = of_cross + w_x, by_factor - w_x * stages[BY_FACTOR, l]
+        one, of_cross, by_factor = one + w_p, of_cross + w_x, by_factor - w_x * stages[BY_FACTOR, l]
         push[row, l], pull[row, l] = w_p, w_x
         part = _reach(l) * h
-    rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3], rows[row, 4] = of_y, of_p, of_x, one, rising
-    rows[row, 5], rows[row, 6], rows[row, 7], rows[row, 8] = by_a, by_k, of_cross, by_factor
+    rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3] = of_y, of_p, of_x, one
+    rows[row, 7], rows[row, 8] = of_cross, by_factor
+
+
+@jit
+def _map_rates(row: int, stages: FloatArray, push: FloatArray, rows: FloatArray) -> None:
+    """Fill what changes from step to step, and from piece to piece of one, in a row of the linear map of a linear motion."""
+    rising, by_a, by_k = 0.0, 0.0, 0.0
+    for l in range(4):
+        rising += push[row, l] * stages[PART, l]
+        by_a, by_k = by_a - push[row, l] * stages[AT_P, l], by_k - push[row, l] * stages[AT_Y, l]
+    rows[row, 4], rows[row, 5], rows[row, 6] = rising, by_a, by_k
 
 
 @jit
@@ -206,6 +214,8 @@ def tangents(
         has_c[j] = _any(d_c[j], 0, d_c.shape[1])
         turning, flowing = turning or _turns(d_c[j]), flowing or d_c[j, 1] != 0.0
         raised = raised or d_c[j, 10] != 0.0
+    bent = crossing or turning or flowing or raised or c[0] != 0.0
+    last_h, last_a, last_k = -1.0, 0.0, 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
     for i in range(n - 1):
@@ -256,7 +266,10 @@ def tangents(
             p += h / 6.0 * tp
             x += h / 6.0 * tx
             for row in range(2 + crossing):
-                _map_row(row, h, turn, stages, rows, push, pull)
+                if bent or not (a == last_a and k == last_k and abs(h - last_h) < 1e-9 * h):
+                    _map_row(row, h, turn, stages, rows, push, pull)
+                _map_rates(row, stages, push, rows)
+            last_h, last_a, last_k = h, a, k
             for j in range(count):
                 # written out: each call that hands over arrays would cost as much as what it does
                 r, sy, sp, sx = int(which[j]), s[j, 0], s[j, 1], s[j, 2]

@@ -111,6 +111,33 @@ def test_the_search_gives_back_the_noise_that_was_put_in():
     assert noise.angle == pytest.approx(min(float(residual[0].std()), 2.2 * SIGMA / 4), rel=0.2)
 
 
+STARTS = [
+    Noise(SIGMA, SIGMA),
+    Noise(SIGMA, SIGMA, 0.3, 10.0),
+    Noise(SIGMA, SIGMA, 1e-5, 0.2),
+    Noise(SIGMA, SIGMA, 0.02, 0.3, 0.02, 0.02, 5.0),
+]
+
+
+@pytest.mark.parametrize("family", ["disturbance", "both"])
+def test_the_search_for_a_noise_ends_at_the_same_likelihood_wherever_it_begins(family):
+    """Its numbers may be a ridge, or one of them on its way to nothing."""
+    known, x = problem(gust=0.03)
+    residual, dynamics = known.residual(x, 0)[0], [(TRUTH[0], 0.0)]
+    found = [estimate_noise(known.records, dynamics, [residual], family, start)[1] for start in STARTS]
+    assert max(found) - min(found) < 1.0
+
+
+@pytest.mark.parametrize("gust", [0.0, 0.03])
+def test_a_search_that_wakes_nothing_loses_none_of_the_likelihood_it_begins_with(gust):
+    known, x = problem(gust=gust)
+    residual, dynamics, calm = known.residual(x, 0)[0], [(TRUTH[0], 0.0)], Noise(SIGMA / 4, SIGMA / 4)
+    found, likelihood = estimate_noise(known.records, dynamics, [residual], "both", calm)
+    again, still = estimate_noise(known.records, dynamics, [residual], "both", found, wake=False)
+    assert likelihood - 1e-6 <= still < likelihood + 0.3
+    assert again.disturbance == pytest.approx(found.disturbance, rel=0.2, abs=1e-4)
+
+
 def test_the_spread_of_a_noise_number_is_that_of_a_sample_variance():
     """n white residuals know the log of their standard deviation to sqrt(1 / 2n)."""
     n, vector = 200, noise_vector(Noise(1.0, 1.0))

@@ -108,3 +108,27 @@ def test_the_tangents_of_every_constant_are_its_central_differences():
             ends.append(path[:, :2].T)
         wanted = (ends[0] - ends[1]) / 2e-5
         np.testing.assert_allclose(sens[j], wanted, atol=2e-6 * (1.0 + np.abs(wanted).max()), err_msg=name)
+
+
+@pytest.mark.parametrize("steady", [True, False], ids=["the map of one step for all", "a map for every step"])
+def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear_motion(steady):
+    """Where damping, stiffness and step stay the map is worked out once, but not what goes with the motion."""
+    rows, start, places = drive(), np.array([0.1, -0.05, 0.0]), range(4)
+    steps = np.where(np.arange(N - 1) < 40, H, 0.08) if steady else H * (1.0 + 0.2 * np.sin(np.arange(N - 1)))
+    rows[:, 4], rows[:, 5:] = 1.0, 0.0
+    if steady:
+        rows[:, 0] = np.where(np.arange(N - 1) < 60, 1.1, 1.4)
+    pushes = np.zeros((4, N - 1, 8))
+    for place in places:
+        pushes[place, :, place] = 1.0 + 0.1 * np.cos(np.arange(N - 1))
+    out, sens = np.empty((N, 3)), np.empty((4, 2, N))
+    kernels.tangents(
+        steps, rows, LINEAR, start, 2, pushes, np.arange(4.0), np.zeros((4, 14)), np.zeros((4, 3)), out, sens
+    )  # fmt: skip
+    for place in places:
+        ends = []
+        for side in (1.0, -1.0):
+            path = np.empty((N, 3))
+            kernels.simulate(steps, rows + side * 1e-5 * pushes[place], LINEAR, start, 2, path)
+            ends.append(path[:, :2].T)
+        np.testing.assert_allclose(sens[place], (ends[0] - ends[1]) / 2e-5, atol=1e-8, err_msg=kernels.DRIVES[place])
