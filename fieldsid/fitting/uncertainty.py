@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.fitting.kalman import transition
+from fieldsid.fitting.kalman_state import transition
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import jit
 from fieldsid.models.record import Record

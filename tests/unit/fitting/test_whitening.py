@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fieldsid.fitting.kalman import transition
+from fieldsid.fitting.kalman_state import transition
 from fieldsid.fitting.noise import log_likelihood
 from fieldsid.fitting.scoring import information, innovated
 from fieldsid.fitting.uncertainty import middle
