@@ -22,7 +22,8 @@ def _learnt(
     The sample is of y or of p, which is its own state; the gains are those of its own state, of the other and of w.
     """
     var = own + white
-    of_own, of_other, of_w = own / var, cross / var, own_w / var
+    share = 1.0 / var
+    of_own, of_other, of_w = own * share, cross * share, own_w * share
     other, other_w, w = other - of_other * cross, other_w - of_other * own_w, w - of_w * own_w
     return (
         var, of_own, of_other, of_w,
@@ -46,19 +47,20 @@ def waking(
     a0, a1, a2, b0, b1, b2 = gain[0, 0], gain[0, 1], gain[0, 2], gain[1, 0], gain[1, 1], gain[1, 2]
     while i < n and settled < SETTLED:
         still = ok[0, i] and ok[1, i]
-        spreads[0, i] = spreads[1, i] = 1.0
+        spreads[0, i] = spreads[1, i] = product = 1.0
         if ok[0, i]:
             var, g0, g1, g2, c00, c01, c02, c11, c12, c22 = _learnt(c00, c01, c02, c11, c12, c22, noise[0] ** 2)
             still = still and stays(g0, a0) and stays(g1, a1) and stays(g2, a2)
             a0, a1, a2 = g0, g1, g2
             spreads[0, i] = spread[0] = np.sqrt(var)
-            log_sum += np.log(var)
+            product *= var
         if ok[1, i]:
             var, g1, g0, g2, c11, c01, c12, c00, c02, c22 = _learnt(c11, c01, c12, c00, c02, c22, noise[1] ** 2)
             still = still and stays(g0, b0) and stays(g1, b1) and stays(g2, b2)
             b0, b1, b2 = g0, g1, g2
             spreads[1, i] = spread[1] = np.sqrt(var)
-            log_sum += np.log(var)
+            product *= var
+        log_sum += np.log(product)
         for j in range(series.shape[0]):
             y, p, w = state[j, 0], state[j, 1], state[j, 2]
             out[j, 0, i] = out[j, 1, i] = 0.0
@@ -138,7 +140,8 @@ def _less(
     float, float,
 ]:  # fmt: skip
     """Return the gains of a sample of variance var and covariances r with the state, and the state's covariance after it."""
-    g0, g1, g2, g3, g4 = r0 / var, r1 / var, r2 / var, r3 / var, r4 / var
+    share = 1.0 / var
+    g0, g1, g2, g3, g4 = r0 * share, r1 * share, r2 * share, r3 * share, r4 * share
     return (
         g0, g1, g2, g3, g4,
         c00 - g0 * r0, c01 - g0 * r1, c02 - g0 * r2, c03 - g0 * r3, c04 - g0 * r4,
@@ -165,7 +168,7 @@ def waking_of_both(
     b0, b1, b2, b3, b4 = gain[1, 0], gain[1, 1], gain[1, 2], gain[1, 3], gain[1, 4]
     while i < n and settled < SETTLED:
         still = ok[0, i] and ok[1, i]
-        spreads[0, i] = spreads[1, i] = 1.0
+        spreads[0, i] = spreads[1, i] = product = 1.0
         if ok[0, i]:
             r0, r1, r2, r3, r4 = c00 + c03, c01 + c13, c02 + c23, c03 + c33, c04 + c34
             var = r0 + r3 + noise[0] ** 2
@@ -175,7 +178,7 @@ def waking_of_both(
             still = still and stays(g0, a0) and stays(g1, a1) and stays(g2, a2) and stays(g3, a3) and stays(g4, a4)
             a0, a1, a2, a3, a4 = g0, g1, g2, g3, g4
             spreads[0, i] = spread[0] = np.sqrt(var)
-            log_sum += np.log(var)
+            product *= var
         if ok[1, i]:
             r0, r1, r2, r3, r4 = c01 + c04, c11 + c14, c12 + c24, c13 + c34, c14 + c44
             var = r1 + r4 + noise[1] ** 2
@@ -185,7 +188,8 @@ def waking_of_both(
             still = still and stays(g0, b0) and stays(g1, b1) and stays(g2, b2) and stays(g3, b3) and stays(g4, b4)
             b0, b1, b2, b3, b4 = g0, g1, g2, g3, g4
             spreads[1, i] = spread[1] = np.sqrt(var)
-            log_sum += np.log(var)
+            product *= var
+        log_sum += np.log(product)
         for j in range(series.shape[0]):
             y, p, w, m, q = state[j, 0], state[j, 1], state[j, 2], state[j, 3], state[j, 4]
             out[j, 0, i] = out[j, 1, i] = 0.0

@@ -9,10 +9,12 @@ import numpy.typing as npt
 
 from fieldsid.fitting.kalman import filtered
 from fieldsid.logs.run import FloatArray
+from fieldsid.models.jit import jit
 from fieldsid.models.record import Record
 
 LOG_STEP = 3e-4
 """Relative change of a noise's number whose effect is taken for a derivative."""
+MOVED, PER_STEP = float(np.exp(LOG_STEP)), 1.0 / LOG_STEP
 SIZES = (0, 1, 2, 4, 5)
 """Places in a noise's vector of its standard deviations, the others being correlation times."""
 
@@ -46,18 +48,42 @@ def information(
     to one and the de to -e, which gives those of the first.
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
-    e, seen = here.errors, record.ok.ravel().astype(np.float64)
-    wide, steep = np.zeros((place.size, e.size)), np.zeros((place.size, e.size))
-    sizes = [row for row, p in enumerate(place) if p in SIZES]
+    is_size, series = np.isin(place, SIZES), np.ascontiguousarray(residual[None])
+    first = int(np.argmax(is_size))
+    errors, spreads = np.empty((place.size, 1, *residual.shape)), np.empty((place.size, *residual.shape))
     for row, p in enumerate(place):
-        if row == sizes[0]:
+        if row != first:
+            moved = noise.copy()
+            moved[p] *= MOVED
+            filtered(record.even, record.ok, a, k, moved, series, errors[row], spreads[row])
+    steep, wide = errors.reshape(place.size, -1), spreads.reshape(place.size, -1)
+    score = _slopes(record.ok.ravel(), here.errors, 1.0 / here.spreads, is_size, first, steep, wide)
+    return score, 2.0 * wide @ wide.T + steep @ steep.T
+
+
+@jit
+def _slopes(
+    seen: npt.NDArray[np.bool_], e: FloatArray, over: FloatArray, is_size: npt.NDArray[np.bool_], first: int,
+    steep: FloatArray, wide: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Return the score (P,); turn errors and spreads with each number moved, (P, m), into de + e ds and ds. over is 1 / s."""
+    score = np.zeros(steep.shape[0])
+    for l in range(e.size):
+        wide[first, l], steep[first, l] = 1.0 * seen[l], -e[l]
+    for row in range(steep.shape[0]):
+        if row == first:
             continue
-        moved = noise.copy()
-        moved[p] *= np.exp(LOG_STEP)
-        there = innovated(record, a, k, moved, residual)
-        wide[row] = (there.spreads / here.spreads - 1.0) / LOG_STEP
-        steep[row] = (there.errors - e) / LOG_STEP
-    wide[sizes[0]] = seen - wide[sizes[1:]].sum(axis=0)
-    steep[sizes[0]] = -e - steep[sizes[1:]].sum(axis=0)
-    raw = steep + wide * e
-    return -(wide.sum(axis=1) + steep @ e), 2.0 * wide @ wide.T + raw @ raw.T
+        total, share = 0.0, 1.0 * is_size[row]
+        for l in range(e.size):
+            ds, de = (wide[row, l] * over[l] - 1.0) * PER_STEP, (steep[row, l] - e[l]) * PER_STEP
+            wide[row, l], steep[row, l] = ds, de + e[l] * ds
+            wide[first, l] -= share * ds
+            steep[first, l] -= share * de
+            total += ds + e[l] * de
+        score[row] = -total
+    total = 0.0
+    for l in range(e.size):
+        total += wide[first, l] + e[l] * steep[first, l]
+        steep[first, l] += e[l] * wide[first, l]
+    score[first] = -total
+    return score
