@@ -17,7 +17,7 @@ import numpy.typing as npt
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Groups, Layout, group_name, layout_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.products import least_squares, solved
+from fieldsid.fitting.products import SINGULAR, least_squares, solved
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
@@ -29,7 +29,7 @@ SHORTENINGS = 4
 ROUNDS_ALIKE = 8
 GENTLE = 0.03
 """A coefficient of either sign is tried this much weaker too: a slow ship's are far below a small vehicle's."""
-WORTHLESS = 1e-9
+WORTHLESS, DEPENDENT = 1e-9, 1e-8
 SLOWEST_PACE = 1e-3
 """1/s; a base fitted without what is missing may show next to no damping."""
 
@@ -47,13 +47,17 @@ class Promise:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """The parent (problem and its x), its residuals (2, n), and orthonormal bases (rows, rank) of its sensitivities."""
+    """The parent (problem and its x), its residuals (2, n), and an orthonormal basis (rows, rank) of its sensitivities.
+
+    Of each run: an orthonormal basis of the sensitivities to its own slots, and those to the shared ones (rows, S).
+    """
 
     problem: Problem
     x: FloatArray
     noise: Noise
     basis: FloatArray
     own_basis: tuple[FloatArray, ...]
+    shared: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
     cost: float
 
@@ -120,8 +124,9 @@ def twin_of(problem: Problem, x: FloatArray, effect: Effect) -> FloatArray | Non
 
 
 def ground_of(problem: Problem, x: FloatArray, noise: Noise) -> Ground:
-    """Return the parent's sensitivities as orthonormal bases, joint and of each run alone."""
-    columns, own, residuals, total = [], [], [], 0.0
+    """Return the parent's sensitivities, joint and of each run alone."""
+    columns, own, shared, residuals, total = [], [], [], [], 0.0
+    first_own = problem.layout.shared
     for run, record in enumerate(problem.records):
         result = problem.linearise(x, run)
         residuals.append(result.residual)
@@ -131,15 +136,24 @@ def ground_of(problem: Problem, x: FloatArray, noise: Noise) -> Ground:
         block = np.zeros((flat.shape[1], len(problem.layout.slots)))
         block[:, list(result.slots)] = flat[1:].T
         columns.append(block)
-        own.append(_orthonormal(flat[1:].T))
-    return Ground(problem, x, noise, _orthonormal(np.concatenate(columns)), tuple(own), tuple(residuals), total)
+        own.append(_orthonormal(block[:, first_own:]))
+        shared.append(block[:, :first_own])
+    return Ground(problem, x, noise, _orthonormal(np.concatenate(columns)), tuple(own), tuple(shared), tuple(residuals), total)
 
 
 def _orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (rows, rank) of columns (rows, k), some of which may depend on others.
+
+    Where one does, the decomposition makes up a direction for it and keeps those after it from that: it is done again without.
+    """
     size = np.linalg.norm(columns, axis=0)
     kept = columns[:, size > 0] / size[size > 0]
-    q, r = np.linalg.qr(kept)
-    return np.asarray(q[:, np.abs(np.diag(r)) > 1e-8])
+    while True:
+        q, r = np.linalg.qr(kept)
+        independent = np.abs(np.diag(r)) > DEPENDENT
+        if independent.all():
+            return np.asarray(q)
+        kept = kept[:, independent]
 
 
 def promise_of(ground: Ground, effect: Effect) -> Promise:
@@ -273,10 +287,9 @@ def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effec
             x[slot] = value
             e, columns = run_columns(ground, problem, x, run, [*shared, *own])
             basis = _orthonormal_beside(ground.own_basis[run], columns[:, len(shared) :])
-            squares.append(_square(basis, e, columns[:, : len(shared)]))
+            squares.append(_square(basis, np.column_stack([e, columns[:, : len(shared)], ground.shared[run]])))
         places.append(slot)
-    size = len(shared) + 1
-    square = np.array(squares).reshape(len(places), len(grid), size, size)
+    square = np.array(squares).reshape(len(places), len(grid), *squares[0].shape)
     low, high = (bound[shared] - x[shared] for bound in (problem.layout.low, problem.layout.high))
     x[places] = np.array(grid)[_alike(square, low, high)]
     return x
@@ -289,33 +302,61 @@ def _orthonormal_beside(basis: FloatArray, columns: FloatArray) -> FloatArray:
     return np.concatenate([basis, _orthonormal(columns - basis @ (basis.T @ columns))], axis=1)
 
 
-def _square(basis: FloatArray, e: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return the products (1 + k, 1 + k) of a residual and k columns among each other, once both are projected off a basis."""
-    both = np.column_stack([e, columns])
-    left = both - basis @ (basis.T @ both)
+def _square(basis: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the products (k, k) of columns (rows, k) among each other, once they are projected off a basis."""
+    left = columns - basis @ (basis.T @ columns)
     return np.asarray(left.T @ left)
 
 
 def _alike(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
     """Return the grid points (R,) whose costs sum to the least for one step, within its bounds (k,), that all runs take.
 
-    square (R, G, 1 + k, 1 + k) are each run's products at each grid point. The step is sought among those that a run
-    alone would take at a grid point, then improved with what all runs have chosen.
+    square (R, G, 1 + k + S, 1 + k + S) are each run's products at each grid point, the parent's shared numbers last. The step
+    is sought among those that a run alone would take at a grid point, whatever the shared numbers are there; then improved
+    with what all runs have chosen, and at last with the shared numbers that all have in common: what comes at a run's start
+    and stays is to a run alone as good as another trim.
     """
+    free = 1 + low.size
+    chosen = _settled_alike(_without(square, free), _cheapest_alone(_without(square, free), low, high), low, high)
+    return _settled_alike(square, chosen, low, high)
 
-    def costs(step: FloatArray) -> FloatArray:
-        row = np.concatenate([[1.0], -step])
-        return np.asarray(np.einsum("i,rgij,j->rg", row, square, row))
 
-    def within(one: FloatArray) -> FloatArray:
-        return np.asarray(np.clip(solved(one[1:, 1:], one[1:, 0]), low, high))
+def _without(square: FloatArray, first: int) -> FloatArray:
+    """Return products (..., first, first) once the columns from `first` on are projected off."""
+    scale = np.sqrt(np.maximum(np.einsum("...ii->...i", square)[..., first:], 1e-300))
+    rest = square[..., first:, first:] / scale[..., :, None] / scale[..., None, :]
+    cross = square[..., :first, first:] / scale[..., None, :]
+    inverse = np.linalg.pinv(rest, rcond=SINGULAR, hermitian=True)
+    return np.asarray(square[..., :first, :first] - cross @ inverse @ cross.swapaxes(-1, -2))
 
-    alone = (within(one) for one in square.reshape(-1, *square.shape[2:]))
-    best = min((costs(step) for step in alone), key=lambda c: float(c.min(axis=1).sum()))
-    runs, chosen = np.arange(square.shape[0]), best.argmin(axis=1)
+
+def _costs(square: FloatArray, step: FloatArray) -> FloatArray:
+    """Return each run's cost at each grid point after a step, (R, G)."""
+    row = np.concatenate([[1.0], -step])
+    return np.asarray(np.einsum("i,rgij,j->rg", row, square, row))
+
+
+def _within(one: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the step of products (1 + K, 1 + K), its first numbers within their bounds (k,)."""
+    step = solved(one[1:, 1:], one[1:, 0])
+    step[: low.size] = np.clip(step[: low.size], low, high)
+    return step
+
+
+def _cheapest_alone(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the grid points (R,) for the best of the steps that a run alone would take at a grid point."""
+    alone = (_costs(square, _within(one, low, high)) for one in square.reshape(-1, *square.shape[2:]))
+    return np.asarray(min(alone, key=lambda costs: float(costs.min(axis=1).sum())).argmin(axis=1))
+
+
+def _settled_alike(
+    square: FloatArray, chosen: npt.NDArray[np.intp], low: FloatArray, high: FloatArray
+) -> npt.NDArray[np.intp]:  # fmt: skip
+    """Return the grid points (R,) at which the step that all runs take together and what each then chooses agree."""
+    runs = np.arange(square.shape[0])
     for _ in range(ROUNDS_ALIKE):
-        again = costs(within(square[runs, chosen].sum(axis=0))).argmin(axis=1)
+        again = _costs(square, _within(square[runs, chosen].sum(axis=0), low, high)).argmin(axis=1)
         if (again == chosen).all():
             break
         chosen = again
-    return np.asarray(chosen)
+    return chosen

@@ -13,7 +13,7 @@ from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.starts import ground_of, promise_of
+from fieldsid.fitting.starts import _orthonormal, _without, ground_of, promise_of
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.simulate import command_record, simulate
@@ -53,3 +53,24 @@ def test_a_run_without_an_event_is_not_given_one_of_another_size():
         right += times == pytest.approx(EVENTS, abs=0.03) and size == pytest.approx(SIZE, rel=0.1)
     # 22 with one size for all runs, 13 where each run takes the event that suits it alone
     assert right >= 20
+
+
+@pytest.mark.parametrize("place", [1, 3, 5])
+def test_a_basis_spans_its_columns_whichever_of_them_depends_on_others(place):
+    """At one speed the damping's power of the speed pushes as the damping does: those after it must not be lost for that."""
+    rng = np.random.default_rng(place)
+    columns = rng.standard_normal((300, 6))
+    columns[:, place] = columns[:, :place] @ rng.standard_normal(place)
+    basis = _orthonormal(columns)
+    assert basis.shape == (300, 5)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(5), atol=1e-12)
+    np.testing.assert_allclose(basis @ (basis.T @ columns), columns, atol=1e-10)
+
+
+def test_products_without_some_columns_are_those_of_what_is_left_once_they_are_projected_off():
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((200, 6)) * np.array([1.0, 5.0, 0.2, 1e3, 1e-4, 1.0])
+    columns[:, 5] = 2.0 * columns[:, 3]
+    rest = _orthonormal(columns[:, 3:])
+    left = columns[:, :3] - rest @ (rest.T @ columns[:, :3])
+    np.testing.assert_allclose(_without(columns.T @ columns, 3), left.T @ left, rtol=1e-8, atol=1e-8)
