@@ -28,7 +28,7 @@ FAR = 4.0
 off, a textbook's shape tells little, and the first of two effects less."""
 HOPE = 0.5
 """Share of the base's error that effects must have left, for a step that does not pay to be gone beyond."""
-MUCH = 2.0
+MUCH = 1.5
 """Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 
 
