@@ -216,3 +216,16 @@ def test_a_prior_holds_a_slot_as_strongly_as_it_says():
     assert descend(problem, x, NOISE, prior=Prior(centre, precision)).x[4] == pytest.approx(centre[4], abs=1e-6)
     precision[4] = 0.0
     np.testing.assert_allclose(descend(problem, x, NOISE, prior=Prior(centre, precision)).x, free.x, rtol=1e-4, atol=1e-7)
+
+
+@pytest.mark.parametrize("effects", [(), ("quadratic_damping",), ("step_change",)], ids=str)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-8])
+def test_a_descent_that_ends_without_looking_is_as_low_as_it_says(effects, tolerance):
+    """The promise of its last step is below the tolerance: where that has led is not looked at."""
+    problem = problem_of([record(YAW[1]), record(YAW[1], 2)], effects)
+    noise = Noise(0.005, 0.005, 0.01, 1.0)
+    start = start_vector(problem.records, problem.layout)
+    found = descend(problem, start, noise, tolerance=tolerance)
+    held = [(b.damping, b.stiffness) for b in (problem.base_of(start, run) for run in range(2))]
+    assert found.converged
+    assert found.cost == pytest.approx(cost_of(problem, found.x, noise, held), rel=tolerance)
