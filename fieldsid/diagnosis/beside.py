@@ -77,7 +77,6 @@ class Beside:
 
     def _answer(self, function: Callable[[T], R], items: Sequence[T], left: int, target: int) -> Never:
         """Write what the items taken come to and end the copy, without a word and without what a process does at its end."""
-        status = 1
         try:
             os.environ[_IS_COPY] = "1"
             nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -86,9 +85,8 @@ class Beside:
             answer = self.dumps(dict(_taken(function, items, left)))
             with os.fdopen(target, "wb") as stream:
                 stream.write(answer + WHOLE)
-            status = 0
         finally:
-            os._exit(status)
+            os._exit(0)
 
     def dumps(self, value: object) -> bytes:
         """Return a value as bytes that `loads` reads."""

@@ -39,8 +39,8 @@ def waking(
 ) -> tuple[int, float, float]:  # fmt: skip
     """Filter from sample `first` until the gains have settled, where a disturbance and white sensors are all there is.
 
-    The same as the general way, for the symmetric covariance of (y, p, w). Returns the sample it stops before, the sum of
-    log variances, and the step f is of.
+    Written out for the symmetric covariance of (y, p, w). Returns the sample it stops before, the sum of log variances, and
+    the step f is of.
     """
     n, log_sum, settled, i = steps.shape[0] + 1, 0.0, 0, first
     c00, c01, c02, c11, c12, c22 = cov[0, 0], cov[0, 1], cov[0, 2], cov[1, 1], cov[1, 2], cov[2, 2]

@@ -23,6 +23,7 @@ from fieldsid.models.signal_path import (
     combined_terms,
     constants_of,
     cross_factor_of,
+    cross_push_of,
     damping_of,
     fin_path,
     lift,
@@ -255,7 +256,7 @@ class Pushes:
         if owner.terms is not None:
             drives[OF_DAMPING], drives[CROSS_FACTOR] = damping_of(self.base, terms), cross_factor_of(terms)
         if owner.fin is not None or owner.core is not None:
-            drives[CROSS_PUSH] = core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
+            drives[CROSS_PUSH] = cross_push_of(fin, core)
         if owner.moment is not None:
             path = run_core(record, self.arrays, self.start)
             moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)

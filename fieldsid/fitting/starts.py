@@ -316,8 +316,8 @@ def _alike(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray
     with what all runs have chosen, and at last with the shared numbers that all have in common: what comes at a run's start
     and stays is to a run alone as good as another trim.
     """
-    free = 1 + low.size
-    chosen = _settled_alike(_without(square, free), _cheapest_alone(_without(square, free), low, high), low, high)
+    alone = _without(square, 1 + low.size)
+    chosen = _settled_alike(alone, _cheapest_alone(alone, low, high), low, high)
     return _settled_alike(square, chosen, low, high)
 
 

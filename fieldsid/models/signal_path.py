@@ -100,8 +100,7 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     drive[:, STIFFNESS] = base.stiffness
     drive[:, MOMENT[0]], drive[:, MOMENT[1]] = moments_of(base, fin, terms)
     drive[:, CROSS_FACTOR] = cross_factor_of(terms)
-    if core.cross_fin != 0.0:
-        drive[:, CROSS_PUSH] = core.cross_fin * fin.mean
+    drive[:, CROSS_PUSH] = cross_push_of(fin, core)
     if core.crossflow != 0.0:
         # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
         cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
@@ -130,6 +129,11 @@ def moments_of(base: Base, fin: FinPath, terms: Terms) -> tuple[FloatArray, Floa
 def cross_factor_of(terms: Terms) -> FloatArray | float:
     """Return the speed over the run's own in the cross state's equation over each interval, (n-1,), or 1."""
     return 1.0 if terms.cross_factor is None else held(terms.cross_factor)
+
+
+def cross_push_of(fin: FinPath, core: Core) -> FloatArray | float:
+    """Return the fin's push on the cross state over each interval, (n-1,), or none."""
+    return core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
 
 
 def constants_of(core: Core) -> FloatArray:
