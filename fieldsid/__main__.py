@@ -1,7 +1,5 @@
 """`python -m fieldsid` is `sysid`."""
 
-import sys
+from fieldsid.cli.app import entry
 
-from fieldsid.cli.app import main
-
-sys.exit(main())
+entry()

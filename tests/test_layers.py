@@ -13,9 +13,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
-    "_version", "errors", "registry", "artifacts", "rounding", "strict", "templates", "logs", "vehicle", "maneuvers", "models",
-    "effects", "fitting", "estimators", "comparison", "planning", "diagnosis", "extension", "turning", "schedule", "exports",
-    "figures", "report", "demo", "cli", "__main__",
+    "_version", "errors", "copies", "registry", "artifacts", "rounding", "strict", "templates", "logs", "vehicle", "maneuvers",
+    "models", "effects", "fitting", "estimators", "comparison", "planning", "diagnosis", "extension", "turning", "schedule",
+    "exports", "figures", "report", "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""
 
@@ -115,4 +115,5 @@ def test_help_page_and_front_door_import_nothing_heavy():
         tree = ast.parse((PACKAGE / "cli" / f"{name}.py").read_text())
         at_import = [n for n in tree.body if isinstance(n, (ast.Import, ast.ImportFrom))]
         modules = {getattr(n, "module", None) or n.names[0].name for n in at_import}
-        assert modules <= {"__future__", "os", "sys", "typing", "fieldsid._version", "fieldsid.cli.catalogue", "fieldsid.cli.day"}
+        own = {"fieldsid._version", "fieldsid.cli.catalogue", "fieldsid.cli.day"}
+        assert modules <= {"__future__", "atexit", "os", "sys", "typing", *own}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Never
 
 # Before NumPy is loaded: the systems solved here are tiny, and threads that wait for a busy core cost ten times the work.
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -34,6 +36,25 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         return explain(error, arguments)
     return code
+
+
+def entry() -> Never:
+    """Run the command line of this process and end it."""
+    codes: list[int] = []
+    atexit.register(_end, codes)  # what is registered first is called last
+    codes.append(main())
+    sys.exit(codes[0])
+
+
+def _end(codes: list[int]) -> None:
+    """End without giving back piece by piece what the system takes as a whole: for compiled code half a second."""
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:  # Python says what could not be written
+        return
+    for code in codes:
+        os._exit(code)
 
 
 def run(arguments: Sequence[str]) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, ModelFile, OutputDir, RunFiles, ToS
+from fieldsid.cli.patience import get_ready
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -48,11 +50,14 @@ def command(
     Example: sysid compare models/run7_yaw.yaml runs/zigzag.parquet
     """
     from fieldsid.cli.inputs import read_runs
+
+    ready = partial(get_ready, "fieldsid.comparison.compare")
+    logs = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready)
     from fieldsid.comparison.compare import compare
     from fieldsid.models.model import load_model
 
     known = load_model(model)
-    found = compare(known, read_runs(runs, mapping=mapping, start=start, end=end))
+    found = compare(known, logs)
     drawn = _drawn(known, model, found, output if figures else None, force=force)
     entries = [_entry(c, figure) for c, figure in zip(found, drawn, strict=True)]
     body = {"schema": "fieldsid/compare/1", "model": str(model), "axis": known.axis, "runs": entries}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
@@ -12,7 +13,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import AxisOption, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
-from fieldsid.cli.patience import compiling_first, refuse_existing, trying
+from fieldsid.cli.patience import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -53,11 +54,12 @@ def command(
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
     from fieldsid.cli.inputs import files_of, read_runs
-    from fieldsid.diagnosis import diagnose
 
     refuse_existing(output, figure, force=force)
     known = _known(model, axis)
-    logs = read_runs([*runs, *(validate or [])], mapping=mapping)
+    logs = read_runs([*runs, *(validate or [])], mapping=mapping, meanwhile=partial(get_ready, "fieldsid.diagnosis"))
+    from fieldsid.diagnosis import diagnose
+
     training, unseen = logs[: len(runs)], logs[len(runs) :]
     with compiling_first(), trying("diagnosing") as report:
         found = diagnose(training, axis, unseen, known=known.effects if known else (), report=report)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Mapping, Sequence
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +14,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
-from fieldsid.cli.patience import compiling_first, refuse_existing, trying
+from fieldsid.cli.patience import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.errors import ArtifactError, UsageError
 
 if TYPE_CHECKING:
@@ -91,17 +92,18 @@ def _extended(
     force: bool,
 ) -> tuple[dict[str, Any], Sequence[Any]]:
     from fieldsid.cli.inputs import read_runs
-    from fieldsid.extension import extend, save_extension
-    from fieldsid.models.model import load_model
 
-    known = load_model(path)
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
     target = output or path.with_name(f"{path.stem}+{'+'.join(dict.fromkeys(names))}.yaml")
     refuse_existing(target, force=force)
-    logs = read_runs([*runs, *validate], mapping=mapping)
+    logs = read_runs([*runs, *validate], mapping=mapping, meanwhile=partial(get_ready, "fieldsid.extension"))
+    from fieldsid.extension import extend, save_extension
+    from fieldsid.models.model import load_model
+
+    known = load_model(path)
     training, unseen = logs[: len(runs)], logs[len(runs) :]
     with compiling_first(), trying("extending") as report:
         found = extend(known, names, training, unseen, report=report)

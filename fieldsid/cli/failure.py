@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import sys
@@ -16,6 +17,9 @@ from fieldsid._version import __version__
 from fieldsid.cli.app import BAD_INPUT, INTERRUPTED, OUR_BUG
 from fieldsid.errors import FieldsidError, UsageError
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What the system answers where a disk, or a user's share of it, is full."""
+
 
 def explain(error: Exception, arguments: Sequence[str]) -> int:
     """Print an error on stderr and return its exit code."""
@@ -24,6 +28,8 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
         return INTERRUPTED
     if isinstance(error, typer.TyperException):
         error = _as_usage(error, arguments)
+    if isinstance(error, OSError) and error.errno in FULL:
+        error = _as_full(error)
     if isinstance(error, FieldsidError):
         sys.stderr.write(f"error: {error}\n")
         return BAD_INPUT
@@ -41,6 +47,12 @@ def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageErr
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"sysid {arguments[0]}"
     return UsageError(words[:1].lower() + words[1:], found=shlex.join(["sysid", *arguments]), hint=f"see `{path} --help`")
+
+
+def _as_full(error: OSError) -> UsageError:
+    """Say where nothing more could be written; a file of ours that was being written there is not left behind."""
+    where = f"`{error.filename}`" if error.filename else "standard output, or the folder for temporary files"
+    return UsageError("there is no room left to write", found=f"{where}: {error.strerror}", hint="make room, and run it again")
 
 
 def _save_trace(error: Exception, arguments: Sequence[str]) -> Path:

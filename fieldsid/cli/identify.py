@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +24,7 @@ from fieldsid.cli.options import (
     VehicleFile,
     names_of,
 )
-from fieldsid.cli.patience import compiling_first
+from fieldsid.cli.patience import compiling_first, get_ready
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -70,11 +71,13 @@ def command(
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
     from fieldsid.cli.inputs import files_of, read_runs
+
+    ready = partial(get_ready, "fieldsid.fitting.identify")
+    known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready)
     from fieldsid.fitting.identify import identify
     from fieldsid.fitting.method import Options
     from fieldsid.vehicle import find_vehicle, load_vehicle
 
-    known = read_runs(runs, mapping=mapping, start=start, end=end)
     with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
         fits = identify(
             known,

@@ -1,13 +1,14 @@
-"""Runs and models as commands take them: files of any known format, and `-` for a CSV on standard input."""
+"""Runs as commands take them: files of any known format, and `-` for a CSV on standard input."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fieldsid.copies import copied, read_back, written
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -17,15 +18,22 @@ STDIN = Path("-")
 
 
 def read_runs(
-    paths: Sequence[Path], *, mapping: Path | None = None, start: float | None = None, end: float | None = None
+    paths: Sequence[Path],
+    *,
+    mapping: Path | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    meanwhile: Callable[[], None] | None = None,
 ) -> list[Run]:
     """Return the runs of the files, each with a name of its own, cut to `start` .. `end` s where given.
 
-    Raises LogError for a file that cannot be read, DataError where the cut leaves nothing.
+    meanwhile: what this process does while a copy of it reads the files, where there can be one. Raises LogError for a file
+    that cannot be read, DataError where the cut leaves nothing.
     """
     if list(paths).count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
-    runs = _apart([_read(path, mapping) for path in paths], paths)
+    known = _read_beside(paths, mapping, meanwhile) if meanwhile is not None and STDIN not in paths else None
+    runs = _apart(known or [_read(path, mapping) for path in paths], paths)
     if start is None and end is None:
         return runs
     return [run.between(-float("inf") if start is None else start, float("inf") if end is None else end) for run in runs]
@@ -45,6 +53,17 @@ def _read(path: Path, mapping: Path | None) -> Run:
     from fieldsid.logs import load_run
 
     return load_run(path, mapping)
+
+
+def _read_beside(paths: Sequence[Path], mapping: Path | None, meanwhile: Callable[[], None]) -> list[Run] | None:
+    """Return the runs as a copy of this process read them; None where it did not: an error is met again, and told, here."""
+    copy = copied(lambda: written([_read(path, mapping) for path in paths]))
+    if copy is None:
+        return None
+    with copy:
+        meanwhile()
+        answer = copy.answer()
+    return None if answer is None else read_back(answer)
 
 
 def _apart(runs: list[Run], paths: Sequence[Path]) -> list[Run]:

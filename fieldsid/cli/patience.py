@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
 from rich.live import Live
@@ -41,3 +42,12 @@ def compiling_first() -> Iterator[None]:
     console = messages()
     with compiling_ahead(lambda text: console.print(text) if console.is_terminal else None):
         yield
+
+
+def get_ready(*modules: str) -> None:
+    """Import what a command needs and load what it compiled: what can be done while its logs are read."""
+    for module in modules:
+        import_module(module)
+    from fieldsid.fitting.ahead import load_compiled
+
+    load_compiled()

@@ -12,8 +12,6 @@ from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.verdict import Verdict
 from fieldsid.errors import FieldsidError
 from fieldsid.models.effect import effect_named
-from fieldsid.planning.discriminate import separate
-from fieldsid.planning.envelope import LARGEST_FIN, Envelope
 
 MOST_RIVALS = 3
 DECIDES = 3.0
@@ -39,6 +37,9 @@ def next_maneuver(search: Search, verdict: Verdict, found: Hypothesis, skipped: 
 
 
 def _deciding(search: Search, rivals: list[Hypothesis]) -> dict[str, Any]:
+    from fieldsid.planning.discriminate import separate
+    from fieldsid.planning.envelope import LARGEST_FIN, Envelope
+
     names = list(dict.fromkeys(n for h in rivals for n in h.names if n not in search.known))
     command = {"separates": names, "command": f"sysid plan --separate {','.join('+'.join(h.names) for h in rivals)}"}
     fin = min(max(float(np.max(np.abs(r.fin - np.median(r.fin)))) for r in search.records), LARGEST_FIN)

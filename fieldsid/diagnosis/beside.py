@@ -7,16 +7,11 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
-import sys
-import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from io import BytesIO
-from pathlib import Path
-from types import MappingProxyType
-from typing import Any, Never, TypeVar
+from typing import Any, TypeVar
 
+from fieldsid.copies import Writer, copied
 from fieldsid.fitting.problem import Problem
 from fieldsid.models.effect import Effect, form_of, in_form
 from fieldsid.models.record import Record
@@ -24,13 +19,8 @@ from fieldsid.models.record import Record
 T = TypeVar("T")
 R = TypeVar("R")
 
-_IS_COPY = "FIELDSID_IS_COPY"
 MOST = 256
 """Items that are shared out at most: their numbers are bytes."""
-WHOLE = b"that is all"
-"""What ends the answer of a copy that came to its end."""
-_ENDING: list[int] = []
-"""Copies that have answered: giving its memory back takes one as long as making it, and nobody need wait for that."""
 
 
 class Beside:
@@ -46,47 +36,21 @@ class Beside:
         What the function changes is seen in one of the two only: all that matters must be in what it returns. Where the
         copy comes to nothing, its items are done here.
         """
-        if not 1 < len(items) < MOST or not can_copy():
+        if not 1 < len(items) < MOST:
             return [function(item) for item in items]
-        _see_off()
-        left, source, target = _numbers(len(items)), *os.pipe()
+        left = _numbers(len(items))
         try:
-            copy = os.fork()
-        except OSError:  # where memory or processes are short there is no copy
-            for end in (left, source, target):
-                os.close(end)
-            return [function(item) for item in items]
-        if copy == 0:
-            os.close(source)
-            self._answer(function, items, left, target)
-        os.close(target)
-        with os.fdopen(source, "rb") as stream:
-            try:
+            copy = copied(lambda: self.dumps(dict(_taken(function, items, left))))
+            if copy is None:
+                return [function(item) for item in items]
+            with copy:
                 done = dict(_taken(function, items, left))
-                answer = stream.read()
-            except BaseException:
-                os.kill(copy, signal.SIGKILL)
-                os.waitpid(copy, 0)
-                raise
-            finally:
-                os.close(left)
-        _ENDING.append(copy)
-        if answer.endswith(WHOLE):
+                answer = copy.answer()
+        finally:
+            os.close(left)
+        if answer is not None:
             done |= self.loads(answer)
         return [done[i] if i in done else function(item) for i, item in enumerate(items)]
-
-    def _answer(self, function: Callable[[T], R], items: Sequence[T], left: int, target: int) -> Never:
-        """Write what the items taken come to and end the copy, without a word and without what a process does at its end."""
-        try:
-            os.environ[_IS_COPY] = "1"
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, 1)
-            os.dup2(nowhere, 2)
-            answer = self.dumps(dict(_taken(function, items, left)))
-            with os.fdopen(target, "wb") as stream:
-                stream.write(answer + WHOLE)
-        finally:
-            os._exit(0)
 
     def dumps(self, value: object) -> bytes:
         """Return a value as bytes that `loads` reads."""
@@ -97,13 +61,6 @@ class Beside:
     def loads(self, answer: bytes) -> Any:
         """Return what `dumps` was given, the known records and effects in it themselves."""
         return _Reader(BytesIO(answer), self).load()
-
-
-def _see_off() -> None:
-    """Wait for the copies that have answered to be gone, unless somebody else has."""
-    while _ENDING:
-        with suppress(ChildProcessError):
-            os.waitpid(_ENDING.pop(), 0)
 
 
 def _numbers(count: int) -> int:
@@ -120,23 +77,7 @@ def _taken(function: Callable[[T], R], items: Sequence[T], left: int) -> Iterato
         yield number[0], function(items[number[0]])
 
 
-def can_copy() -> bool:
-    """Whether this process is alone, may be copied, and would not share a core with its copy.
-
-    Other threads may hold what a copy would wait for; elsewhere than on Linux libraries do not survive it.
-    """
-    if not sys.platform.startswith("linux") or _IS_COPY in os.environ:
-        return False
-    return len(os.sched_getaffinity(0)) > 1 and threading.active_count() == 1 and not _warns()
-
-
-def _warns() -> bool:
-    """Whether Python would warn of a copy, as it does from 3.12 on beside any thread, a linear algebra library's too."""
-    threads = Path("/proc/self/task")
-    return sys.version_info >= (3, 12) and (not threads.is_dir() or sum(1 for _ in threads.iterdir()) > 1)
-
-
-class _Writer(pickle.Pickler):
+class _Writer(Writer):
     def __init__(self, out: BytesIO, known: Beside) -> None:
         super().__init__(out, protocol=5)
         self.places = {id(r): i for i, r in enumerate(known.records)}
@@ -153,17 +94,10 @@ class _Writer(pickle.Pickler):
         return None
 
     def reducer_override(self, obj: object) -> Any:
-        """Return how a mapping that is read only is made anew, and a problem without the arrays of its last call."""
-        if isinstance(obj, MappingProxyType):
-            return _read_only, (dict(obj),)
+        """Return how a problem is made anew without the arrays of its last call, and all else as a writer does."""
         if isinstance(obj, Problem):
             return Problem, (obj.records, obj.layout)
-        return NotImplemented
-
-
-def _read_only(values: dict[str, object]) -> MappingProxyType[str, object]:
-    """Return a mapping that is read only; its own class cannot be named in what is written."""
-    return MappingProxyType(values)
+        return super().reducer_override(obj)
 
 
 class _Reader(pickle.Unpickler):

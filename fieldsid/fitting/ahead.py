@@ -19,7 +19,8 @@ from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.models.axis import Axis
-from fieldsid.models.jit import is_compiled
+from fieldsid.models.jit import is_compiled, is_loaded
+from fieldsid.models.kernels import tangents
 from fieldsid.models.model import Noise
 from fieldsid.models.record import ROLES, Record
 
@@ -58,6 +59,13 @@ def compile_motion() -> None:
     for own in (*((e,) for e in effects), tuple(e for e in effects if e.fin is not None)):
         more = problem.with_effects(own)
         more.linearise(more.start(), 0)
+
+
+def load_compiled() -> None:
+    """Load what an earlier process compiled, once; nothing where that must still be done."""
+    if not is_loaded(tangents) and is_compiled(tangents) and is_compiled(filtered):
+        compile_filters()
+        compile_motion()
 
 
 @contextmanager

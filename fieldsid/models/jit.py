@@ -22,11 +22,16 @@ def plain_of(function: Callable[P, R]) -> Callable[P, R]:
     return cast("Callable[P, R]", getattr(function, "py_func", function))
 
 
+def is_loaded(function: Callable[..., object]) -> bool:
+    """Whether a function needs nothing more before it runs: it has run in this process, or is plain Python."""
+    return not hasattr(function, "py_func") or bool(cast("Any", function).signatures)
+
+
 def is_compiled(function: Callable[..., object]) -> bool:
     """Whether a function is compiled in this process, or by an earlier one that left it on the disk, newer than its source."""
-    door: Any = function
-    if not hasattr(door, "py_func") or door.signatures:
+    if is_loaded(function):
         return True
+    door: Any = function
     code = door.py_func.__code__
     source = Path(code.co_filename)
     kept = Path(door.stats.cache_path).glob(f"{source.stem}.{door.py_func.__qualname__}-{code.co_firstlineno}.*.nbi")

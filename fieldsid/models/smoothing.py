@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import solveh_banded
-from scipy.ndimage import median_filter
 
 from fieldsid.logs.run import FloatArray
 
@@ -85,7 +85,8 @@ def _wild(values: FloatArray) -> npt.NDArray[np.bool_]:
 
     A step or a slow swing is its own median.
     """
-    off = np.abs(values - median_filter(values, size=NEIGHBOURS, mode="nearest"))
+    around = sliding_window_view(np.pad(values, NEIGHBOURS // 2, mode="edge"), NEIGHBOURS)
+    off = np.abs(values - np.median(around, axis=1))
     usual = 1.4826 * float(np.median(off))
     return np.asarray((off > WILD * usual) & (off > LARGE * float(np.ptp(values))))
 

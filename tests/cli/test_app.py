@@ -128,6 +128,34 @@ def test_a_reader_that_goes_away_is_no_error():
     assert done.stderr == ""
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_no_bug():
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "fieldsid", "effects", "list", "--json"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: there is no room left to write\n  found: standard output")
+
+
+@pytest.mark.parametrize(("words", "code"), [("'--version'", 0), ("'efects'", 2)])
+def test_the_end_comes_at_once_but_after_all_that_is_registered_for_it(words, code):
+    program = (
+        "import atexit, sys; from fieldsid.cli import app\n"
+        f"sys.argv = ['sysid', {words}]; real = app.main\n"
+        "def main():\n"
+        "    atexit.register(lambda: print('registered', end=''))\n"
+        "    return real()\n"
+        "app.main = main\n"
+        "class Late:\n"
+        "    def __del__(self): print('given back piece by piece')\n"
+        "late = Late()\n"
+        "app.entry()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert done.stdout.endswith("registered")
+
+
 def test_a_file_becomes_a_command_by_its_first_line(tmp_path: Path):
     (tmp_path / "dance.py").write_text('"""sysid dance: turn around."""\n')
     (tmp_path / "helper.py").write_text('"""Helps."""\n')

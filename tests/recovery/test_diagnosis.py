@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from truth.bank import Case, make_case
 
-from fieldsid.diagnosis import Diagnosis, beside, diagnose
+from fieldsid import copies
+from fieldsid.diagnosis import Diagnosis, diagnose
 from fieldsid.diagnosis.diagnose import body_of
 from fieldsid.diagnosis.search import search
 from fieldsid.diagnosis.usable import usable
@@ -151,5 +152,5 @@ def test_an_unseen_run_is_flown_at_its_own_speed_and_that_is_said() -> None:
 def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case(kind, 40)
     shared = diagnosed(case)
-    monkeypatch.setattr(beside, "can_copy", lambda: False)
+    monkeypatch.setattr(copies, "can_copy", lambda: False)
     assert body_of(diagnosed(case)) == body_of(shared)

@@ -10,8 +10,9 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis import beside
-from fieldsid.diagnosis.beside import Beside, can_copy, formed
+from fieldsid import copies
+from fieldsid.copies import can_copy
+from fieldsid.diagnosis.beside import Beside, formed
 from fieldsid.effects import all_effects
 from fieldsid.fitting.ahead import a_record
 from fieldsid.fitting.layout import layout_of
@@ -23,14 +24,14 @@ EFFECTS = all_effects(Axis.YAW)
 RECORD = a_record()
 KNOWN = Beside([RECORD], EFFECTS.values())
 
-copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
+needs_copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
 
 
 def test_values_come_back_in_the_order_of_the_items():
     assert KNOWN.each(lambda i: i * i, range(40)) == [i * i for i in range(40)]
 
 
-@copies
+@needs_copies
 def test_two_processes_take_the_items():
     here = threading.Event()
 
@@ -41,7 +42,7 @@ def test_two_processes_take_the_items():
     assert len(set(KNOWN.each(slowly, range(8)))) == 2
 
 
-@copies
+@needs_copies
 def test_what_comes_back_refers_to_what_is_known():
     problem = Problem((RECORD,), layout_of((RECORD,), Axis.YAW, (EFFECTS["servo_lag"],)))
     for back in KNOWN.each(lambda _item: problem, range(6)):
@@ -71,7 +72,7 @@ def test_a_record_that_is_not_known_is_copied():
     np.testing.assert_array_equal(back.both, other.both)
 
 
-@copies
+@needs_copies
 def test_work_within_work_does_not_wait_for_the_copy_that_waits_for_it():
     pause = threading.Event()
 
@@ -83,17 +84,7 @@ def test_work_within_work_does_not_wait_for_the_copy_that_waits_for_it():
     assert [a for a, _ in answers] == [[i, i + 1, i + 2] for i in range(6)]
 
 
-@copies
-def test_copies_that_have_answered_are_seen_off():
-    for _ in range(5):
-        KNOWN.each(str, range(3))
-    assert len(beside._ENDING) == 1
-    beside._see_off()
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
-
-
-@copies
+@needs_copies
 @pytest.mark.parametrize("how", ["raises", "dies", "cannot be written"])
 def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
     here = os.getpid()
@@ -112,12 +103,12 @@ def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
     assert KNOWN.each(value, range(6)) == list(range(6))
 
 
-@copies
+@needs_copies
 def test_where_no_copy_is_to_be_had_all_is_done_here_and_nothing_stays_open(monkeypatch):
     def refused():
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
-    monkeypatch.setattr(beside.os, "fork", refused)
+    monkeypatch.setattr(copies.os, "fork", refused)
     ends = len(list(Path("/proc/self/fd").iterdir()))
     assert KNOWN.each(lambda i: (i, os.getpid()), range(4)) == [(i, os.getpid()) for i in range(4)]
     assert len(list(Path("/proc/self/fd").iterdir())) == ends
@@ -133,28 +124,6 @@ def test_an_error_is_raised_as_it_is_and_leaves_no_process_behind():
         os.waitpid(-1, os.WNOHANG)
 
 
-@copies
+@needs_copies
 def test_a_copy_copies_no_more():
     assert [can_copy(), *KNOWN.each(lambda _item: (threading.Event().wait(0.02), can_copy())[1], range(6))].count(False) >= 1
-
-
-def test_nothing_is_copied_beside_another_thread():
-    done = threading.Event()
-    other = threading.Thread(target=done.wait)
-    other.start()
-    try:
-        assert not can_copy()
-    finally:
-        done.set()
-        other.join()
-
-
-def test_nothing_is_copied_elsewhere_than_on_linux(monkeypatch):
-    monkeypatch.setattr(beside.sys, "platform", "darwin")
-    assert not can_copy()
-    assert KNOWN.each(lambda i: (i, os.getpid()), range(3)) == [(i, os.getpid()) for i in range(3)]
-
-
-def test_nothing_is_copied_where_python_would_warn_of_it(monkeypatch):
-    monkeypatch.setattr(beside, "_warns", lambda: True)
-    assert not can_copy()

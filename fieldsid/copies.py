@@ -1,0 +1,124 @@
+"""Work done in a forked copy of this process, where the system has a second core and can copy a process."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Never, Self
+
+_IS_COPY = "FIELDSID_IS_COPY"
+WHOLE = b"that is all"
+"""What ends the answer of a copy that came to its end."""
+_ENDING: list[int] = []
+"""Copies that have answered: giving its memory back takes one as long as making it, and nobody need wait for that."""
+
+
+class Copy:
+    """A copy of this process at work; left with an error it is ended."""
+
+    def __init__(self, process: int, source: int) -> None:
+        self._process, self._stream = process, os.fdopen(source, "rb")
+
+    def answer(self) -> bytes | None:
+        """Wait for what the copy has worked out and return it; None where it came to nothing."""
+        answer = self._stream.read()
+        return answer.removesuffix(WHOLE) if answer.endswith(WHOLE) else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, error: object, *_more: object) -> None:
+        self._stream.close()
+        if error is None:
+            _ENDING.append(self._process)
+            return
+        os.kill(self._process, signal.SIGKILL)
+        os.waitpid(self._process, 0)
+
+
+def copied(work: Callable[[], bytes]) -> Copy | None:
+    """Return a copy of this process that does some work; None where no copy is to be had.
+
+    What the work changes is seen in the copy only, and what it says or raises nowhere: all that matters must be in what it
+    returns.
+    """
+    if not can_copy():
+        return None
+    while _ENDING:  # wait for the copies that have answered to be gone, unless somebody else has
+        with suppress(ChildProcessError):
+            os.waitpid(_ENDING.pop(), 0)
+    source, target = os.pipe()
+    try:
+        process = os.fork()
+    except OSError:  # where memory or processes are short
+        os.close(source)
+        os.close(target)
+        return None
+    if process == 0:
+        os.close(source)
+        _work(work, target)
+    os.close(target)
+    return Copy(process, source)
+
+
+def _work(work: Callable[[], bytes], target: int) -> Never:
+    """Write what the work comes to and end the copy, without a word and without what a process does at its end."""
+    try:
+        os.environ[_IS_COPY] = "1"
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
+        answer = work()
+        with os.fdopen(target, "wb") as stream:
+            stream.write(answer + WHOLE)
+    finally:
+        os._exit(0)
+
+
+def can_copy() -> bool:
+    """Whether this process is alone, may be copied, and would not share a core with its copy.
+
+    Other threads may hold what a copy would wait for; elsewhere than on Linux libraries do not survive it.
+    """
+    if not sys.platform.startswith("linux") or _IS_COPY in os.environ:
+        return False
+    return len(os.sched_getaffinity(0)) > 1 and threading.active_count() == 1 and not _warns()
+
+
+def _warns() -> bool:
+    """Whether Python would warn of a copy, as it does from 3.12 on beside any thread, a linear algebra library's too."""
+    threads = Path("/proc/self/task")
+    return sys.version_info >= (3, 12) and (not threads.is_dir() or sum(1 for _ in threads.iterdir()) > 1)
+
+
+class Writer(pickle.Pickler):
+    """Writes what goes from one process to the other, mappings that are read only as well."""
+
+    def reducer_override(self, obj: object) -> Any:
+        """Return how a mapping that is read only is made anew."""
+        return (_read_only, (dict(obj),)) if isinstance(obj, MappingProxyType) else NotImplemented
+
+
+def _read_only(values: dict[str, object]) -> MappingProxyType[str, object]:
+    """Return a mapping that is read only; its own class cannot be named in what is written."""
+    return MappingProxyType(values)
+
+
+def written(value: object) -> bytes:
+    """Return a value as bytes that pickle reads."""
+    out = BytesIO()
+    Writer(out, protocol=5).dump(value)
+    return out.getvalue()
+
+
+def read_back(answer: bytes) -> Any:
+    """Return the value that a copy of this process has written."""
+    return pickle.loads(answer)  # noqa: S301 - nobody else wrote it

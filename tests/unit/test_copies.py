@@ -1,0 +1,106 @@
+"""A copy of the process answers in full or not at all, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from fieldsid import copies
+from fieldsid.copies import can_copy, copied, read_back, written
+
+needs_copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
+
+
+def answer_of(work):
+    """What a copy's work comes to."""
+    with copied(work) as copy:
+        return copy.answer()
+
+
+@needs_copies
+def test_a_copy_answers_with_what_its_work_comes_to():
+    assert answer_of(lambda: b"x" * 2**20) == b"x" * 2**20  # more than a pipe holds
+    assert int(answer_of(lambda: str(os.getpid()).encode())) != os.getpid()
+
+
+@needs_copies
+def test_what_a_copy_says_is_not_heard(capfd):
+    assert answer_of(lambda: str(os.write(1, b"out")).encode() + str(os.write(2, b"err")).encode()) == b"33"
+    assert capfd.readouterr() == ("", "")
+
+
+@needs_copies
+@pytest.mark.parametrize("work", [lambda: 1 / 0, lambda: os._exit(9), lambda: "no bytes"], ids=["raises", "dies", "no bytes"])
+def test_a_copy_that_came_to_nothing_has_no_answer(work):
+    assert answer_of(work) is None
+
+
+@needs_copies
+def test_an_error_beside_a_copy_ends_it():
+    with pytest.raises(ValueError, match="here"), copied(lambda: [threading.Event().wait(60.0), b""][1]) as copy:
+        raise ValueError("here")
+    with pytest.raises(ChildProcessError):
+        os.waitpid(copy._process, os.WNOHANG)
+
+
+@needs_copies
+def test_copies_that_have_answered_are_seen_off_by_the_next():
+    for _ in range(5):
+        answer_of(lambda: b"")
+    assert len(copies._ENDING) == 1
+    last = copies._ENDING[0]
+    answer_of(lambda: b"")
+    assert last not in copies._ENDING
+    with pytest.raises(ChildProcessError):
+        os.waitpid(last, os.WNOHANG)
+
+
+@needs_copies
+def test_where_no_copy_is_to_be_had_nothing_stays_open(monkeypatch):
+    def refused():
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(copies.os, "fork", refused)
+    ends = len(list(Path("/proc/self/fd").iterdir()))
+    assert copied(lambda: b"") is None
+    assert len(list(Path("/proc/self/fd").iterdir())) == ends
+
+
+@needs_copies
+def test_a_copy_copies_no_more():
+    assert can_copy()
+    assert answer_of(lambda: str(can_copy()).encode()) == b"False"
+
+
+def test_nothing_is_copied_beside_another_thread():
+    done = threading.Event()
+    other = threading.Thread(target=done.wait)
+    other.start()
+    try:
+        assert copied(lambda: b"") is None
+    finally:
+        done.set()
+        other.join()
+
+
+def test_nothing_is_copied_elsewhere_than_on_linux(monkeypatch):
+    monkeypatch.setattr(copies.sys, "platform", "darwin")
+    assert copied(lambda: b"") is None
+
+
+def test_nothing_is_copied_where_python_would_warn_of_it(monkeypatch):
+    monkeypatch.setattr(copies, "_warns", lambda: True)
+    assert copied(lambda: b"") is None
+
+
+def test_mappings_that_are_read_only_are_read_back_as_such():
+    value = {"signals": MappingProxyType({"yaw_rad": np.arange(3.0)}), "name": "run7"}
+    again = read_back(written(value))
+    assert isinstance(again["signals"], MappingProxyType)
+    np.testing.assert_array_equal(again["signals"]["yaw_rad"], np.arange(3.0))
+    assert again["name"] == "run7"
