@@ -19,6 +19,8 @@ from fieldsid.models.record import Record
 
 FASTEST_S = 1e-6
 """A lag below this moves nothing that can be measured; the command is returned as it is."""
+ALIKE = 1e-12
+"""Steps that differ by less, of themselves, decay alike: the exponential of the last one is taken."""
 
 
 @jit
@@ -28,19 +30,21 @@ def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float,
     The lag is that of the side the fin moves to at the start of an interval; a held command lets it turn nowhere else.
     """
     fin = start[0]
+    x, gone, bend = 0.0, 0.0, 0.0
     for i in range(start.shape[0]):
         h = steps[i]
         lag = rising if start[i] >= fin else falling
-        x = h / lag
         slope = (end[i] - start[i]) / h
         c = fin - start[i] + slope * lag
-        gone = -np.expm1(-x)
+        if abs(h / lag - x) > ALIKE * x:
+            x = h / lag
+            gone = -np.expm1(-x)
+            if x < 1e-2:
+                # First moment of the exponential about the middle, as a series: the closed form cancels.
+                bend = -x * (1.0 - 0.5 * x + 0.15 * x * x)
+            else:
+                bend = 12.0 / (x * x) * (1.0 - (1.0 - gone) * (1.0 + x) - 0.5 * x * gone)
         mean = start[i] + slope * (0.5 * h - lag) + c * gone / x
-        if x < 1e-2:
-            # First moment of the exponential about the middle, as a series: the closed form cancels.
-            bend = -x * (1.0 - 0.5 * x + 0.15 * x * x)
-        else:
-            bend = 12.0 / (x * x) * (1.0 - (1.0 - gone) * (1.0 + x) - 0.5 * x * gone)
         half = 0.5 * (slope * h + c * bend)
         last = start[i] + slope * (h - lag) + c * (1.0 - gone)
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, fin, last

@@ -12,7 +12,7 @@ from fieldsid.fitting.lean import Lean, lean
 from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.step import bounded_step
 from fieldsid.fitting.stream import streamed, streams
-from fieldsid.fitting.whitening import whiten
+from fieldsid.fitting.whitening import is_white, whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -79,11 +79,16 @@ def cost_of(problem: Problem, x: FloatArray, noise: Noise, dynamics: Dynamics | 
 
 def products(record: Record, noise: Noise, damping: float, stiffness: float, result: RunResult) -> FloatArray | None:
     """Return the products (1 + P, 1 + P) of a run's whitened residual and sensitivities, None where the motion diverges."""
-    if not np.isfinite(result.stack).all():
-        return None
-    white, _ = whiten(record, noise, damping, stiffness, result.stack)
-    flat = white.reshape(white.shape[0], -1)
-    return np.asarray(flat @ flat.T)
+    stack = result.stack
+    with np.errstate(invalid="ignore", over="ignore"):
+        if is_white(noise) and record.is_whole:
+            angle, rate = stack[:, 0], stack[:, 1]
+            product = angle @ angle.T / noise.angle**2 + rate @ rate.T / noise.rate**2
+        else:
+            white, _ = whiten(record, noise, damping, stiffness, stack)
+            flat = white.reshape(white.shape[0], -1)
+            product = flat @ flat.T
+    return product if np.isfinite(product).all() else None
 
 
 def normal_equations(
@@ -100,8 +105,8 @@ def normal_equations(
         product = products(record, noise, damping, stiffness, result)
         if product is None:
             return float("inf"), normal, gradient, results
-        index = np.array([place[s] for s in result.slots], dtype=int)
-        normal[np.ix_(index, index)] += product[1:, 1:]
+        index = np.array([place[s] for s in result.slots], dtype=np.intp)
+        normal[index[:, None], index] += product[1:, 1:]
         gradient[index] += product[1:, 0]
         total += float(product[0, 0])
     return total, normal, gradient, results

@@ -161,8 +161,8 @@ class Problem:
         record, layout = self.records[run], self.layout
         values = self.values_of(x, run)
         base, start = self._base(values, run), self._start_of(values, run)
-        wanted = set(range(len(x)) if free is None else free)
-        slots = tuple(i for i in (*range(layout.shared), *layout.of_run(run)) if i in wanted and self._touches(i, run))
+        wanted = range(len(x)) if free is None else set(free)
+        slots = tuple(i for i in (*self._shared_of(run), *layout.of_run(run)) if i in wanted)
         arrays = with_moments(record, self._arrays(base, values, run), layout.effects, values, start)
         return slots, Pushes(record, layout, self.scales(run), self.authority_of(run), base, values, start, arrays)
 
@@ -171,14 +171,15 @@ class Problem:
         g = self.layout.groups
         return group_name(NAMES[self.layout.axis].authority, g, g.of_run[run])
 
-    def _touches(self, slot: int, run: int) -> bool:
-        """Whether a shared slot enters a run: another speed group's authority does not, unless the trim refers to it."""
-        names, name = NAMES[self.layout.axis], self.layout.slots[slot].name
-        if name == names.authority and self.layout.groups.trim_of_fin:
-            return True
-        if name == names.authority or name.startswith(f"{names.authority}@"):
-            return name == self.authority_of(run)
-        return True
+    def _shared_of(self, run: int) -> Sequence[int]:
+        """Return the shared slots that enter a run: another speed group's authority does not, unless the trim refers to it."""
+        layout, g = self.layout, self.layout.groups
+        if g.by_law or len(g.speeds) == 1:
+            return range(layout.shared)
+        authority, own = NAMES[layout.axis].authority, {self.authority_of(run)}
+        if g.trim_of_fin:
+            own.add(authority)
+        return [i for i, n in enumerate(layout.names) if n in own or not (n == authority or n.startswith(f"{authority}@"))]
 
     def start(self) -> FloatArray:
         """Return the start vector of the layout."""

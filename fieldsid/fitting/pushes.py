@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from fieldsid.fitting.layout import START_NAMES, Layout
 from fieldsid.logs.run import FloatArray
 from fieldsid.models import kernels
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Core, Effect, FinPath, Motion, Values
+from fieldsid.models.effect import Core, Effect, FinPath, Motion, Values, held
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import (
     CROSS_FACTOR,
@@ -32,6 +32,7 @@ from fieldsid.models.signal_path import (
     run_core,
 )
 from fieldsid.models.signal_path import DAMPING as OF_DAMPING
+from fieldsid.models.signal_path import STIFFNESS as OF_STIFFNESS
 from fieldsid.models.speed_law import over_reference
 
 CROSS = START_NAMES.index("rate_before")
@@ -39,8 +40,13 @@ DAMPING, RATE, SQUARE = (kernels.CONSTANTS.index(name) for name in ("cross_dampi
 EXPONENT = 1e-4
 """Half width of the central difference by the exponent of the speed law."""
 
-Push = Callable[[slice, FloatArray], None]
-"""Fills a part (m, 8), zero before, with the derivatives of the drives by one number."""
+DRIVEN = max(OF_DAMPING, OF_STIFFNESS, CROSS_FACTOR, CROSS_PUSH, *MOMENT) + 1
+CONSTANTS = len(kernels.CONSTANTS)
+"""Drives that a parameter may push, the flow behind them being none; constants of the core."""
+
+Drives = Mapping[int, tuple[float, FloatArray | None]]
+"""The derivatives of the drives by one number: a factor, and the (n-1,) that it multiplies, none where that is one."""
+ONE = (1.0, None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,62 +68,57 @@ class Pushes:
 
     def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Return motion (n, 3) before the sensor, and a stack (1 + P, 2, n): room for a residual, and the sensitivities."""
-        rows, which, d_c, d_start = self._directions(slots)
+        drives, d_c, d_start = self._directions(slots)
         stack = np.empty((1 + len(slots), 2, len(self.record)))
-        out = self._march(slice(0, len(self.record) - 1), rows, which, d_c, self.start, d_start, stack[1:])
+        out = self._march(slice(0, len(self.record) - 1), drives, d_c, self.start, d_start, stack[1:])
         return out, stack
 
     def integrate_pieces(self, slots: tuple[int, ...], length: int) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
         """Yield the same in pieces of `length` intervals, without the cross state's sensitivity from piece to piece."""
-        rows, which, d_c, d_start = self._directions(slots)
+        drives, d_c, d_start = self._directions(slots)
         start, last = self.start, len(self.record) - 1
         for first in range(0, last, length):
             part = slice(first, min(first + length, last))
             sens = np.empty((len(slots), 2, part.stop - part.start + 1))
-            out = self._march(part, rows, which, d_c, start, d_start, sens)
+            out = self._march(part, drives, d_c, start, d_start, sens)
             start, d_start = out[-1].copy(), np.column_stack([sens[:, :, -1], np.zeros(len(slots))])
             end = part.stop + 1 if part.stop == last else part.stop
             yield slice(first, end), out[: end - first], sens[:, :, : end - first]
 
     def along(self, commanded: Sequence[FinPath]) -> FloatArray:
         """Return how angle and rate would move, (K, 2, n), to first order, with each of K other commands, sensors included."""
-        a, count = self.arrays, len(commanded)
+        a, b, count = self.arrays, self.base.authority, len(commanded)
         paths = [fin_path(self.record, self.layout.effects, self.values, c) for c in commanded]
         own = lift(a.fin, a.terms)
-
-        def push_of(path: FinPath) -> Push:
-            other, mean = lift(path, a.terms), path.mean - a.fin.mean
-
-            def push(part: slice, row: FloatArray) -> None:
-                for place, new, old in zip(MOMENT, other, own, strict=True):
-                    row[:, place] = self.base.authority * (new[part] - old[part])
-                row[:, CROSS_PUSH] = a.core.cross_fin * mean[part]
-
-            return push
-
-        rows, whole = [push_of(p) for p in paths], slice(0, len(self.record) - 1)
-        d_c, sens = np.zeros((count, len(kernels.CONSTANTS))), np.empty((count, 2, len(self.record)))
-        out = self._march(whole, rows, np.arange(count, dtype=float), d_c, self.start, np.zeros((count, 3)), sens)
+        drives = []
+        for path in paths:
+            start, end = (new - old for new, old in zip(lift(path, a.terms), own, strict=True))
+            drives.append({MOMENT[0]: (b, start), MOMENT[1]: (b, end), CROSS_PUSH: (a.core.cross_fin, path.mean - a.fin.mean)})
+        whole, d_c, sens = slice(0, len(self.record) - 1), np.zeros((count, CONSTANTS)), np.empty((count, 2, len(self.record)))
+        out = self._march(whole, drives, d_c, self.start, np.zeros((count, 3)), sens)
         self.through_sensors(Motion(out[:, 0], out[:, 1]), (), sens)
         return sens
 
-    def _directions(self, slots: tuple[int, ...]) -> tuple[list[Push], FloatArray, FloatArray, FloatArray]:
-        """Return what the slots push: drives of a part, whose they are (P,), constants (P, 14), initial states (P, 3)."""
+    def _directions(self, slots: tuple[int, ...]) -> tuple[list[Drives], FloatArray, FloatArray]:
+        """Return what the slots push: derivatives of the drives, of the constants (P, 14), of the initial states (P, 3)."""
         count = len(slots)
-        rows: list[Push] = []
-        which, d_c, d_start = np.full(count, -1.0), np.zeros((count, len(kernels.CONSTANTS))), np.zeros((count, 3))
+        drives: list[Drives] = []
+        d_c, d_start = np.zeros((count, CONSTANTS)), np.zeros((count, 3))
+        hidden = "rate_before" in self.values
         for j, slot in enumerate(slots):
-            name = self.layout.slots[slot].name
+            name = self.layout.every[slot]
             if name in START_NAMES:
                 part = START_NAMES.index(name)
                 d_start[j, part] = 1.0 if part < CROSS else self._settles(self.arrays.constants[RATE])
+                drives.append({})
                 continue
-            push, d_c[j] = self._push(name)
-            d_start[j, CROSS] = self._moves_start(d_c[j])
-            if push is not None:
-                which[j] = len(rows)
-                rows.append(push)
-        return rows, which, d_c, d_start
+            push, constants = self._push(name)
+            drives.append(push)
+            if constants is not None:
+                d_c[j] = constants
+            if hidden:
+                d_start[j, CROSS] = self._moves_start(d_c[j])
+        return drives, d_c, d_start
 
     def _core(self, values: Values) -> Core:
         return combined_core(self.layout.effects, values, self.scales[0])
@@ -134,89 +135,82 @@ class Pushes:
         return -float(push) / float(stiff) if damping > 0.0 else 0.0
 
     def _march(
-        self, part: slice, rows: list[Push], which: FloatArray, d_c: FloatArray, start: FloatArray, d_start: FloatArray,
-        sens: FloatArray,
+        self, part: slice, drives: Sequence[Drives], d_c: FloatArray, start: FloatArray, d_start: FloatArray, sens: FloatArray
     ) -> FloatArray:  # fmt: skip
         """Return motion (m + 1, 3) over the m intervals of a part, and fill sens (P, 2, m + 1)."""
         a, steps = self.arrays, self.record.steps[part]
-        drives = np.zeros((len(rows), steps.size, len(kernels.DRIVES)))
-        for row, push in zip(drives, rows, strict=True):
-            push(part, row)
+        place, factor = np.zeros((len(drives), DRIVEN), dtype=np.intp), np.zeros((len(drives), DRIVEN))
+        columns: dict[int, FloatArray] = {}
+        known = {id(None): 0}
+        for j, own in enumerate(drives):
+            for drive, (by, column) in own.items():
+                if column is not None:
+                    columns[id(column)] = column
+                place[j, drive], factor[j, drive] = known.setdefault(id(column), len(known)), by
+        rows = np.empty((len(known), steps.size))
+        rows[0] = 1.0
+        for row, column in zip(rows[1:], columns.values(), strict=True):
+            row[:] = column[part]
         out = np.empty((steps.size + 1, 3))
-        kernels.tangents(steps, a.drive[part], a.constants, start, a.pieces, drives, which, d_c, d_start, out, sens)
+        kernels.tangents(steps, a.drive[part], a.constants, start, a.pieces, rows, place, factor, d_c, d_start, out, sens)
         return out
 
-    def _push(self, name: str) -> tuple[Push | None, FloatArray]:
+    def _push(self, name: str) -> tuple[Drives, FloatArray | None]:
+        """Return what a slot does to the drives, and to the constants (14,) where it does."""
         names = NAMES[self.layout.axis]
-        none = np.zeros(len(kernels.CONSTANTS))
         share, ratio = self.scales
         exponent = self.values.get("damping_exponent", 1.0)
         if name == names.damping:
-            return self._damping(share**exponent), none
+            return self._damping(share**exponent), None
         if name == "damping_exponent":
             return self._by_exponent(self.base.damping * float(np.log(share)), exponent)
         if name == names.authority or name.startswith(f"{names.authority}@"):
-            return self._authority(name, ratio**2), none
+            return self._authority(name, ratio**2), None
         if name == names.stiffness:
-            return _constant(slice(1, 2)), none
+            return {OF_STIFFNESS: ONE}, None
         if name == names.trim:
-            return self._trim(), none
+            return self._trim(), None
         return self._of_effect(name)
 
-    def _by_exponent(self, factor: float, exponent: float) -> tuple[Push, FloatArray]:
+    def _by_exponent(self, factor: float, exponent: float) -> tuple[Drives, FloatArray | None]:
         """Return what the exponent of the speed law does to the damping and the fin's push on the cross state, and (14,)."""
+        of_damping = self._damping(factor)
+        if all(e.core is None for e in self.layout.effects):
+            return of_damping, None
         up, down = (self._core(self.values | {"damping_exponent": exponent + s}) for s in (EXPONENT, -EXPONENT))
-        of_damping, by_fin = self._damping(factor), (up.cross_fin - down.cross_fin) / (2 * EXPONENT)
-        mean = self.arrays.fin.mean
+        by_fin = (up.cross_fin - down.cross_fin) / (2 * EXPONENT)
+        constants = (constants_of(up) - constants_of(down)) / (2 * EXPONENT)
+        return {**of_damping, CROSS_PUSH: (by_fin, self.arrays.fin.mean)}, constants
 
-        def push(part: slice, row: FloatArray) -> None:
-            of_damping(part, row)
-            row[:, CROSS_PUSH] = by_fin * mean[part]
-
-        return push, (constants_of(up) - constants_of(down)) / (2 * EXPONENT)
-
-    def _damping(self, factor: float) -> Push:
+    def _damping(self, factor: float) -> Drives:
         shape = self.arrays.terms.damping_factor
+        return {OF_DAMPING: (factor, None if shape is None else held(shape))}
 
-        def push(part: slice, row: FloatArray) -> None:
-            row[:, 0] = factor if shape is None else factor * 0.5 * (shape[:-1][part] + shape[1:][part])
-
-        return push
-
-    def _trim(self) -> Push:
+    def _trim(self) -> Drives:
         """Return what the trim slot does: a moment that stays, or one that goes with the authority."""
         if not self.layout.groups.trim_of_fin:
-            return _constant(slice(2, 4))
+            return {MOMENT[0]: ONE, MOMENT[1]: ONE}
         over, shape = self._over_reference(), self._authority_shape()
+        return {MOMENT[0]: (over, shape[0]), MOMENT[1]: (over, shape[1])}
 
-        def push(part: slice, row: FloatArray) -> None:
-            row[:, 2], row[:, 3] = over * shape[0][part], over * shape[1][part]
-
-        return push
-
-    def _authority_shape(self) -> tuple[FloatArray, FloatArray]:
-        """Return the authority factor at both ends of each interval, (n-1,) each."""
+    def _authority_shape(self) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return the authority factor at both ends of each interval, (n-1,) each, none where it is one."""
         factor = self.arrays.terms.authority_factor
-        if factor is None:
-            ones = np.ones(len(self.record) - 1)
-            return ones, ones
-        return factor[:-1], factor[1:]
+        return (None, None) if factor is None else (factor[:-1], factor[1:])
 
     def _over_reference(self) -> float:
         return over_reference(self.base.authority, self.values[NAMES[self.layout.axis].authority])
 
-    def _authority(self, name: str, factor: float) -> Push:
+    def _authority(self, name: str, factor: float) -> Drives:
         """Return what an authority slot does: it lifts the fin of its own group's runs, and a trim of the fin's goes with it."""
-        start, end = lift(self.arrays.fin, self.arrays.terms)
-        own, moved, shape = name == self.authority, self._moves_trim(name, factor), self._authority_shape()
-
-        def push(part: slice, row: FloatArray) -> None:
-            row[:, 2], row[:, 3] = moved * shape[0][part], moved * shape[1][part]
-            if own:
-                row[:, 2] += factor * start[part]
-                row[:, 3] += factor * end[part]
-
-        return push
+        lifted, shape = lift(self.arrays.fin, self.arrays.terms), self._authority_shape()
+        own, moved = name == self.authority, self._moves_trim(name, factor)
+        if not own:
+            return {place: (moved, trim) for place, trim in zip(MOMENT, shape, strict=True)}
+        if moved == 0.0:
+            return {place: (factor, fin) for place, fin in zip(MOMENT, lifted, strict=True)}
+        both = zip(MOMENT, lifted, shape, strict=True)
+        return {place: (1.0, factor * fin + (moved if trim is None else moved * trim)) for place, fin, trim in both}
 
     def _moves_trim(self, name: str, factor: float) -> float:
         """Return the derivative of the run's trim moment C b / b_reference by an authority slot."""
@@ -227,22 +221,21 @@ class Pushes:
         by_own = trim / at_reference
         return by_own * factor if name == self.authority else -by_own * self._over_reference()
 
-    def _of_effect(self, name: str) -> tuple[Push | None, FloatArray]:
+    def _of_effect(self, name: str) -> tuple[Drives, FloatArray | None]:
         """Return an effect's own slope where it has one, else the central difference of the arrays: no motion enters them."""
         owner, coefficient = next((e, c) for e in self.layout.effects for c in e.coefficients if c.name == name)
-        none = np.zeros(len(kernels.CONSTANTS))
         if owner.measure is not None:
-            return None, none
+            return {}, None
         if owner.slope is not None:
             slope = owner.slope(name, self.values, self.record)
-            return _columns({MOMENT[0]: slope[:-1], MOMENT[1]: slope[1:]}), none
+            return {MOMENT[0]: (1.0, slope[:-1]), MOMENT[1]: (1.0, slope[1:])}, None
         step = coefficient.step
         high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
         (above, up), (below, down) = (self._entered(owner, self.values | {name: value}) for value in (high, low))
         width = high - low
         changes = {place: value - below[place] for place, value in above.items()}
-        slopes = {place: c / width for place, c in changes.items() if isinstance(c, np.ndarray) or c != 0.0}
-        return (_columns(slopes) if slopes else None), (up - down) / width
+        drives = {place: (1.0 / width, c) if isinstance(c, np.ndarray) else (c / width, None) for place, c in changes.items()}
+        return drives, None if owner.core is None else (up - down) / width
 
     def _entered(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
         """Return the drives that an effect enters, by their place, and the core's constants (14,), at these values."""
@@ -303,21 +296,6 @@ class Pushes:
 def _between(plus: Motion, minus: Motion, step: float) -> FloatArray:
     """Return the difference quotient of two motions, (2, n)."""
     return np.stack([plus.angle - minus.angle, plus.rate - minus.rate]) / step
-
-
-def _constant(columns: slice, factor: float = 1.0) -> Push:
-    def push(_part: slice, row: FloatArray) -> None:
-        row[:, columns] = factor
-
-    return push
-
-
-def _columns(slopes: Mapping[int, FloatArray | float]) -> Push:
-    def push(part: slice, row: FloatArray) -> None:
-        for place, slope in slopes.items():
-            row[:, place] = slope[part] if isinstance(slope, np.ndarray) else slope
-
-    return push
 
 
 def _moved(motion: Motion, direction: FloatArray, step: float) -> Motion:

@@ -15,7 +15,7 @@ from fieldsid.models.record import Record
 LOG_STEP = 3e-4
 """Relative change of a noise's number whose effect is taken for a derivative."""
 MOVED, PER_STEP = float(np.exp(LOG_STEP)), 1.0 / LOG_STEP
-SIZES = (0, 1, 2, 4, 5)
+IS_SIZE = np.array([True, True, True, False, True, True, False])
 """Places in a noise's vector of its standard deviations, the others being correlation times."""
 
 
@@ -48,7 +48,7 @@ def information(
     to one and the de to -e, which gives those of the first.
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
-    is_size, series = np.isin(place, SIZES), np.ascontiguousarray(residual[None])
+    is_size, series = IS_SIZE[place], np.ascontiguousarray(residual[None])
     first = int(np.argmax(is_size))
     errors, spreads = np.empty((place.size, 1, *residual.shape)), np.empty((place.size, *residual.shape))
     for row, p in enumerate(place):

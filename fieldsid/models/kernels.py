@@ -18,13 +18,13 @@ import numpy as np
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import ORDINARY, STILL
 from fieldsid.models.jit import jit
+from fieldsid.models.linear_core import DIVERGED, IntArray, is_even, linear_motion, linear_tangents, spoil
 
 DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
 CONSTANTS = (
     "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
     "cross_damping", "cross_rate", "cross_quadratic", "beyond_square", "heading_sin2", "heading_cos2", "heading_turn",
 )  # fmt: skip
-DIVERGED = 1e4
 SLOWEST = 0.01
 """Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
 FAINTEST = 1e-150
@@ -67,14 +67,6 @@ def _any(values: FloatArray, first: int, last: int) -> bool:
 
 
 @jit
-def _spoil(out: FloatArray, first: int) -> None:
-    """Set the rows of out (n, p) from `first` on to NaN."""
-    for i in range(first, out.shape[0]):
-        for l in range(out.shape[1]):
-            out[i, l] = np.nan
-
-
-@jit
 def _weight(stage: int) -> float:
     """Return the weight of a stage of the RK4 rule, times six."""
     return 1.0 + (stage % 3 != 0)
@@ -90,6 +82,9 @@ def _reach(stage: int) -> float:
 def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> None:
     """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on."""
     n = steps.shape[0] + 1
+    if is_even(steps, drive) and not (_bends(c) or _is_crossing(drive, c, start)):
+        linear_motion(steps, drive, start, pieces, out)
+        return
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
     turning, late = _turns(c), -0.5 * steps.sum()
@@ -123,7 +118,7 @@ def simulate(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatAr
             p += h / 6.0 * tp
             x += h / 6.0 * tx
         if not abs(p) < DIVERGED:
-            _spoil(out, i + 1)
+            spoil(out, i + 1)
             return
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
         late += steps[i]
@@ -170,17 +165,17 @@ def _map_rates(row: int, stages: FloatArray, push: FloatArray, rows: FloatArray)
 
 
 @jit
-def _is_crossing(
-    drive: FloatArray, c: FloatArray, start: FloatArray, d_drive: FloatArray, d_c: FloatArray, d_start: FloatArray
-) -> bool:
-    """Whether the cross state or a derivative of it is anything but zero."""
+def _bends(c: FloatArray) -> bool:
+    """Whether any of the constants (14,) makes angle and rate go otherwise than linearly."""
+    return c[0] != 0.0 or c[1] != 0.0 or _turns(c)
+
+
+@jit
+def _is_crossing(drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
+    """Whether the cross state is anything but zero."""
     found = _any(c, 7, 10) or start[2] != 0.0
-    for j in range(d_c.shape[0]):
-        found = found or _any(d_c[j], 7, 10) or d_start[j, 2] != 0.0
     for i in range(drive.shape[0]):
         found = found or drive[i, 5] != 0.0
-        for r in range(d_drive.shape[0]):
-            found = found or d_drive[r, i, 5] != 0.0
     return found
 
 
@@ -191,8 +186,9 @@ def tangents(
     c: FloatArray,
     start: FloatArray,
     pieces: int,
-    d_drive: FloatArray,
-    which: FloatArray,
+    columns: FloatArray,
+    place: IntArray,
+    factor: FloatArray,
     d_c: FloatArray,
     d_start: FloatArray,
     out: FloatArray,
@@ -200,18 +196,23 @@ def tangents(
 ) -> None:
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
-    d_drive (K, n-1, 8) holds derivatives of the drives; which (P,) is the row of each parameter in it, -1 for
-    none; d_c (P, 14) those of the constants; d_start (P, 3) those of the initial state. All parameters go through one
-    linear map a step, see `_map_row`.
+    A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says; none goes
+    with the flow. d_c (P, 14) are those of the constants, d_start (P, 3) those of the initial state. All parameters go
+    through one linear map a step, see `_map_row`.
     """
     n, count = steps.shape[0] + 1, d_c.shape[0]
-    s, has_c = d_start.copy(), np.zeros(count, dtype=np.bool_)
+    crossing, has_c = _is_crossing(drive, c, start), np.zeros(count, dtype=np.bool_)
+    for j in range(count):
+        has_c[j] = _any(d_c[j], 0, d_c.shape[1])
+        crossing = crossing or _any(d_c[j], 7, 10) or d_start[j, 2] != 0.0 or factor[j, 5] != 0.0
+    if is_even(steps, drive) and not (crossing or _bends(c) or has_c.any()):
+        linear_tangents(steps, drive, start, pieces, columns, place, factor, d_start, out, sens)
+        return
+    s = d_start.copy()
     stages, rows, push, pull = np.zeros((STAGED, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
     turning, flowing, raised, late = _turns(c), c[1] != 0.0, c[10] != 0.0, -0.5 * steps.sum()
-    crossing = _is_crossing(drive, c, start, d_drive, d_c, d_start)
     for j in range(count):
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
-        has_c[j] = _any(d_c[j], 0, d_c.shape[1])
         turning, flowing = turning or _turns(d_c[j]), flowing or d_c[j, 1] != 0.0
         raised = raised or d_c[j, 10] != 0.0
     bent = crossing or turning or flowing or raised or c[0] != 0.0
@@ -272,7 +273,7 @@ def tangents(
             last_h, last_a, last_k = h, a, k
             for j in range(count):
                 # written out: each call that hands over arrays would cost as much as what it does
-                r, sy, sp, sx = int(which[j]), s[j, 0], s[j, 1], s[j, 2]
+                sy, sp, sx = s[j, 0], s[j, 1], s[j, 2]
                 to_y = rows[0, 0] * sy + rows[0, 1] * sp
                 to_p = rows[1, 0] * sy + rows[1, 1] * sp
                 to_x = 0.0
@@ -280,16 +281,24 @@ def tangents(
                     to_y += rows[0, 2] * sx
                     to_p += rows[1, 2] * sx
                     to_x = rows[2, 0] * sy + rows[2, 1] * sp + rows[2, 2] * sx
-                if r >= 0:
-                    m, slope = d_drive[r, i, 2], d_drive[r, i, 3] - d_drive[r, i, 2]
-                    d_a, d_k, d_fast, d_q = d_drive[r, i, 0], d_drive[r, i, 1], d_drive[r, i, 4], d_drive[r, i, 5]
-                    to_y += rows[0, 3] * m + rows[0, 4] * slope + rows[0, 5] * d_a + rows[0, 6] * d_k
-                    to_p += rows[1, 3] * m + rows[1, 4] * slope + rows[1, 5] * d_a + rows[1, 6] * d_k
+                if factor[j, 2] != 0.0 or factor[j, 3] != 0.0:
+                    m = factor[j, 2] * columns[place[j, 2], i]
+                    slope = factor[j, 3] * columns[place[j, 3], i] - m
+                    to_y += rows[0, 3] * m + rows[0, 4] * slope
+                    to_p += rows[1, 3] * m + rows[1, 4] * slope
                     if crossing:
-                        to_y += rows[0, 7] * d_q + rows[0, 8] * d_fast
-                        to_p += rows[1, 7] * d_q + rows[1, 8] * d_fast
-                        to_x += rows[2, 3] * m + rows[2, 4] * slope + rows[2, 5] * d_a + rows[2, 6] * d_k
-                        to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
+                        to_x += rows[2, 3] * m + rows[2, 4] * slope
+                if factor[j, 0] != 0.0 or factor[j, 1] != 0.0:
+                    d_a, d_k = factor[j, 0] * columns[place[j, 0], i], factor[j, 1] * columns[place[j, 1], i]
+                    to_y += rows[0, 5] * d_a + rows[0, 6] * d_k
+                    to_p += rows[1, 5] * d_a + rows[1, 6] * d_k
+                    if crossing:
+                        to_x += rows[2, 5] * d_a + rows[2, 6] * d_k
+                if crossing and (factor[j, 4] != 0.0 or factor[j, 5] != 0.0):
+                    d_fast, d_q = factor[j, 4] * columns[place[j, 4], i], factor[j, 5] * columns[place[j, 5], i]
+                    to_y += rows[0, 7] * d_q + rows[0, 8] * d_fast
+                    to_p += rows[1, 7] * d_q + rows[1, 8] * d_fast
+                    to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
                 if has_c[j]:
                     for l in range(4):
                         ps, xs = stages[AT_P, l], stages[AT_X, l]
@@ -313,9 +322,9 @@ def tangents(
                 s[j, 1] = to_p if abs(to_p) > FAINTEST else 0.0
                 s[j, 2] = to_x if abs(to_x) > FAINTEST else 0.0
         if not abs(p) < DIVERGED:
-            _spoil(out, i + 1)
+            spoil(out, i + 1)
             for j in range(count):
-                _spoil(sens[j].T, i + 1)
+                spoil(sens[j].T, i + 1)
             return
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
         late += steps[i]

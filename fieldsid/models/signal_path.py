@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import ceil, sqrt
+from operator import attrgetter
 
 import numpy as np
 
@@ -26,6 +27,7 @@ DAMPING, STIFFNESS, CROSS_FACTOR, CROSS_PUSH = (
 MOMENT, FLOW = ((kernels.DRIVES.index(f"{name}_start"), kernels.DRIVES.index(f"{name}_end")) for name in ("moment", "flow"))
 """The places of the core's drives."""
 NO_CORE = Core()
+_CONSTANTS = attrgetter(*kernels.CONSTANTS)
 MOMENT_ROUNDS = 30
 MOMENT_TOLERANCE = 1e-9
 
@@ -95,7 +97,7 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
     core = combined_core(effects, values, scale)
-    drive = np.zeros((len(record) - 1, len(kernels.DRIVES)))
+    drive = np.empty((len(record) - 1, len(kernels.DRIVES)))
     drive[:, DAMPING] = damping = damping_of(base, terms)
     drive[:, STIFFNESS] = base.stiffness
     drive[:, MOMENT[0]], drive[:, MOMENT[1]] = moments_of(base, fin, terms)
@@ -105,6 +107,8 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
         # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
         cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
         drive[:, FLOW[0]], drive[:, FLOW[1]] = cross[:-1], cross[1:]
+    else:
+        drive[:, FLOW[0] : FLOW[1] + 1] = 0.0
     constants = constants_of(core)
     return Assembled(drive, constants, _pieces(record, damping, base.stiffness, constants), fin, terms, core)
 
@@ -138,7 +142,7 @@ def cross_push_of(fin: FinPath, core: Core) -> FloatArray | float:
 
 def constants_of(core: Core) -> FloatArray:
     """Return a core's coefficients as the vector (14,) that the kernel takes; the fin's push on the cross state is a drive."""
-    return np.array([getattr(core, name) for name in kernels.CONSTANTS])
+    return np.array(_CONSTANTS(core))
 
 
 def lift(fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:

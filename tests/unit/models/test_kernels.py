@@ -16,6 +16,11 @@ C = dict(zip(kernels.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3,
 LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0])
 
 
+def NOTHING(count):  # noqa: N802
+    """What parameters push that push no drive."""
+    return np.ones((1, N - 1)), np.zeros((count, 6), dtype=np.intp), np.zeros((count, 6))
+
+
 def drive(seed=4):
     rng = np.random.default_rng(seed)
     out = np.zeros((N - 1, 8))
@@ -96,9 +101,7 @@ def test_the_tangents_of_every_constant_are_its_central_differences():
     steps, c, start, rows = np.full(N - 1, H), np.array(list(C.values())), np.array([0.1, -0.05, 0.02]), drive()
     count = c.size
     out, sens = np.empty((N, 3)), np.empty((count, 2, N))
-    kernels.tangents(
-        steps, rows, c, start, 2, np.zeros((1, N - 1, 8)), np.full(count, -1.0), np.eye(count), np.zeros((count, 3)), out, sens
-    )
+    kernels.tangents(steps, rows, c, start, 2, *NOTHING(count), np.eye(count), np.zeros((count, 3)), out, sens)
     for j, name in enumerate(kernels.CONSTANTS):
         ends = []
         for side in (1.0, -1.0):
@@ -110,25 +113,70 @@ def test_the_tangents_of_every_constant_are_its_central_differences():
         np.testing.assert_allclose(sens[j], wanted, atol=2e-6 * (1.0 + np.abs(wanted).max()), err_msg=name)
 
 
-@pytest.mark.parametrize("steady", [True, False], ids=["the map of one step for all", "a map for every step"])
-def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear_motion(steady):
+def clock(kind):
+    """Steps and damping: alike over all intervals, over many, or over none."""
+    steps = {"even": np.full(N - 1, H), "steady": np.where(np.arange(N - 1) < 40, H, 0.08)}
+    damping = {"even": np.full(N - 1, 1.1), "steady": np.where(np.arange(N - 1) < 60, 1.1, 1.4)}
+    return steps.get(kind, H * (1.0 + 0.2 * np.sin(np.arange(N - 1)))), damping.get(kind, drive()[:, 0])
+
+
+def pushed():
+    """Four parameters that push one drive each: columns (5, n-1), places and factors (4, 6), and the drives (4, n-1, 8)."""
+    columns = np.stack([np.ones(N - 1), *(1.0 + 0.1 * np.cos(np.arange(N - 1) * (1 + i)) for i in range(4))])
+    places, factors, pushes = np.zeros((4, 6), dtype=np.intp), np.zeros((4, 6)), np.zeros((4, N - 1, 8))
+    for i in range(4):
+        places[i, i], factors[i, i], pushes[i, :, i] = i + 1, 0.5, 0.5 * columns[i + 1]
+    return columns, places, factors, pushes
+
+
+@pytest.mark.parametrize("kind", ["even", "steady", "every"])
+def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear_motion(kind):
     """Where damping, stiffness and step stay the map is worked out once, but not what goes with the motion."""
-    rows, start, places = drive(), np.array([0.1, -0.05, 0.0]), range(4)
-    steps = np.where(np.arange(N - 1) < 40, H, 0.08) if steady else H * (1.0 + 0.2 * np.sin(np.arange(N - 1)))
+    rows, start = drive(), np.array([0.1, -0.05, 0.0])
+    steps, rows[:, 0] = clock(kind)
     rows[:, 4], rows[:, 5:] = 1.0, 0.0
-    if steady:
-        rows[:, 0] = np.where(np.arange(N - 1) < 60, 1.1, 1.4)
-    pushes = np.zeros((4, N - 1, 8))
-    for place in places:
-        pushes[place, :, place] = 1.0 + 0.1 * np.cos(np.arange(N - 1))
+    columns, places, factors, pushes = pushed()
     out, sens = np.empty((N, 3)), np.empty((4, 2, N))
-    kernels.tangents(
-        steps, rows, LINEAR, start, 2, pushes, np.arange(4.0), np.zeros((4, 14)), np.zeros((4, 3)), out, sens
-    )  # fmt: skip
-    for place in places:
+    none = np.zeros((4, 14)), np.zeros((4, 3))
+    kernels.tangents(steps, rows, LINEAR, start, 2, columns, places, factors, *none, out, sens)
+    for place in range(4):
         ends = []
         for side in (1.0, -1.0):
             path = np.empty((N, 3))
             kernels.simulate(steps, rows + side * 1e-5 * pushes[place], LINEAR, start, 2, path)
             ends.append(path[:, :2].T)
         np.testing.assert_allclose(sens[place], (ends[0] - ends[1]) / 2e-5, atol=1e-8, err_msg=kernels.DRIVES[place])
+
+
+@pytest.mark.parametrize("pieces", [1, 3])
+@pytest.mark.parametrize("what", ["a straight motion", "one without bound", "a single run's own start"])
+def test_the_linear_core_moves_as_the_general_one(monkeypatch, pieces, what):
+    rows, start, columns, places, factors, _ = drive(), np.array([0.1, -0.05, 0.0]), *pushed()
+    steps, rows[:, 0] = np.full(N - 1, H), -9.0 if what == "one without bound" else 1.1
+    rows[:, 4], rows[:, 5:] = 1.0, 0.0
+    d_start = np.eye(4, 3) if what == "a single run's own start" else np.zeros((4, 3))
+    d_start[:, 2], none = 0.0, np.zeros((4, 14))
+    found = []
+    for even in (True, False):
+        path, out, sens = np.empty((N, 3)), np.empty((N, 3)), np.empty((4, 2, N))
+        if not even:
+            monkeypatch.setattr(kernels, "is_even", lambda *_: False)
+        assert plain_of(kernels.is_even)(steps, rows) == even
+        plain_of(kernels.simulate)(steps, rows, LINEAR, start, pieces, path)
+        plain_of(kernels.tangents)(steps, rows, LINEAR, start, pieces, columns, places, factors, none, d_start, out, sens)
+        np.testing.assert_array_equal(path, out)
+        found.append((out, sens))
+    assert np.isnan(found[0][0]).any() == (what == "one without bound")
+    for fast, slow in zip(*found, strict=True):
+        np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-12)
+
+
+def test_few_intervals_or_unlike_ones_are_not_even():
+    rows, steps = np.ones((N - 1, 8)), np.full(N - 1, H)
+    assert kernels.is_even(steps, rows)
+    assert not kernels.is_even(steps[:8], rows[:8])
+    assert not kernels.is_even(np.linspace(H, 1.001 * H, N - 1), rows)
+    for place in range(2):
+        bent = rows.copy()
+        bent[-1, place] = 2.0
+        assert not kernels.is_even(steps, bent)
