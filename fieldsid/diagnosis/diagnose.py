@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,11 +16,12 @@ from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.freely import freely
 from fieldsid.diagnosis.hypothesis import Hypothesis
-from fieldsid.diagnosis.records import Candidate, Diagnosis
+from fieldsid.diagnosis.records import Candidate, Diagnosis, Pair
 from fieldsid.diagnosis.refitted import refitted_model
-from fieldsid.diagnosis.remainder import remainder_of
+from fieldsid.diagnosis.remainder import Remainder, remainder_of
 from fieldsid.diagnosis.search import Search, search
 from fieldsid.diagnosis.split import held_back
+from fieldsid.diagnosis.trial import Judged
 from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.verdict import MOSTLY, Verdict, added, explained, probabilities, verdict_of
 from fieldsid.diagnosis.weather import in_its_weather
@@ -34,6 +36,7 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out, record_of
 
 SHOWN = 8
+Refitted = tuple[Model, tuple[Note, ...]]
 
 
 def diagnose(
@@ -59,51 +62,70 @@ def diagnose(
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
     work = search(learned, unseen, axis, catalogue, known=known, report=report)
-    found = work.best()
-    judged = in_its_weather(found.judged, work.beside)
-    left = remainder_of(judged)
-    verdict = verdict_of(work, found, left, judged)
-    if verdict.word == "unexplained" and work.is_noiseless:
+    ending = _ended(work, work.best())
+    if ending.verdict.word == "unexplained" and work.is_noiseless:
         # from the first base: one begun anew under the other noise is that of a search that has led nowhere
         first = search(learned, unseen, axis, catalogue, known=known, report=report)
         other = freely(first)
         if other is not None and explained(first, other) > MOSTLY:
-            work, found, judged, verdict = first, other, other.judged, Verdict("effect", added(first, other))
-            left = remainder_of(judged)
-    floor = shown_floor(work.floor, judged.noise)
-    return _said(work, found, verdict, headline(work, verdict, found, left, floor, judged.noise), floor, skipped, notes)
+            ending = _ended(first, other, Verdict("effect", added(first, other)))
+    return _said(ending, skipped, notes)
 
 
-def _said(
-    work: Search,
-    found: Hypothesis,
-    verdict: Verdict,
-    says: str,
-    floor: Noise,
-    skipped: Mapping[str, str],
-    notes: tuple[Note, ...],
-) -> Diagnosis:
-    base = work.base()
-    named = found if verdict.word in ("effect", "undecided") else base
-    candidates = _candidates(work, found, floor)
+@dataclass(frozen=True, slots=True)
+class _Ending:
+    """Where a search ended, its verdict, and what is said of that.
 
-    def refitted() -> tuple[Model, tuple[Note, ...]]:
-        model = refitted_model(named)
+    judged is the hypothesis found in its weather; models are the base's and its, with how unseen runs were flown; shown are
+    the leading hypotheses, with the errors of the first of them.
+    """
+
+    work: Search
+    found: Hypothesis
+    judged: Judged
+    left: Remainder
+    verdict: Verdict
+    models: tuple[Refitted, Refitted]
+    places: tuple[tuple[Place, ...], tuple[Note, ...]]
+    shown: Sequence[Hypothesis]
+    errors: Sequence[Pair]
+
+
+def _ended(work: Search, found: Hypothesis, verdict: Verdict | None = None) -> _Ending:
+    """Return what a search comes to that ended at a hypothesis, under a verdict where that is known."""
+    base, judged, shown = work.base(), in_its_weather(found.judged, work.beside), _leading(work, found)
+
+    def refitted(h: Hypothesis) -> Refitted:
+        model = refitted_model(h)
         return model, as_flown(model, work.validation)
 
-    parts: tuple[Callable[[], Any], ...] = (
-        refitted, partial(refitted_model, base), partial(where_of, base, work.validation or work.records),
-    )  # fmt: skip
-    (model, flown), base_model, (where, diverged) = work.beside.each(lambda part: part(), parts)
+    # at once, whatever the verdict will be: each sharing out costs a copy of the process
+    parts: list[Callable[[], Any]] = [
+        partial(refitted, found), partial(remainder_of, judged), partial(where_of, base, work.validation or work.records),
+        *(partial(getattr, h, "errors") for h in shown[:SHOWN]), *([partial(refitted, base)] if found is not base else []),
+    ]  # fmt: skip
+    done = work.beside.each(lambda part: part(), parts)
+    own, left, places = done[:3]
+    errors, of_base = done[3 : 3 + len(shown[:SHOWN])], own if found is base else done[-1]
+    verdict = verdict or verdict_of(work, found, left, judged)
+    return _Ending(work, found, judged, left, verdict, (of_base, own), places, shown, errors)
+
+
+def _said(end: _Ending, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> Diagnosis:
+    work, found, verdict, base = end.work, end.found, end.verdict, end.work.base()
+    named = found if verdict.word in ("effect", "undecided") else base
+    (base_model, _), (model, flown) = end.models if named is found else (end.models[0], end.models[0])
+    floor = shown_floor(work.floor, end.judged.noise)
+    where, diverged = end.places
     return Diagnosis(
         axis=work.axis,
         verdict=verdict.word,
         effects=added(work, named),
-        says=says,
+        says=headline(work, verdict, found, end.left, floor, end.judged.noise),
         base=base.errors,
         final=named.errors,
         noise_floor=floor,
-        candidates=candidates,
+        candidates=_candidates(end, floor),
         model=model,
         base_model=base_model,
         where=where,
@@ -113,15 +135,19 @@ def _said(
     )
 
 
-def _candidates(work: Search, found: Hypothesis, floor: Noise) -> tuple[Candidate, ...]:
-    """Return the leading hypotheses, the one found first, then by evidence."""
+def _leading(work: Search, found: Hypothesis) -> list[Hypothesis]:
+    """Return all hypotheses but the base, the one found first, then by evidence, those not worth having last."""
     base = work.base()
     others = [h for h in work.ranked() if h is not found and h is not base]
     others.sort(key=lambda h: not work.admissible(h))
-    shown = [*([found] if found is not base else []), *others]
-    fair = [h for h in (*shown, base) if h is found or h is base or work.admissible(h)]
+    return [*([found] if found is not base else []), *others]
+
+
+def _candidates(end: _Ending, floor: Noise) -> tuple[Candidate, ...]:
+    """Return the leading hypotheses."""
+    work, base = end.work, end.work.base()
+    fair = [h for h in (*end.shown, base) if h is end.found or h is base or work.admissible(h)]
     p = dict(zip(map(id, fair), probabilities(fair), strict=True))
-    errors = work.beside.each(lambda h: h.errors, shown[:SHOWN])
     return tuple(
         Candidate(
             effects=added(work, h),
@@ -131,9 +157,9 @@ def _candidates(work: Search, found: Hypothesis, floor: Noise) -> tuple[Candidat
             explained=explained(work, h),
             score=h.score - base.score,
             evidence=evidence(work, h, floor),
-            confusable_with=confusable(work, h, shown),
+            confusable_with=confusable(work, h, end.shown),
         )
-        for h, pair in zip(shown, errors, strict=False)
+        for h, pair in zip(end.shown, end.errors, strict=False)
     )
 
 

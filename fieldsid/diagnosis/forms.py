@@ -64,7 +64,7 @@ class Shaping:
         while left:
             best = zip(left, self._best_forms([asked[i] for i in left]), strict=True)
             likely = [(i, form) for i, form in best if form is not None and likelier(asked[i].h, form)]
-            formed = self.beside.each(lambda of: with_free_run(of[1], self.floor).worked_out(), likely)
+            formed = self.beside.each(lambda of: with_free_run(of[1], self.floor).worked_out(fitted=True), likely)
             taken = {i: form for (i, _), form in zip(likely, formed, strict=True) if asked[i].takes(form)}
             for i, form in taken.items():
                 asked[i] = replace(asked[i], h=form)

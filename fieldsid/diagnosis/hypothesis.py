@@ -75,9 +75,12 @@ class Hypothesis:
         """The errors a hypothesis is judged by: on unseen runs, on training runs where there are none."""
         return self.unseen_errors if self.validation else self.train
 
-    def worked_out(self) -> Hypothesis:
-        """Return itself with the errors it is judged by known: worked out where it was found, beside others."""
-        _ = self.judging
+    def worked_out(self, *, fitted: bool = False) -> Hypothesis:
+        """Return itself with the errors it is judged by known: worked out where it was found, beside others.
+
+        fitted: those on the runs it was fitted to as well, which few are asked for.
+        """
+        _ = self.errors if fitted else self.judging
         return self
 
     @property

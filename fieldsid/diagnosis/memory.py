@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.diagnosis.trial import Trial
-from fieldsid.fitting.starts import ground_of, grown, projected, run_columns
+from fieldsid.fitting.products import solved
+from fieldsid.fitting.starts import all_rows, ground_of, grown, projected
 from fieldsid.fitting.tails import chi_square_tail
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
@@ -86,9 +87,8 @@ def follows(trial: Trial, noise: Noise) -> Follows:
     ground = ground_of(trial.problem, trial.x, noise)
     problem, x = grown(trial.problem, trial.x, MEMORY, {})
     new = [i for i, s in enumerate(problem.layout.slots) if s.name in NAMES]
-    parts = [run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
-    e, c = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
-    before, _ = projected(ground.basis, e, c[:, :0])
-    after, _ = projected(ground.basis, e, c)
-    alone = [projected(ground.basis, e, c[:, [i]])[0] for i in range(c.shape[1])]
-    return Follows(chi_square_tail(before - after, len(NAMES)), NAMES[int(np.argmin(alone))])
+    left = projected(ground.basis, all_rows(ground, problem, x, new))
+    gram = left @ left.T
+    gain = float(gram[0, 1:] @ solved(gram[1:, 1:], gram[1:, 0]))
+    alone = gram[0, 1:] ** 2 / np.maximum(np.diag(gram)[1:], np.finfo(float).tiny)
+    return Follows(chi_square_tail(gain, len(NAMES)), NAMES[int(np.argmax(alone))])

@@ -213,7 +213,8 @@ class Search:
         children = [c for c in self._children(key)[:LEADING] if c.score > parent.score]
 
         def flown(child: Hypothesis) -> Hypothesis:
-            return with_free_run(child, self.floor, parent, self.free.get(frozenset(child.names), ()))
+            free = self.free.get(frozenset(child.names), ())
+            return with_free_run(child, self.floor, parent, free).worked_out(fitted=True)
 
         self.tried |= {frozenset(child.names): child for child in self.beside.each(flown, children)}
 
@@ -238,7 +239,7 @@ class Search:
         def better(name: frozenset[str]) -> Hypothesis:
             known = self.tried[name]
             other = under_other_law(known, self.told, self.family, asks_for_more=asks_for_more(known, self.floor))
-            return known if other is None else with_free_run(other, self.floor).worked_out()
+            return known if other is None else with_free_run(other, self.floor).worked_out(fitted=True)
 
         self.tried |= dict(zip(names, self.beside.each(better, names), strict=True))
 

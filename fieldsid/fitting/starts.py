@@ -17,7 +17,7 @@ import numpy.typing as npt
 from fieldsid.fitting.descent import cost_of
 from fieldsid.fitting.layout import Groups, Layout, group_name, layout_of
 from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.products import SINGULAR, least_squares, solved
+from fieldsid.fitting.products import SINGULAR, solved
 from fieldsid.fitting.whitening import whiten
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
@@ -49,7 +49,7 @@ class Promise:
 class Ground:
     """The parent (problem and its x), its residuals (2, n), and an orthonormal basis (rows, rank) of its sensitivities.
 
-    Of each run: an orthonormal basis of the sensitivities to its own slots, and those to the shared ones (rows, S).
+    Of each run: an orthonormal basis of the sensitivities to its own slots, and those to the shared ones (S, rows).
     """
 
     problem: Problem
@@ -137,7 +137,7 @@ def ground_of(problem: Problem, x: FloatArray, noise: Noise) -> Ground:
         block[:, list(result.slots)] = flat[1:].T
         columns.append(block)
         own.append(_orthonormal(block[:, first_own:]))
-        shared.append(block[:, :first_own])
+        shared.append(block[:, :first_own].T)
     return Ground(problem, x, noise, _orthonormal(np.concatenate(columns)), tuple(own), tuple(shared), tuple(residuals), total)
 
 
@@ -163,12 +163,14 @@ def promise_of(ground: Ground, effect: Effect) -> Promise:
 
 def promises_of(ground: Ground, effect: Effect) -> list[Promise]:
     """Return every scan point of an effect over its shared grid, the best first, their starts a whole step away."""
-    promises = []
+    problem, begun = grown(ground.problem, ground.x, effect, {})
+    new, promises = _new_slots(problem, effect), []
     for values in shared_points(ground, effect):
-        problem, x = grown(ground.problem, ground.x, effect, values)
+        x = begun.copy()
+        x[new] = [values.get(problem.layout.every[i], x[i]) for i in new]
         for c in effect.nuisance:
-            x = _best_per_run(ground, problem, x, effect, c)
-        promises.append(Promise(effect, *_first_order(ground, problem, x, effect), problem))
+            x = _best_per_run(ground, problem, x, new, c)
+        promises.append(Promise(effect, *_first_order(ground, problem, x, new), problem))
     return sorted(promises, key=lambda p: p.cost)
 
 
@@ -214,33 +216,51 @@ def _new_slots(problem: Problem, effect: Effect) -> list[int]:
     return [i for i, s in enumerate(problem.layout.slots) if s.name in names]
 
 
-def run_columns(ground: Ground, problem: Problem, x: FloatArray, run: int, new: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Return one run's whitened residual (m,) and its columns of the new slots (m, k)."""
+def run_rows(ground: Ground, problem: Problem, x: FloatArray, run: int, new: Sequence[int]) -> FloatArray:
+    """Return one run's whitened residual, and what it is by each of the new slots, (1 + k, m)."""
     record = problem.records[run]
     result = problem.linearise(x, run, new)
     if not np.isfinite(result.stack).all():
-        size = 2 * len(record)
-        return np.full(size, 1e6), np.zeros((size, len(new)))
+        rows = np.zeros((1 + len(new), 2 * len(record)))
+        rows[0] = 1e6
+        return rows
     white, _ = whiten(record, ground.noise, result.base.damping, result.base.stiffness, result.stack)
     flat = white.reshape(white.shape[0], -1)
-    columns = np.zeros((flat.shape[1], len(new)))
-    columns[:, [list(new).index(s) for s in result.slots]] = flat[1:].T
-    return flat[0], columns
+    if result.slots == tuple(new):
+        return flat
+    rows = np.zeros((1 + len(new), flat.shape[1]))
+    rows[[0, *(1 + list(new).index(slot) for slot in result.slots)]] = flat
+    return rows
 
 
-def _first_order(ground: Ground, problem: Problem, x: FloatArray, effect: Effect) -> tuple[float, FloatArray, FloatArray]:
+def all_rows(ground: Ground, problem: Problem, x: FloatArray, new: Sequence[int]) -> FloatArray:
+    """Return the whitened residual of all runs, and what it is by each of the new slots, (1 + k, rows)."""
+    return np.concatenate([run_rows(ground, problem, x, run, new) for run in range(len(problem.records))], axis=1)
+
+
+def _first_order(ground: Ground, problem: Problem, x: FloatArray, new: Sequence[int]) -> tuple[float, FloatArray, FloatArray]:
     """Return the predicted cost after one step in the new slots, where the step begins, and its bounded end."""
-    new = _new_slots(problem, effect)
-    parts = [run_columns(ground, problem, x, run, new) for run in range(len(problem.records))]
-    e, c = np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
-    cost, step = projected(ground.basis, e, c)
-    low, high = problem.layout.low[new], problem.layout.high[new]
+    rows, index = all_rows(ground, problem, x, new), list(new)
+    left = projected(ground.basis, rows)
+    step = _step_in(left, np.einsum("ij,ij->i", rows, rows)[1:])
+    low, high = problem.layout.low[index], problem.layout.high[index]
     start = x.copy()
-    wished = x[new] + step
-    start[new] = np.clip(wished, low + 1e-3 * (x[new] - low), high - 1e-3 * (high - x[new]))
+    wished = x[index] + step
+    start[index] = np.clip(wished, low + 1e-3 * (x[index] - low), high - 1e-3 * (high - x[index]))
     if np.any((wished < low) | (wished > high)):
-        cost, _ = projected(ground.basis, e - c @ (start[new] - x[new]), c[:, :0])
-    return cost, x, start
+        step = start[index] - x[index]
+    after = left[0] - step @ left[1:]
+    return float(after @ after), x, start
+
+
+def _step_in(left: FloatArray, before: FloatArray) -> FloatArray:
+    """Return the step (k,) that lowers the first row most by the others, (1 + k, rows), their squares (k,) before projection."""
+    gram = left @ left.T
+    useful = np.diag(gram)[1:] > 1e-12 * np.maximum(before, WORTHLESS**2)
+    step, places = np.zeros(before.size), 1 + np.flatnonzero(useful)
+    if places.size:
+        step[useful] = solved(gram[places[:, None], places], gram[places, 0])
+    return step
 
 
 def shortened(ground: Ground, promise: Promise) -> Promise:
@@ -254,29 +274,17 @@ def shortened(ground: Ground, promise: Promise) -> Promise:
     return replace(promise, start=x)
 
 
-def projected(basis: FloatArray, e: FloatArray, c: FloatArray) -> tuple[float, FloatArray]:
-    """Return |residual|^2 after projecting off the basis and the columns c, and the step in c."""
-    left = e - basis @ (basis.T @ e)
-    if c.shape[1] == 0:
-        return float(left @ left), np.zeros(0)
-    free = c - basis @ (basis.T @ c)
-    size = np.linalg.norm(free, axis=0)
-    useful = size > 1e-6 * np.maximum(np.linalg.norm(c, axis=0), WORTHLESS)
-    step = np.zeros(c.shape[1])
-    if not useful.any():
-        return float(left @ left), step
-    step[useful] = least_squares(free[:, useful].T, left)
-    after = left - free @ step
-    return float(after @ after), step
+def projected(basis: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return rows (k, m) once the orthonormal columns of a basis (m, r) are taken off."""
+    return np.asarray(rows - (rows @ basis) @ basis.T)
 
 
-def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effect, c: Coefficient) -> FloatArray:
+def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, new: Sequence[int], c: Coefficient) -> FloatArray:
     """Return x with one per-run nuisance at the grid point each run likes best, the effect's shared numbers alike for all.
 
     Each run alone would take the event of its own that suits it, large or small; a run without any would find one.
     """
     x = x.copy()
-    new = _new_slots(problem, effect)
     shared = [i for i in new if problem.layout.slots[i].run < 0]
     grid = c.scan or (c.start,)
     places, squares = [], []
@@ -285,9 +293,10 @@ def _best_per_run(ground: Ground, problem: Problem, x: FloatArray, effect: Effec
         own = [i for i in new if i != slot and problem.layout.slots[i].run == run]
         for value in grid:
             x[slot] = value
-            e, columns = run_columns(ground, problem, x, run, [*shared, *own])
-            basis = _orthonormal_beside(ground.own_basis[run], columns[:, len(shared) :])
-            squares.append(_square(basis, np.column_stack([e, columns[:, : len(shared)], ground.shared[run]])))
+            rows = run_rows(ground, problem, x, run, [*shared, *own])
+            basis = _orthonormal_beside(ground.own_basis[run], rows[1 + len(shared) :].T)
+            left = projected(basis, np.concatenate([rows[: 1 + len(shared)], ground.shared[run]]))
+            squares.append(left @ left.T)
         places.append(slot)
     square = np.array(squares).reshape(len(places), len(grid), *squares[0].shape)
     low, high = (bound[shared] - x[shared] for bound in (problem.layout.low, problem.layout.high))
@@ -300,12 +309,6 @@ def _orthonormal_beside(basis: FloatArray, columns: FloatArray) -> FloatArray:
     if not columns.any():
         return basis
     return np.concatenate([basis, _orthonormal(columns - basis @ (basis.T @ columns))], axis=1)
-
-
-def _square(basis: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return the products (k, k) of columns (rows, k) among each other, once they are projected off a basis."""
-    left = columns - basis @ (basis.T @ columns)
-    return np.asarray(left.T @ left)
 
 
 def _alike(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:

@@ -17,7 +17,7 @@ WORK = SimpleNamespace(known=(), records=[SimpleNamespace(fin=np.array([-0.2, 0.
 @pytest.mark.parametrize("odds", [12.0, 0.4])
 def test_a_maneuver_that_is_not_expected_to_decide_is_not_advised_as_if_it_did(monkeypatch, odds):
     plan = SimpleNamespace(expected_log_odds=odds, plain=lambda: {"maneuver": "prbs", "expected_log_odds": odds})
-    monkeypatch.setattr(advise, "separate", lambda *_args, **_more: plan)
+    monkeypatch.setattr("fieldsid.planning.discriminate.separate", lambda *_args, **_more: plan)
     fly = advise.next_maneuver(WORK, Verdict("undecided", ("servo_lag",), (RIVALS[1],)), RIVALS[0], {})
     assert fly["expected_log_odds"] == odds
     assert fly["command"] == "sysid plan --separate servo_lag,delay"
