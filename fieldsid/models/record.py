@@ -84,8 +84,18 @@ class Record:
         if not self.fin_is_held:
             return FinPath(self.fin[:-1], self.fin[1:])
         if early is None:
-            return FinPath(self.fin[:-1], self.fin[:-1])
+            lost = self._lost()
+            return FinPath(self.fin[:-1], self.fin[:-1] if lost is None else self.fin[:-1] + np.diff(self.fin) * lost)
         return _jumping(self.fin, np.clip(early[1:] / self.steps, 0.0, 1.0), np.clip(-early[:-1] / self.steps, 0.0, 1.0))
+
+    def _lost(self) -> FloatArray | None:
+        """Return the share of the samples of each interval that the log has lost, (n-1,), None where it has lost none.
+
+        What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
+        """
+        usual = float(np.median(self.steps)) if self.steps.size else 0.0
+        count = np.rint(self.steps / usual) if usual > 0.0 else np.ones(self.steps.size)
+        return None if (count <= 1.0).all() else 1.0 - 1.0 / np.maximum(count, 1.0)
 
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""

@@ -48,3 +48,18 @@ def test_a_sensors_spikes_count_as_not_measured():
         ("spikes", "run", "yaw_rate_rad_s", 1),
     ]
     assert left_out([replace(run, notes=examine(run, {}))], Axis.PITCH) == ()
+
+
+def test_a_command_that_is_lost_lies_between_those_around_it():
+    time, fin = 0.1 * np.arange(60), 0.3 * np.sin(0.5 * np.arange(60))
+    kept = np.delete(np.arange(60), [20, 31, 32])
+    zero = np.zeros(kept.size)
+    lossy = Run("a", time[kept], {"yaw_rad": zero, "yaw_rate_rad_s": zero, "rudder_rad": fin[kept]})
+    path = record_of(lossy, Axis.YAW).commanded
+    area = np.cumsum(np.diff(time[kept]) * path.mean)
+    wanted = np.cumsum(0.1 * fin[:-1])[kept[1:] - 1]
+    np.testing.assert_allclose(area, wanted, atol=0.1 * 0.3 * 0.5**2)  # half the bend of the sine over two lost samples
+    held = np.cumsum(np.diff(time[kept]) * fin[kept][:-1])
+    assert np.abs(held - wanted).max() > 2.0 * np.abs(area - wanted).max()
+    np.testing.assert_array_equal(path.start, fin[kept][:-1])
+    assert np.flatnonzero(path.end != path.start).tolist() == [19, 29]
