@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -12,7 +12,7 @@ import numpy as np
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import Trial, judge, refine
-from fieldsid.diagnosis.worth import WORTH, asks_for_more
+from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
@@ -91,19 +91,32 @@ class Trims:
         """Return the first question's answer, and a hypothesis with more evidence under the other law than what was found has.
 
         One of the effects found may stand in for that law. Where something is left, it may be hidden by it: what was found
-        is tried, and the likeliest of all, which the law may have kept from predicting.
+        is tried, and those of all which the law may have kept from predicting: the likeliest, and the one that fits best.
         """
         key, asked = frozenset(found.names), list[Hypothesis]()
         if self.turned < TURNS:
             asked = [tried[k] for k in tried if k < key and len(k) == len(key) - 1]
-            asked += [found, max(tried.values(), key=lambda h: h.score)] if asks_for_more(found, floor) else []
+            asked += [found, *_foremost(tried.values())] if asks_for_more(found, floor) else []
         keys = {(h.names, h.score): h for h in asked}
         new = {k: partial(better_trim, h, told) for k, h in keys.items() if k not in self.known}
         parts: tuple[Callable[[], Any], ...] = (first, *new.values())
         answer, *again = beside.each(lambda part: part(), parts)
         self.known |= dict(zip(new, again, strict=True))
-        better = [h for h in (self.known[k] for k in keys) if h is not None and h.score > found.score]
+        better = [h for h in (self.known[k] for k in keys) if h is not None and h.score > found.score and _predicts(h, found)]
         return answer, max(better, key=lambda h: h.score, default=None)
+
+
+def _foremost(tried: Collection[Hypothesis]) -> tuple[Hypothesis, Hypothesis]:
+    """Return the hypotheses of most evidence, on all runs and on those fitted to."""
+    return max(tried, key=lambda h: h.score), max(tried, key=lambda h: float(h.by_run.sum()) - h.cost)
+
+
+def _predicts(h: Hypothesis, found: Hypothesis) -> bool:
+    """Whether a hypothesis under the other law predicts unseen runs no worse than what was found.
+
+    Where speeds are a little off, a disturbance takes what either law leaves of the heading, and evidence alone tells by chance.
+    """
+    return h.judging.mean < ALIKE * found.judging.mean
 
 
 def better_trim(h: Hypothesis, told: Noise) -> Hypothesis | None:

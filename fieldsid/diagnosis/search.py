@@ -98,10 +98,12 @@ class Search:
             self.floor = floor_below(self.floor, self.records, residuals_of(trial.problem, trial.x))
 
     def _keep(self, judged: Judged) -> Hypothesis:
+        """Keep a hypothesis where it has more evidence than what is known of its effects: a better fit may be a worse end."""
         key = frozenset(judged.trial.names)
         known, cost = self.tried.get(key), price(judged, self.validation)
         if known is None or judged.likelihood - cost > known.judged.likelihood - known.cost + 1e-3:
-            self.tried[key] = hypothesis_of(judged, self.validation)
+            found = hypothesis_of(judged, self.validation)
+            self.tried[key] = found if known is None or found.score > known.score else known
         return self.tried[key]
 
     def grow(self, parent: Hypothesis, *, most: int | None = None, forced: bool = False) -> list[Hypothesis]:
@@ -192,14 +194,16 @@ class Search:
     def _back_from_child(self, key: frozenset[str]) -> None:
         """Judge a hypothesis again from where its best child has led its numbers: a cost that is not smooth has many ends.
 
-        Where that is a better end, its leading children are judged from there too.
+        Where that is a better end, on unseen runs as well, its leading children are judged from there too.
         """
         child, parent = next(iter(self._children(key)), None), self.tried[key]
         again = self._judged_from(parent, child) if child else parent.judged
         if again.likelihood > parent.judged.likelihood + SETTLED:
-            self.tried[key] = parent = with_free_run(hypothesis_of(again, self.validation), self.floor)
-            for judged in self.beside.each(lambda child: self._judged_from(child, parent), self._children(key)[:LEADING]):
-                self._keep(judged)
+            better = with_free_run(hypothesis_of(again, self.validation), self.floor)
+            if better.score > parent.score:
+                self.tried[key] = parent = better
+                for judged in self.beside.each(lambda child: self._judged_from(child, parent), self._children(key)[:LEADING]):
+                    self._keep(judged)
 
     def _judged_from(self, h: Hypothesis, other: Hypothesis) -> Judged:
         """Judge a hypothesis from the numbers of another one where it has them, else from its own."""
