@@ -12,7 +12,7 @@ import numpy as np
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import Trial, judge, refine
-from fieldsid.diagnosis.worth import ALIKE, WORTH, asks_for_more
+from fieldsid.diagnosis.worth import MUCH, WORTH, asks_for_more
 from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
@@ -112,11 +112,11 @@ def _foremost(tried: Collection[Hypothesis]) -> tuple[Hypothesis, Hypothesis]:
 
 
 def _predicts(h: Hypothesis, found: Hypothesis) -> bool:
-    """Whether a hypothesis under the other law predicts unseen runs no worse than what was found.
+    """Whether a hypothesis under the other law does not predict unseen runs far worse than what was found.
 
     Where speeds are a little off, a disturbance takes what either law leaves of the heading, and evidence alone tells by chance.
     """
-    return h.judging.mean < ALIKE * found.judging.mean
+    return h.judging.mean < MUCH * found.judging.mean
 
 
 def better_trim(h: Hypothesis, told: Noise) -> Hypothesis | None:
