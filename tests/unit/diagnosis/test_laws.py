@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fieldsid.diagnosis import laws
@@ -14,8 +15,10 @@ from fieldsid.models.model import Noise
 FLOOR = Noise(0.003, 0.003)
 
 
-def hypothesis(*names, score):
-    return SimpleNamespace(names=names, score=score)
+def hypothesis(*names, score, fitted=0.0, error=1.0):
+    """A hypothesis of some evidence, on all runs and on those fitted to, and its error on unseen ones."""
+    errors = SimpleNamespace(mean=error)
+    return SimpleNamespace(names=names, score=score, by_run=np.array([fitted]), cost=0.0, judging=errors)
 
 
 @pytest.fixture
@@ -54,6 +57,22 @@ def test_what_has_less_evidence_than_what_was_found_does_not_turn_the_law(asked)
     trims.known[("delay",), 100.0] = None
     assert trims.asked(found, tried, FLOOR, FLOOR, Beside((), ()), str)[1] is None
     assert asked == [()]
+
+
+def test_what_fits_best_is_asked_too_for_the_law_may_hide_it_on_unseen_runs(asked):
+    found = hypothesis(score=100.0, fitted=10.0)
+    tried = {frozenset(): found, frozenset(("stall",)): hypothesis("stall", score=97.0, fitted=90.0)}
+    tried[frozenset(("delay",))] = hypothesis("delay", score=99.0, fitted=20.0)
+    assert Trims().asked(found, tried, FLOOR, FLOOR, Beside((), ()), str)[1].names == ()
+    assert sorted(asked) == [(), ("stall",)]
+
+
+@pytest.mark.parametrize(("error", "turns"), [(1.2, True), (3.0, False)])
+def test_the_law_is_not_turned_to_where_it_predicts_far_worse(monkeypatch, asked, error, turns):
+    monkeypatch.setattr(laws, "better_trim", lambda h, _told: hypothesis(*h.names, score=h.score + 30.0, error=error))
+    found = hypothesis("delay", score=100.0)
+    tried = {frozenset(): hypothesis(score=0.0), frozenset(("delay",)): found}
+    assert (Trims().asked(found, tried, FLOOR, FLOOR, Beside((), ()), str)[1] is not None) == turns
 
 
 def test_a_search_that_has_turned_twice_asks_no_more(asked):
