@@ -19,12 +19,12 @@ TEMPER = 2.0
 """Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
 RIVAL = 3.0
 """Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
-BESIDE = ((0.7, 1e-6), (0.5, 1e-3), (0.3, BEYOND_CHANCE))
+BESIDE = ((0.7, 1e-5), (0.6, 1e-3), (0.3, BEYOND_CHANCE))
 """Share of the excess error an effect must explain to be named where what is left is less likely than this p-value: a form
 is never exact, but the less it explains the less it may leave."""
-LEAVES, BESIDE_SOME = 1.6, ((0.85, BESIDE[0][1]),)
+LEAVES, BESIDE_SOME = 1.6, ((0.85, 1e-6),)
 """Error over the noise floor that a form of the right effect hardly leaves, and the share to be explained beyond it."""
-BESIDE_MUCH = ((0.97, BESIDE[0][1]),)
+BESIDE_MUCH = ((0.97, 1e-6),)
 """The same where what is left is beyond any sea: most of a base that is far off is explained by whatever bends."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
