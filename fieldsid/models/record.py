@@ -22,6 +22,8 @@ from fieldsid.models.smoothing import smoothed
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
 JITTER = 0.35
 """Share of the usual step within which steps differ by the clock's jitter, not by a sample that is missing."""
+REGULAR = 0.9
+"""Share of the steps that are the usual one, but for jitter, from which on a longer one has lost samples."""
 FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 """What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
 
@@ -92,9 +94,12 @@ class Record:
         """Return the share of the samples of each interval that the log has lost, (n-1,), None where it has lost none.
 
         What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
+        A log without a usual step has lost nothing that could be told.
         """
         usual = float(np.median(self.steps)) if self.steps.size else 0.0
-        count = np.rint(self.steps / usual) if usual > 0.0 else np.ones(self.steps.size)
+        if not np.mean(np.abs(self.steps - usual) < JITTER * usual) > REGULAR:
+            return None
+        count = np.rint(self.steps / usual)
         return None if (count <= 1.0).all() else 1.0 - 1.0 / np.maximum(count, 1.0)
 
     def __getitem__(self, role: str) -> FloatArray:

@@ -11,6 +11,7 @@ from fieldsid.effects import all_effects, pick_effect
 from fieldsid.effects._paths import Beyond
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import FinPath, Motion, as_fitted, in_form
+from fieldsid.models.record import first_part
 from fieldsid.models.signal_path import Base, assemble, measured, run_core, with_moments
 from fieldsid.models.simulate import command_record
 
@@ -132,7 +133,7 @@ def test_a_fin_that_stays_out_is_its_rule_applied_finely(jump, release):
     steps = rng.random(60) < 0.4
     end = np.where(steps, start, end)
     values = {"width": width, "deadband_jump": jump, "release": release}
-    path = pick_effect("deadband").fin(FinPath(start, end), values, record())
+    path = pick_effect("deadband").fin(FinPath(start, end), values, first_part(record(), 61))
     moves = False
     for i in range(start.size):
         fine = start[i] + (end[i] - start[i]) * (np.arange(4000) + 0.5) / 4000

@@ -63,3 +63,10 @@ def test_a_command_that_is_lost_lies_between_those_around_it():
     assert np.abs(held - wanted).max() > 2.0 * np.abs(area - wanted).max()
     np.testing.assert_array_equal(path.start, fin[kept][:-1])
     assert np.flatnonzero(path.end != path.start).tolist() == [19, 29]
+
+
+def test_a_log_without_a_usual_step_has_lost_nothing_that_could_be_told():
+    time = np.cumsum(np.random.default_rng(3).uniform(0.02, 0.2, 80))
+    zero, fin = np.zeros(80), 0.3 * np.sin(time)
+    path = record_of(Run("a", time, {"yaw_rad": zero, "yaw_rate_rad_s": zero, "rudder_rad": fin}), Axis.YAW).commanded
+    np.testing.assert_array_equal(path.start, path.end)
