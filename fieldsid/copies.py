@@ -102,6 +102,9 @@ def _warns() -> bool:
 class Writer(pickle.Pickler):
     """Writes what goes from one process to the other, mappings that are read only as well."""
 
+    def __init__(self, out: BytesIO) -> None:
+        super().__init__(out, protocol=5)
+
     def reducer_override(self, obj: object) -> Any:
         """Return how a mapping that is read only is made anew."""
         return (_read_only, (dict(obj),)) if isinstance(obj, MappingProxyType) else NotImplemented
@@ -112,10 +115,10 @@ def _read_only(values: dict[str, object]) -> MappingProxyType[str, object]:
     return MappingProxyType(values)
 
 
-def written(value: object) -> bytes:
-    """Return a value as bytes that pickle reads."""
+def written(value: object, writer: Callable[[BytesIO], Writer] = Writer) -> bytes:
+    """Return a value as the bytes that a writer makes of it."""
     out = BytesIO()
-    Writer(out, protocol=5).dump(value)
+    writer(out).dump(value)
     return out.getvalue()
 
 

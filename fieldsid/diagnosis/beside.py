@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from io import BytesIO
 from typing import Any, TypeVar
 
-from fieldsid.copies import Writer, copied
+from fieldsid.copies import Writer, copied, written
 from fieldsid.fitting.problem import Problem
 from fieldsid.models.effect import Effect, form_of, in_form
 from fieldsid.models.record import Record
@@ -54,9 +54,7 @@ class Beside:
 
     def dumps(self, value: object) -> bytes:
         """Return a value as bytes that `loads` reads."""
-        out = BytesIO()
-        _Writer(out, self).dump(value)
-        return out.getvalue()
+        return written(value, lambda out: _Writer(out, self))
 
     def loads(self, answer: bytes) -> Any:
         """Return what `dumps` was given, the known records and effects in it themselves."""
@@ -79,7 +77,7 @@ def _taken(function: Callable[[T], R], items: Sequence[T], left: int) -> Iterato
 
 class _Writer(Writer):
     def __init__(self, out: BytesIO, known: Beside) -> None:
-        super().__init__(out, protocol=5)
+        super().__init__(out)
         self.places = {id(r): i for i, r in enumerate(known.records)}
         self.effects = known.effects
 

@@ -62,13 +62,14 @@ def diagnose(
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
     work = search(learned, unseen, axis, catalogue, known=known, report=report)
-    ending = _ended(work, work.best())
+    found = work.best()
+    ending = _ended(work, found, in_its_weather(found.judged, work.beside))
     if ending.verdict.word == "unexplained" and work.is_noiseless:
         # from the first base: one begun anew under the other noise is that of a search that has led nowhere
         first = search(learned, unseen, axis, catalogue, known=known, report=report)
         other = freely(first)
         if other is not None and explained(first, other) > MOSTLY:
-            ending = _ended(first, other, Verdict("effect", added(first, other)))
+            ending = _ended(first, other, other.judged, Verdict("effect", added(first, other)))
     return _said(ending, skipped, notes)
 
 
@@ -76,8 +77,8 @@ def diagnose(
 class _Ending:
     """Where a search ended, its verdict, and what is said of that.
 
-    judged is the hypothesis found in its weather; models are the base's and its, with how unseen runs were flown; shown are
-    the leading hypotheses, with the errors of the first of them.
+    judged is the hypothesis found as what is left is judged; models are the base's and its, with how unseen runs were flown;
+    shown are the leading hypotheses, with the errors of the first of them.
     """
 
     work: Search
@@ -91,9 +92,9 @@ class _Ending:
     errors: Sequence[Pair]
 
 
-def _ended(work: Search, found: Hypothesis, verdict: Verdict | None = None) -> _Ending:
-    """Return what a search comes to that ended at a hypothesis, under a verdict where that is known."""
-    base, judged, shown = work.base(), in_its_weather(found.judged, work.beside), _leading(work, found)
+def _ended(work: Search, found: Hypothesis, judged: Judged, verdict: Verdict | None = None) -> _Ending:
+    """Return what a search comes to that ended at a hypothesis, judged in its weather, under a verdict where that is known."""
+    base, shown = work.base(), _leading(work, found)
 
     def refitted(h: Hypothesis) -> Refitted:
         model = refitted_model(h)

@@ -75,28 +75,33 @@ def is_even(steps: FloatArray, drive: FloatArray) -> bool:
 
 
 @jit
-def _responses(step: float, drive: FloatArray, pieces: int) -> FloatArray:
-    """Return what units of y, p, and of the moment at both ends become over an interval, with tangents by a and k, (4, 6)."""
-    u, room = np.zeros((4, 6)), np.zeros((5, 6))
+def _responses(a: float, k: float, h: float, pieces: int, u: FloatArray, room: FloatArray) -> None:
+    """Fill u (4, 6) with what units of y, p, and of the moment at both ends become over h, and its tangents by a and k."""
     for unit in range(4):
-        _unit_response(drive[0, 0], drive[0, 1], step, pieces, unit, u[unit], room)
-    return u
+        _unit_response(a, k, h, pieces, unit, u[unit], room)
 
 
 @jit
-def linear_motion(steps: FloatArray, drive: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> int:
-    """Fill out (n, 3) with angle and rate over even intervals, NaN from where it diverges on; return the samples that are not."""
-    u = _responses(steps[0], drive, pieces)
+def linear_motion(steps: FloatArray, drive: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> None:
+    """Fill out (n, 3) with angle and rate over even intervals, NaN from where it diverges on."""
+    u, room = np.zeros((4, 6)), np.zeros((5, 6))
+    _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, room)
+    _move(u, drive, start, out)
+
+
+@jit
+def _move(u: FloatArray, drive: FloatArray, start: FloatArray, out: FloatArray) -> int:
+    """Fill out (n, 3) by the responses of an interval; return the samples before the motion diverges."""
     y, p = start[0], start[1]
     out[0, 0], out[0, 1], out[0, 2] = y, p, 0.0
-    for i in range(steps.shape[0]):
+    for i in range(drive.shape[0]):
         m0, m1 = drive[i, 2], drive[i, 3]
         y, p = u[0, 0] * y + u[1, 0] * p + u[2, 0] * m0 + u[3, 0] * m1, u[0, 1] * y + u[1, 1] * p + u[2, 1] * m0 + u[3, 1] * m1
         if not abs(p) < DIVERGED:
             spoil(out, i + 1)
             return i + 1
         out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, 0.0
-    return int(steps.shape[0] + 1)
+    return int(drive.shape[0] + 1)
 
 
 @jit
@@ -105,7 +110,9 @@ def linear_tangents(
     factor: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
 ) -> None:  # fmt: skip
     """Fill out (n, 3) and sens (P, 2, n) over even intervals, as `tangents` of models/kernels.py does."""
-    u, whole = _responses(steps[0], drive, pieces), linear_motion(steps, drive, start, pieces, out)
+    u, room = np.zeros((4, 6)), np.zeros((5, 6))
+    _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, room)
+    whole = _move(u, drive, start, out)
     for j in range(place.shape[0]):
         y, p = d_start[j, 0], d_start[j, 1]
         f_a, f_k, f_0, f_1 = factor[j, 0], factor[j, 1], factor[j, 2], factor[j, 3]
@@ -170,8 +177,7 @@ def accumulate(  # noqa: C901  (one loop over the samples: a call in it would do
         h = steps[i]
         if abs(h - last) > STEP_TOLERANCE * h:
             last = h
-            for unit in range(4):
-                _unit_response(a, k, h, pieces, unit, u[unit], room)
+            _responses(a, k, h, pieces, u, room)
         d0, d1 = fin[0, i], fin[1, i]
         m0, m1 = b * d0 + c, b * d1 + c
         for j in range(6):
