@@ -33,6 +33,10 @@ KnownModel = Annotated[
 ]
 FigureFile = Annotated[Path | None, typer.Option("--figure", metavar="PNG", help="Draw the candidates.", show_default=False)]
 
+Thorough = Annotated[
+    bool, typer.Option("--thorough", help="Go on for as long as there is something to try, half a minute where much is left.")
+]
+
 
 def command(
     runs: RunFiles,
@@ -42,6 +46,7 @@ def command(
     mapping: MappingFile = None,
     output: OutputFile = None,
     figure: FigureFile = None,
+    thorough: Thorough = False,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -62,7 +67,7 @@ def command(
 
     training, unseen = logs[: len(runs)], logs[len(runs) :]
     with compiling_first(), trying("diagnosing") as report:
-        found = diagnose(training, axis, unseen, known=known.effects if known else (), report=report)
+        found = diagnose(training, axis, unseen, known=known.effects if known else (), report=report, thorough=thorough)
     inputs = [*files_of(logs), *([model] if model else [])]
     body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model)
     body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, force=force)}

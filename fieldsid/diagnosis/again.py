@@ -31,8 +31,6 @@ def begun_again(h: Hypothesis, known: Collection[str], told: Noise, family: str,
         problem, start = _start(h, effect, plain=plain)
         return hypothesis_of(judge(problem, start, h.judged.noise, told, family), h.validation)
 
-    if h.judging.over(floor) < DOUBTFUL:
-        return h
     ends = beside.each(judged_from, [(e, plain) for e in h.effects if e.name not in known for plain in (True, False)])
     best = max(ends, key=lambda end: end.score, default=h)
     return with_free_run(best, floor) if best.score > h.score + SETTLED else h

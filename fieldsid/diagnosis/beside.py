@@ -12,6 +12,7 @@ from io import BytesIO
 from typing import Any, TypeVar
 
 from fieldsid.copies import Writer, copied, written
+from fieldsid.fitting import effort
 from fieldsid.fitting.problem import Problem
 from fieldsid.models.effect import Effect, form_of, in_form
 from fieldsid.models.record import Record
@@ -40,7 +41,8 @@ class Beside:
             return [function(item) for item in items]
         left = _numbers(len(items))
         try:
-            copy = copied(lambda: self.dumps(dict(_taken(function, items, left))))
+            before = effort.done()
+            copy = copied(lambda: self.dumps((dict(_taken(function, items, left)), effort.done() - before)))
             if copy is None:
                 return [function(item) for item in items]
             with copy:
@@ -49,7 +51,9 @@ class Beside:
         finally:
             os.close(left)
         if answer is not None:
-            done |= self.loads(answer)
+            theirs, worked_out = self.loads(answer)
+            done |= theirs
+            effort.count(worked_out)
         return [done[i] if i in done else function(item) for i, item in enumerate(items)]
 
     def dumps(self, value: object) -> bytes:

@@ -19,13 +19,14 @@ from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Pair
 from fieldsid.diagnosis.refitted import refitted_model
 from fieldsid.diagnosis.remainder import Remainder, remainder_of
-from fieldsid.diagnosis.search import Search, search
+from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import Judged
 from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.verdict import MOSTLY, Verdict, added, explained, probabilities, verdict_of
 from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.diagnosis.words import evidence, headline
+from fieldsid.diagnosis.worth import asks_for_more
 from fieldsid.effects import all_effects
 from fieldsid.errors import DataError, ModelError
 from fieldsid.fitting.fit import check
@@ -36,6 +37,9 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out, record_of
 
 SHOWN = 8
+UNTRIED = Note(
+    "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
+)
 Refitted = tuple[Model, tuple[Note, ...]]
 
 
@@ -46,10 +50,12 @@ def diagnose(
     *,
     known: Sequence[str] = (),
     report: Callable[[str], None] = lambda _text: None,
+    thorough: bool = False,
 ) -> Diagnosis:
     """Return which catalogued effect the base model lacks on some runs, judged on runs it was not fitted to.
 
-    known names effects the model has already: they are part of the base. report is told what is being tried.
+    known names effects the model has already: they are part of the base. report is told what is being tried. thorough: for as
+    long as there is something to try, see allowance.py.
     Raises DataError when a run cannot be fitted on the axis, EffectError for a user's effect that fails.
     """
     both = Beside((), ()).each(lambda run: record_of(run, axis), (*training, *validation))
@@ -61,12 +67,12 @@ def diagnose(
     missing = [n for n in known if n in skipped]
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
-    work = search(learned, unseen, axis, catalogue, known=known, report=report)
+    work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
     found = work.best()
     ending = _ended(work, found, in_its_weather(found.judged, work.beside))
     if ending.verdict.word == "unexplained" and work.is_noiseless:
         # from the first base: one begun anew under the other noise is that of a search that has led nowhere
-        first = search(learned, unseen, axis, catalogue, known=known, report=report)
+        first = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
         other = freely(first)
         if other is not None and explained(first, other) > MOSTLY:
             ending = _ended(first, other, other.judged, Verdict("effect", added(first, other)))
@@ -132,7 +138,7 @@ def _said(end: _Ending, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> 
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, skipped),
         skipped=skipped,
-        notes=(*notes, *diverged, *flown),
+        notes=(*notes, *diverged, *flown, *([UNTRIED] if work.allowance.ended and asks_for_more(found, work.floor) else [])),
     )
 
 

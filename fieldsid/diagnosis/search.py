@@ -8,7 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from fieldsid.diagnosis.again import begun_again
+from fieldsid.diagnosis.again import DOUBTFUL, begun_again
+from fieldsid.diagnosis.allowance import ANEW, MOST, Allowance
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import is_noiseless, told_apart
 from fieldsid.diagnosis.forms import Plain, Shaping
@@ -37,14 +38,17 @@ LARGEST, PAIR = 4, 2
 
 @dataclass(slots=True)
 class Search:
-    """Everything tried so far on one set of runs, by the set of effects."""
+    """Everything tried so far on one set of runs, by the set of effects; known ones are part of its base."""
 
     records: tuple[Record, ...]
     validation: tuple[Record, ...]
     axis: Axis
-    catalogue: tuple[Effect, ...]
-    floor: Noise
-    known: tuple[str, ...] = ()
+    catalogue: Sequence[Effect]
+    known: Sequence[str] = ()
+    report: Callable[[str], None] = lambda _text: None
+    thorough: bool = False
+    """Whether it goes on for as long as there is something to try."""
+    floor: Noise = field(init=False)
     tried: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
     family: str = ""
     begun: set[str] = field(default_factory=set)
@@ -57,13 +61,15 @@ class Search:
     flown_from: set[frozenset[str]] = field(default_factory=set)
     free: dict[frozenset[str], list[Trial]] = field(default_factory=dict)
     shaped: dict[frozenset[str], float] = field(default_factory=dict)
-    report: Callable[[str], None] = lambda _text: None
     beside: Beside = field(init=False)
+    allowance: Allowance = field(init=False)
 
     def __post_init__(self) -> None:
         """Tell hypotheses apart down to the sensors' noise, until the base shows how far off it is."""
-        self.told = self.floor
-        self.beside = Beside((*self.records, *self.validation), self.catalogue)
+        both = (*self.records, *self.validation)
+        self.told = self.floor = floor_of(both)
+        self.beside = Beside(both, self.catalogue)
+        self.allowance = Allowance(len(both), np.inf if self.thorough else MOST)
 
     @property
     def root(self) -> frozenset[str]:
@@ -119,9 +125,11 @@ class Search:
             later = self._gone(parent, by_effect(found))
             leading = {n for h in self._children(key)[:LEADING] for n in h.names if n not in key}
             self._gone(parent, by_effect([w for w in later if w.promise.effect.name in leading]), every=True)
-            self._back_from_child(key)
+            if self.allowance.lasts():
+                self._back_from_child(key)
             self._free_runs(key)
-            self._improve(key, self._leading(key))
+            if self.allowance.lasts():
+                self._improve(key, self._leading(key))
         return self._children(key)
 
     def _children(self, key: frozenset[str]) -> list[Hypothesis]:
@@ -256,19 +264,22 @@ class Search:
     def best(self) -> Hypothesis:
         """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
         best = self._grown(self.base())
-        nothing = frozenset(best.names) == self.root
-        if self.error(best) > MUCH and (nothing or is_odd(best.judged, self.beside)):  # the textbook's forms may promise nothing
+        nothing = frozenset(best.names) == self.root  # the textbook's forms may promise nothing
+        if self.error(best) > MUCH and self.allowance.lasts() and (nothing or is_odd(best.judged, self.beside)):
             untried = [e for e in self.catalogue if nothing and e.forms and self.root | {e.name} not in self.tried]
             self._gone(self.base(), by_effect(ways(self.base(), untried, None, self.beside, anew=False, flown=True)))
             self._improve(self.root, [], every=True)
             best = self._grown(self._likeliest())
-        best = begun_again(best, self.known, self.told, self.family, sensors(self.floor, self.base()), self.beside)
-        self.tried[frozenset(best.names)] = best
+        if self.error(best) > DOUBTFUL and self.allowance.lasts():
+            best = begun_again(best, self.known, self.told, self.family, sensors(self.floor, self.base()), self.beside)
+            self.tried[frozenset(best.names)] = best
         return best
 
     def _grown(self, best: Hypothesis) -> Hypothesis:
         """Return where a hypothesis leads to, itself where all its additions were tried."""
         while frozenset(best.names) not in self.grown_from and len(best.names) < len(self.known) + LARGEST:
+            if best is not self.base() and not self.allowance.lasts():
+                break
             current = self._climbed(best)
             if current is None:
                 best = self.base()
@@ -292,7 +303,7 @@ class Search:
             self.hear(current.judged.trial)
             if self._turn():
                 return None
-            if paying is None or not asks_for_more(current, self.floor):
+            if paying is None or not asks_for_more(current, self.floor) or not self.allowance.lasts():
                 break
         return current
 
@@ -302,9 +313,13 @@ class Search:
         What was missing may have hidden it. Likelihoods compare under one noise only, and a disturbance that stands in for
         coloured sensors lets the heading wander for free. What was found stays among what is tried, judged anew.
         """
+        if not self.allowance.lasts():
+            return False
         found = self._likeliest()
         noise = partial(other_noise, found, self.floor, self.begun, self.beside)
         judged, again = self.trims.asked(found, self.tried, self.floor, self.told, self.beside, noise)
+        if (judged is None and again is None) or not self.allowance.lasts(ANEW):
+            return False
         if judged is not None:
             self.family, again = judged.family, hypothesis_of(judged, self.validation)
         elif again is not None:
@@ -312,12 +327,10 @@ class Search:
             self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
             self.free.clear()
             self.flown_from.clear()
-        if again is None:
-            return False
         self.tried.clear()
         self.shaped.clear()
         self.grown_from.clear()
-        if frozenset(again.names) != self.root:
+        if again is not None and frozenset(again.names) != self.root:
             self.tried[frozenset(again.names)] = with_free_run(again, self.floor)
         return True
 
@@ -325,7 +338,7 @@ class Search:
         """Return a pair that pays, of whose two the first has more evidence than what pays alone, and no less error yet."""
         least = -np.inf if paying is None else paying.score + WORTH
         first = next((c for c in children if likelier(current, c)), None)
-        if first is None or first.score <= least:
+        if first is None or first.score <= least or not self.allowance.lasts():
             return None
         return next((c for c in self.grow(first) if pays(first, c) and pays(current, c) and c.score > least), None)
 
@@ -343,7 +356,7 @@ class Search:
         best = found
         for gone in found.effects[:-1]:
             rest = frozenset(n for n in found.names if n != gone.name)
-            if gone.name in self.known or rest not in self.tried:
+            if gone.name in self.known or rest not in self.tried or not self.allowance.lasts():
                 continue
             children = self.grow(self.tried[rest], most=PROMISING_INSTEAD)
             child = next((c for c in children if pays(self.tried[rest], c)), best)
@@ -384,12 +397,3 @@ class Search:
     def ranked(self) -> list[Hypothesis]:
         """Return all judged hypotheses, best score first."""
         return sorted(self.tried.values(), key=lambda h: -h.score)
-
-
-def search(
-    records: Sequence[Record], validation: Sequence[Record], axis: Axis, catalogue: Sequence[Effect], *,
-    known: Sequence[str] = (), report: Callable[[str], None] = lambda _text: None,
-) -> Search:  # fmt: skip
-    """Return a search ready to go; known effects are part of its base."""
-    floor = floor_of([*records, *validation])
-    return Search(tuple(records), tuple(validation), axis, tuple(catalogue), floor, tuple(known), report=report)

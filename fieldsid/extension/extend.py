@@ -15,7 +15,7 @@ from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.refitted import refitted_model
-from fieldsid.diagnosis.search import Search, search
+from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.diagnosis.usable import usable
@@ -94,7 +94,7 @@ def extend(
     check([*records, *unseen], parent.axis)
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
     parts = _with_signals((*(pick_effect(n) for n in parent.effects), *new), [*learned, *judged])
-    work = search(learned, judged, parent.axis, parts, known=parent.effects, report=report)
+    work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
     before = base_from(work, parent)
     after = _with_all(work)
     work.hear(after.judged.trial)

@@ -42,12 +42,16 @@ def a_record() -> Record:
 
 def compile_filters() -> None:
     """Call what judges noise once."""
+    _estimate("disturbance")
+
+
+def _estimate(family: str) -> None:
     record = a_record()
-    estimate_noise([record], [(1.0, 0.0)], [record.both], "disturbance", STIRRED)
+    estimate_noise([record], [(1.0, 0.0)], [record.both], family, STIRRED)
 
 
 def compile_motion() -> None:
-    """Call what moves, fits and says how sure it is once, and then each effect."""
+    """Call what moves, fits and says how sure it is once, then each effect, and last what few fits need."""
     records = (a_record(),)
     problem = Problem(records, layout_of(records, Axis.YAW, (), speed_groups(records)))
     x = start_vector(records, problem.layout)
@@ -59,6 +63,7 @@ def compile_motion() -> None:
     for own in (*((e,) for e in effects), tuple(e for e in effects if e.fin is not None)):
         more = problem.with_effects(own)
         more.linearise(more.start(), 0)
+    _estimate("both")
 
 
 def load_compiled() -> None:

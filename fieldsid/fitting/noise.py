@@ -198,7 +198,7 @@ class _Slope:
         runs = [
             (r, max(a, 1e-3), max(k, 0.0), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)
         ]
-        here = [innovated(r, a, k, noise, e) for r, a, k, e in runs]
+        here = [innovated(r, a, k, noise, self.place, e) for r, a, k, e in runs]
         total = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
         if not (np.isfinite(total) and total > least):
             return -np.inf, np.zeros(count), np.eye(count)

@@ -8,6 +8,7 @@ from math import isfinite
 
 import numpy as np
 
+from fieldsid.fitting.effort import count
 from fieldsid.fitting.layout import START_NAMES, Layout, group_name, layout_of
 from fieldsid.fitting.pushes import Pushes
 from fieldsid.logs.run import FloatArray
@@ -123,6 +124,7 @@ class Problem:
 
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
+        count()
         record, effects = self.records[run], self.layout.effects
         values = self.values_of(x, run)
         base, start = self._base(values, run), self._start_of(values, run)
@@ -137,6 +139,7 @@ class Problem:
 
     def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
         """Return one run's free run with its sensitivities to the free slots that touch it."""
+        count()
         slots, pushes = self._pushes(x, run, free)
         out, stack = pushes.integrate(slots)
         shown = pushes.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])

@@ -12,7 +12,7 @@ from truth.bank import Case, make_case
 from fieldsid import copies
 from fieldsid.diagnosis import Diagnosis, diagnose
 from fieldsid.diagnosis.diagnose import body_of
-from fieldsid.diagnosis.search import search
+from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.usable import usable
 from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run
@@ -69,7 +69,7 @@ def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:
     axis = Axis(case.axis)
     training, unseen = ([record_of(r, axis) for r in runs_of(logs, "run")] for logs in (case.training, case.validation))
     catalogue, _ = usable(all_effects(axis).values(), [*training, *unseen])
-    work = search(training, unseen, axis, catalogue)
+    work = Search(training, unseen, axis, catalogue)
     found = work.best()
     longer = work.grow(found)[0]
     assert len(longer.names) == len(found.names) + 1 == 3

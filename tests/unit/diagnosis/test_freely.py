@@ -10,7 +10,7 @@ from truth.noise import Clock
 from truth.physics import Physics
 
 from fieldsid.diagnosis.freely import BETTER, _flown, _thinned, freely
-from fieldsid.diagnosis.search import search
+from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.trial import refine
 from fieldsid.diagnosis.verdict import added
 from fieldsid.effects import pick_effect
@@ -37,7 +37,7 @@ def work():
         log = flown(HIDDEN, CLOCK, plan)
         log = {k: log[k] for k in ("time_s", "yaw_rad", "yaw_rate_rad_s", "rudder_rad")}
         records.append(record_of(Run(f"run{i}", log.pop("time_s"), log), Axis.YAW))
-    return search(records[:2], records[2:], Axis.YAW, [pick_effect(n) for n in TRIED])
+    return Search(records[:2], records[2:], Axis.YAW, [pick_effect(n) for n in TRIED])
 
 
 def test_both_hidden_effects_are_found_and_what_each_lacks_is_known(work):

@@ -9,7 +9,7 @@ import hidden_lag
 import pytest
 
 from fieldsid.diagnosis import search as module
-from fieldsid.diagnosis.search import search
+from fieldsid.diagnosis.search import Search
 from fieldsid.effects import all_effects
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
@@ -21,7 +21,7 @@ def base():
     training, unseen = hidden_lag.runs()
     records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
     lag = [all_effects(Axis.YAW)["servo_lag"]]
-    made = search(*records, Axis.YAW, lag)
+    made = Search(*records, Axis.YAW, lag)
     made.base()
     return made
 

@@ -7,7 +7,7 @@ import pytest
 from short_way import compare_with_the_general_core
 from truth.paper import YAW, paper_run
 
-from fieldsid.diagnosis.search import search
+from fieldsid.diagnosis.search import Search
 from fieldsid.fitting.fit import fit
 from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.problem import Problem
@@ -74,6 +74,6 @@ def test_a_joint_fit_keeps_a_moment_that_is_the_same_at_all_speeds():
 
 @pytest.mark.parametrize("bent", [True, False])
 def test_the_diagnosis_finds_which_law_the_trim_follows(bent):
-    base = search(runs(bent=bent), [flown(1.9, bent=bent, seed=9)], Axis.YAW, ()).base()
+    base = Search(runs(bent=bent), [flown(1.9, bent=bent, seed=9)], Axis.YAW, ()).base()
     assert base.judged.trial.problem.layout.groups.trim_of_fin is bent
     assert base.unseen_errors.over(Noise(ANGLE, RATE)) < 1.2

@@ -1,0 +1,28 @@
+"""What a search may work out before it goes on only with what it has found: nobody on a boat waits for the last percent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fieldsid.fitting.effort import done
+
+MOST = 3000
+"""Times each run may be flown, linearised or filtered, on average."""
+ANEW = 0.5
+"""Share of that within which a search may begin anew: it then costs about as much again."""
+
+
+@dataclass(slots=True)
+class Allowance:
+    """What a search over some runs may work out, and whether something was left untried for it."""
+
+    runs: int
+    most: float = MOST
+    ended: bool = False
+    began: int = field(default_factory=done)
+
+    def lasts(self, share: float = 1.0) -> bool:
+        """Whether less than a share of it is spent; if not, what is asked for is left untried."""
+        lasts = done() - self.began < share * self.most * self.runs
+        self.ended = self.ended or not lasts
+        return lasts
