@@ -5,13 +5,12 @@ What comes back refers to the records and effects that both processes know, inst
 
 from __future__ import annotations
 
-import os
 import pickle
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from io import BytesIO
 from typing import Any, TypeVar
 
-from fieldsid.copies import Writer, copied, written
+from fieldsid.copies import Writer, each, written
 from fieldsid.fitting import effort
 from fieldsid.fitting.problem import Problem
 from fieldsid.models.effect import Effect, form_of, in_form
@@ -19,9 +18,6 @@ from fieldsid.models.record import Record
 
 T = TypeVar("T")
 R = TypeVar("R")
-
-MOST = 256
-"""Items that are shared out at most: their numbers are bytes."""
 
 
 class Beside:
@@ -32,29 +28,15 @@ class Beside:
         self.effects = {e.name: e for e in effects}
 
     def each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Return a function of every item, in order, some of them from a copy of this process: each takes the next one left.
+        """Return a function of every item as `copies.each` does, what the copy has worked out counted here as well."""
+        before = effort.done()
 
-        What the function changes is seen in one of the two only: all that matters must be in what it returns. Where the
-        copy comes to nothing, its items are done here.
-        """
-        if not 1 < len(items) < MOST:
-            return [function(item) for item in items]
-        left = _numbers(len(items))
-        try:
-            before = effort.done()
-            copy = copied(lambda: self.dumps((dict(_taken(function, items, left)), effort.done() - before)))
-            if copy is None:
-                return [function(item) for item in items]
-            with copy:
-                done = dict(_taken(function, items, left))
-                answer = copy.answer()
-        finally:
-            os.close(left)
-        if answer is not None:
-            theirs, worked_out = self.loads(answer)
-            done |= theirs
+        def read(answer: bytes) -> dict[int, R]:
+            done, worked_out = self.loads(answer)
             effort.count(worked_out)
-        return [done[i] if i in done else function(item) for i, item in enumerate(items)]
+            return dict(done)
+
+        return each(function, items, lambda done: self.dumps((done, effort.done() - before)), read)
 
     def dumps(self, value: object) -> bytes:
         """Return a value as bytes that `loads` reads."""
@@ -63,20 +45,6 @@ class Beside:
     def loads(self, answer: bytes) -> Any:
         """Return what `dumps` was given, the known records and effects in it themselves."""
         return _Reader(BytesIO(answer), self).load()
-
-
-def _numbers(count: int) -> int:
-    """Return a pipe's end that gives each number below count once, to whoever reads it."""
-    source, target = os.pipe()
-    with os.fdopen(target, "wb") as stream:
-        stream.write(bytes(range(count)))
-    return source
-
-
-def _taken(function: Callable[[T], R], items: Sequence[T], left: int) -> Iterator[tuple[int, R]]:
-    """Yield the places and values of the items that are taken here."""
-    while number := os.read(left, 1):
-        yield number[0], function(items[number[0]])
 
 
 class _Writer(Writer):

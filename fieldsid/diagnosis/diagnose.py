@@ -11,8 +11,8 @@ import numpy as np
 
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
+from fieldsid.copies import each
 from fieldsid.diagnosis.advise import next_maneuver
-from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.freely import freely
 from fieldsid.diagnosis.hypothesis import Hypothesis
@@ -58,7 +58,7 @@ def diagnose(
     long as there is something to try, see allowance.py.
     Raises DataError when a run cannot be fitted on the axis, EffectError for a user's effect that fails.
     """
-    both = Beside((), ()).each(lambda run: record_of(run, axis), (*training, *validation))
+    both = each(lambda run: record_of(run, axis), (*training, *validation))
     records, unseen = both[: len(training)], tuple(both[len(training) :])
     check([*records, *unseen], axis)
     learned, unseen, notes = (tuple(records), unseen, ()) if unseen else held_back(records)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+from fieldsid.copies import each
 from fieldsid.models.axis import Axis
 from fieldsid.schedule.margins import control_margins, margins
 from fieldsid.schedule.plant import FinLimits, LinearPlant, family_at
@@ -90,17 +91,18 @@ def verify_schedule(schedule: Schedule, source: Source, *, draws: int = DRAWS, l
     """Check a schedule on the parameters it was made from, with their errors, at its knots and midway between them."""
     limits = limits or _limits(schedule)
     constant = constant_row(schedule)
-    scheduled, compared, steps = [], [], []
-    for i, (speed, knot) in enumerate(checked_speeds(schedule)):
+
+    def checked(place: tuple[int, tuple[float, bool]]) -> tuple[Check, Check, tuple[float, Steps, Steps]]:
+        i, (speed, knot) = place
         plant = family_at(source, speed, limits, draws, SEED + 10 * i)
         row = schedule.at(speed)
         held = replace(constant, speed=speed, feed_forward=row.feed_forward, reference_gain=row.reference_gain)
         one, steps_of_row = _check(plant, row, schedule, knot=knot, constant=False)
         other, steps_of_constant = _check(plant, held, schedule, knot=knot, constant=True)
-        scheduled.append(one)
-        compared.append(other)
-        steps.append((speed, steps_of_row, steps_of_constant))
-    return Verification(tuple(scheduled), tuple(compared), constant, tuple(steps))
+        return one, other, (speed, steps_of_row, steps_of_constant)
+
+    scheduled, compared, steps = zip(*each(checked, list(enumerate(checked_speeds(schedule)))), strict=True)
+    return Verification(scheduled, compared, constant, steps)
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
