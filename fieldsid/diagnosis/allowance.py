@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 from fieldsid.fitting.effort import done
 
 MOST = 3000
-"""Times each run may be flown, linearised or filtered, on average."""
-ANEW = 0.5
-"""Share of that within which a search may begin anew: it then costs about as much again."""
+"""Times each run may be flown, linearised or filtered, on average, before nothing more is begun."""
 
 
 @dataclass(slots=True)
@@ -21,8 +19,8 @@ class Allowance:
     ended: bool = False
     began: int = field(default_factory=done)
 
-    def lasts(self, share: float = 1.0) -> bool:
-        """Whether less than a share of it is spent; if not, what is asked for is left untried."""
-        lasts = done() - self.began < share * self.most * self.runs
+    def lasts(self) -> bool:
+        """Whether something of it is left; if not, what is asked for is left untried."""
+        lasts = done() - self.began < self.most * self.runs
         self.ended = self.ended or not lasts
         return lasts

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from fieldsid.diagnosis.again import DOUBTFUL, begun_again
-from fieldsid.diagnosis.allowance import ANEW, MOST, Allowance
+from fieldsid.diagnosis.allowance import MOST, Allowance
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import is_noiseless, told_apart
 from fieldsid.diagnosis.forms import Plain, Shaping
@@ -318,7 +318,7 @@ class Search:
         found = self._likeliest()
         noise = partial(other_noise, found, self.floor, self.begun, self.beside)
         judged, again = self.trims.asked(found, self.tried, self.floor, self.told, self.beside, noise)
-        if (judged is None and again is None) or not self.allowance.lasts(ANEW):
+        if judged is None and again is None:
             return False
         if judged is not None:
             self.family, again = judged.family, hypothesis_of(judged, self.validation)
