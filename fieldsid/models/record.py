@@ -18,6 +18,7 @@ from fieldsid.models.cross import cross_speed
 from fieldsid.models.depth import depth_along
 from fieldsid.models.effect import FinPath
 from fieldsid.models.smoothing import smoothed
+from fieldsid.models.surge import causes_of, surge_behind
 
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
 JITTER = 0.35
@@ -160,8 +161,12 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     signals = {
         role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0))
         for role, c in ROLES.items()
-        if run.has(c) and not (along and role == "depth")
+        if run.has(c) and role != "surge" and not (along and role == "depth")
     }
+    if run.has(ROLES["surge"]):
+        turning = np.interp(run.time, run.time[rate_ok], rate[rate_ok]) if rate_ok.any() else None
+        causes, fastest_s = causes_of(signals.get("thrust"), turning, held), FASTEST_S["surge"]
+        signals["surge"] = surge_behind(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
     if run.has(names.cross):
         signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
     if along:

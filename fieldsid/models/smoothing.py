@@ -3,8 +3,8 @@
     min_z  sum_i w_i (v_i - z_i)^2 + (T/h)^4 sum_i (z_(i-1) - 2 z_i + z_(i+1))^2
 which passes what is slower than T and leaves out what is faster, without phase. T is the one of least generalised
 cross-validation error; the trace of the smoother comes from one random vector of fixed seed.
-What is known to move the signal may be given as columns: the smoother then only has to follow what they leave, where that
-validates better, and passes less noise.
+What is known to move the signal may be given as columns: the smoother then only has to follow what they leave, unless that
+validates worse than chance, and passes less noise.
 Sources: Whittaker 1923, On a new method of graduation; Craven and Wahba 1979; Girard 1989, Numer. Math. 56 (the trace);
 Green and Silverman 1994, Nonparametric Regression and Generalized Linear Models, chapter 4 (columns beside a smoother).
 """
@@ -28,8 +28,10 @@ HELD_S = 1.0
 """A value repeated for no longer than this was held by the log until the sensor's next one."""
 NEIGHBOURS, WILD, LARGE = 9, 8.0, 0.1
 """Values a running median is taken over; spreads, and share of the signal's own range, beyond which one is wild."""
+CHANCE = 12.0
+"""Samples' worth of noise that two smoothers' errors differ by by chance: what is known to move a signal is left out beyond."""
 ENOUGH = 20_000
-"""Samples from whose first part a longer signal's T is found."""
+"""Samples from whose first part a longer signal's T is found, and which columns it goes with."""
 
 
 def smoothed(
@@ -55,13 +57,13 @@ def smoothed(
     trends = [(line, 0)]
     if beside:
         # of all that is left beside the columns of each set, not of its slow part alone: sets differ in little else
-        sums = [_fitted(np.column_stack([straight, columns]), full, seen) for columns in beside]
-        best = min(range(len(sums)), key=lambda i: float(np.sum((full - sums[i])[seen] ** 2)))
-        trends.append((sums[best], beside[best].shape[1]))
+        best = min(beside, key=lambda columns: _left(np.column_stack([straight, columns])[part], full[part], seen[part]))
+        trends.append((_fitted(np.column_stack([straight, best]), full, seen), best.shape[1]))
     stiffnesses, found = _stiffnesses(step, fastest_s), []
     for trend, spent in trends:
-        found.append((*_best_stiffness((full - trend)[part], weight[part], stiffnesses, spent), trend))
-    stiffness, _, trend = min(found, key=lambda of: of[1])
+        stiffness, error = _best_stiffness((full - trend)[part], weight[part], stiffnesses, spent)
+        found.append((error * (1.0 if spent else 1.0 + CHANCE / float(weight[part].sum())), stiffness, trend))
+    _, stiffness, trend = min(found, key=lambda of: of[0])
     return np.asarray(trend + _solved(weight, stiffness, (weight * (full - trend))[:, None])[:, 0])
 
 
@@ -70,6 +72,11 @@ def _fitted(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]
     size = np.linalg.norm(columns[seen], axis=0)
     scaled = columns / np.where(size > 0.0, size, 1.0)
     return np.asarray(scaled @ np.linalg.lstsq(scaled[seen], values[seen], rcond=1e-9)[0])
+
+
+def _left(columns: FloatArray, values: FloatArray, seen: npt.NDArray[np.bool_]) -> float:
+    """Return the sum of squares that the least-squares sum of columns (n, k) leaves of values (n,) where seen."""
+    return float(np.sum((values - _fitted(columns, values, seen))[seen] ** 2))
 
 
 def _fresh(values: FloatArray, ok: npt.NDArray[np.bool_], step: float) -> npt.NDArray[np.bool_]:
