@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from fieldsid.fitting.effort import done
 
-MOST = 3000
+MOST = 3500
 """Times each run may be flown, linearised or filtered, on average, before nothing more is begun."""
 
 

@@ -27,6 +27,12 @@ from fieldsid.models.speed_law import TRIM_OF_FIN
 
 T = TypeVar("T")
 
+World = tuple[
+    dict[frozenset[str], Hypothesis], dict[frozenset[str], float], set[frozenset[str]], dict[frozenset[str], list[Trial]],
+    set[frozenset[str]],
+]  # fmt: skip
+"""What was tried, shaped and grown from; free runs, and from where they were flown."""
+
 TURNS = 2
 """Times a search begins anew under the trim's other law: a first effect may have asked for the one that the second does not."""
 ALIKE_SPEEDS = 1.1
@@ -79,10 +85,20 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
 
 @dataclass(slots=True)
 class Trims:
-    """What hypotheses come to under the trim's other law, each judged once, and how often a search has turned to it."""
+    """What hypotheses come to under the trim's other law, each judged once, and how often a search has turned to it.
+
+    left is what had been tried by then, under each noise and law: a search may come back.
+    """
 
     known: dict[tuple[tuple[str, ...], float], Hypothesis | None] = field(default_factory=dict)
     turned: int = 0
+    left: dict[tuple[str, bool], World] = field(default_factory=dict)
+
+    def turn(self, family: str, world: World, *, law: bool, other: bool) -> World:
+        """Return what was tried under the other law before, keeping the world of the law that is left."""
+        self.turned += 1
+        self.left[family, law] = world
+        return self.left.get((family, other), ({}, {}, set(), {}, set()))
 
     def asked(
         self, found: Hypothesis, tried: Mapping[frozenset[str], Hypothesis], floor: Noise, told: Noise, beside: Beside,
@@ -117,6 +133,11 @@ def _predicts(h: Hypothesis, found: Hypothesis) -> bool:
     Where speeds are a little off, a disturbance takes what either law leaves of the heading, and evidence alone tells by chance.
     """
     return h.judging.mean < MUCH * found.judging.mean
+
+
+def law_of(h: Hypothesis) -> bool:
+    """Return whether the trim of a hypothesis is a bent fin's."""
+    return h.judged.trial.problem.layout.groups.trim_of_fin
 
 
 def better_trim(h: Hypothesis, told: Noise) -> Hypothesis | None:

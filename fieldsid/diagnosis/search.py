@@ -14,7 +14,7 @@ from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import is_noiseless, told_apart
 from fieldsid.diagnosis.forms import Plain, Shaping
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
-from fieldsid.diagnosis.laws import Trims, base_trial, error_by_law, speed_laws, under_other_law
+from fieldsid.diagnosis.laws import Trims, base_trial, error_by_law, law_of, speed_laws, under_other_law
 from fieldsid.diagnosis.remainder import is_odd
 from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
@@ -277,11 +277,12 @@ class Search:
 
     def _grown(self, best: Hypothesis) -> Hypothesis:
         """Return where a hypothesis leads to, itself where all its additions were tried."""
-        while frozenset(best.names) not in self.grown_from and len(best.names) < len(self.known) + LARGEST:
+        anew = False
+        while anew or (frozenset(best.names) not in self.grown_from and len(best.names) < len(self.known) + LARGEST):
             if best is not self.base() and not self.allowance.lasts():
                 break
             current = self._climbed(best)
-            if current is None:
+            if anew := current is None:
                 best = self.base()
                 continue
             self._thinned(current)
@@ -322,16 +323,15 @@ class Search:
             return False
         if judged is not None:
             self.family, again = judged.family, hypothesis_of(judged, self.validation)
+            self.tried, self.shaped, self.grown_from = {}, {}, set()
         elif again is not None:
-            self.trims.turned += 1
-            self.trim_of_fin = again.judged.trial.problem.layout.groups.trim_of_fin
-            self.free.clear()
-            self.flown_from.clear()
-        self.tried.clear()
-        self.shaped.clear()
-        self.grown_from.clear()
+            left, self.trim_of_fin = law_of(self.base()), law_of(again)
+            world = self.tried, self.shaped, self.grown_from, self.free, self.flown_from
+            world = self.trims.turn(self.family, world, law=left, other=self.trim_of_fin)
+            self.tried, self.shaped, self.grown_from, self.free, self.flown_from = world
         if again is not None and frozenset(again.names) != self.root:
-            self.tried[frozenset(again.names)] = with_free_run(again, self.floor)
+            known, again = self.tried.get(frozenset(again.names)), with_free_run(again, self.floor)
+            self.tried[frozenset(again.names)] = again if known is None or again.score > known.score else known
         return True
 
     def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis], paying: Hypothesis | None) -> Hypothesis | None:

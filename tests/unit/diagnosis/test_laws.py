@@ -80,3 +80,12 @@ def test_a_search_that_has_turned_twice_asks_no_more(asked):
     tried = {frozenset(): hypothesis(score=99.0), frozenset(("delay",)): found}
     assert Trims(turned=TURNS).asked(found, tried, FLOOR, FLOOR, Beside((), ()), lambda: 7) == (7, None)
     assert asked == []
+
+
+def test_a_search_that_comes_back_to_a_law_finds_what_it_had_tried():
+    trims, first = Trims(), ({}, {frozenset(): 1.0}, set(), {}, set())
+    second = trims.turn("disturbance", first, law=False, other=True)
+    assert second == ({}, {}, set(), {}, set())
+    assert trims.turn("disturbance", second, law=True, other=False) is first
+    assert trims.turn("both", first, law=False, other=True) == ({}, {}, set(), {}, set())
+    assert trims.turned == 3
