@@ -29,6 +29,8 @@ MORE, FOLLOWED = 3, 4
 """Effects beyond the `most` that the free run's screen follows for some rounds: far from an effect first order says little."""
 POINTS = 4
 """Scan points of an effect that are followed."""
+APART = 0.1
+"""Share of a run that two times of an event are apart from which on each is a way of its own."""
 SHIFTS, SHIFT_ROUNDS = 3, 12
 """Shifts of time that are followed, and for how many rounds."""
 
@@ -91,11 +93,20 @@ def by_effect(found: Sequence[Way]) -> list[list[Way]]:
 
 
 def brought(way: Way, parent: Hypothesis, known: Hypothesis) -> bool:
-    """Whether another way to the same hypothesis has brought what this one promises."""
+    """Whether another way to the same hypothesis has brought what this one promises, its events at about the same times."""
     trial, cost = known.judged.trial, way.promise.cost
+    if trial.problem.layout.names == way.promise.problem.layout.names and _apart(way.promise, trial.x):
+        return False
     if way.plain:
         return cost_of(trial.problem, trial.x, way.ground.noise) < (1.0 + GLIMPSE_PLAIN) * cost
     return known.judged.likelihood - parent.judged.likelihood > 0.5 * (way.ground.cost - cost) - SETTLED
+
+
+def _apart(promise: Promise, x: FloatArray) -> bool:
+    """Whether an event of a run begins so far from where x has it that one does not lead to the other."""
+    events = {c.name for c in promise.effect.nuisance if c.unit == "run"}
+    slots = promise.problem.layout.slots
+    return any(abs(a - b) > APART for s, a, b in zip(slots, promise.start, x, strict=True) if s.name in events)
 
 
 def _free_ground(parent: Hypothesis) -> Ground:

@@ -124,7 +124,11 @@ def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named(index: int
     assert found.final.validation.angle_rms_rad < 1.15 * case.floor["angle_rad"]
 
 
-@pytest.mark.parametrize(("seed", "index"), [(136, 15), (136, 50), (136, 29)], ids=("no better yet", "stands in", "another end"))
+@pytest.mark.parametrize(
+    ("seed", "index"),
+    [(136, 15), (136, 50), (136, 29), (171, 62)],
+    ids=("no better yet", "stands in", "another end", "other times of an event"),
+)
 def test_a_single_effect_is_found_whatever_law_of_the_trim_or_end_of_the_fit_hid_it(seed: int, index: int) -> None:
     case = make_case(index, seed)
     found = diagnosed(case)
