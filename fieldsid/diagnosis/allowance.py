@@ -15,7 +15,7 @@ class Allowance:
     """What a search over some runs may work out, and whether something was left untried for it."""
 
     runs: int
-    most: float = MOST
+    most: float
     ended: bool = False
     began: int = field(default_factory=done)
 

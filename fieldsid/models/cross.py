@@ -8,6 +8,8 @@ Source: Fossen 2011, section 7.1 (the linear sway mode of manoeuvring).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -27,10 +29,10 @@ def cross_speed(
     return smoothed(time, cross, beside=_drifts(time, np.interp(time, time[rate_ok], rate[rate_ok]), fin))
 
 
-def _drifts(time: FloatArray, rate: FloatArray, fin: FloatArray) -> list[FloatArray]:
-    """Return for every T the columns (n, 4) that a turning hull's drift is a sum of."""
+def _drifts(time: FloatArray, rate: FloatArray, fin: FloatArray) -> Iterator[FloatArray]:
+    """Yield for every T the columns (n, 4) that a turning hull's drift is a sum of."""
     steps, since = np.diff(time), time - time[0]
-    return [
+    return (
         np.column_stack([rate, behind(steps, rate, lag), behind(steps, fin, lag), np.exp(-since / lag)])
         for lag in LAGS_S.tolist()
-    ]
+    )

@@ -28,8 +28,8 @@ def depth_along(
     steps = np.diff(time)
     path = integrated(time, np.sin(pitch) if surge is None else surge * np.sin(pitch))
     # a heave behind the pitch rate has moved the hull by what is left of the pitch behind the same lag
-    columns = [
+    columns = (
         np.column_stack([path, pitch, behind(steps, pitch, lag), integrated(time, behind(steps, fin, lag))])
         for lag in LAGS_S.tolist()
-    ]
+    )
     return smoothed(time, depth, fastest_s=fastest_s, beside=columns)

@@ -11,7 +11,7 @@ Green and Silverman 1994, Nonparametric Regression and Generalized Linear Models
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -35,12 +35,12 @@ ENOUGH = 20_000
 
 
 def smoothed(
-    time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0, beside: Sequence[FloatArray] = ()
+    time: FloatArray, values: FloatArray, *, fastest_s: float = 0.0, beside: Iterable[FloatArray] | None = None
 ) -> FloatArray:  # fmt: skip
     """Return a signal (n,) without its noise and its gaps (NaN), at times (n,) s; T is at least `fastest_s` s.
 
     Values that a log repeats until the sensor's next one count once, and wild ones not at all. `beside` are rival sets of
-    columns (n, k) that the signal may be a sum of, but for what is smoothed.
+    columns (n, k), made as they are asked for, that the signal may be a sum of, but for what is smoothed.
     """
     ok = np.isfinite(values)
     full = np.interp(time, time[ok], values[ok])
@@ -55,9 +55,9 @@ def smoothed(
         return full
     weight, part = seen.astype(np.float64), slice(0, ENOUGH)
     trends = [(line, 0)]
-    if beside:
+    if beside is not None:
         # of all that is left beside the columns of each set, not of its slow part alone: sets differ in little else
-        best = min(beside, key=lambda columns: _left(np.column_stack([straight, columns])[part], full[part], seen[part]))
+        best = min(beside, key=lambda columns: _left(np.column_stack([straight[part], columns[part]]), full[part], seen[part]))
         trends.append((_fitted(np.column_stack([straight, best]), full, seen), best.shape[1]))
     stiffnesses, found = _stiffnesses(step, fastest_s), []
     for trend, spent in trends:

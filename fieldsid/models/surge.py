@@ -26,9 +26,9 @@ def surge_behind(time: FloatArray, surge: FloatArray, causes: Sequence[FloatArra
     T of the smoother is at least fastest_s s.
     """
     steps, since = np.diff(time), time - time[0]
-    columns = [
+    columns = (
         np.column_stack([*(behind(steps, cause, lag) for cause in causes), np.exp(-since / lag)]) for lag in LAGS_S.tolist()
-    ]
+    )
     return smoothed(time, surge, fastest_s=fastest_s, beside=columns)
 
 
