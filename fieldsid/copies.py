@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import select
 import signal
 import sys
 import threading
@@ -30,7 +31,7 @@ class Copy:
     """A copy of this process at work; left with an error it is ended."""
 
     def __init__(self, process: int, source: int) -> None:
-        self._process, self._stream = process, os.fdopen(source, "rb")
+        self.process, self._stream = process, os.fdopen(source, "rb")
 
     def answer(self) -> bytes | None:
         """Wait for what the copy has worked out and return it; None where it came to nothing."""
@@ -41,12 +42,21 @@ class Copy:
         return self
 
     def __exit__(self, error: object, *_more: object) -> None:
-        self._stream.close()
         if error is None:
-            _ENDING.append(self._process)
+            self._stream.close()
+            _ENDING.append(self.process)
             return
-        os.kill(self._process, signal.SIGKILL)
-        os.waitpid(self._process, 0)
+        self.end()
+
+    def is_at_work(self) -> bool:
+        """Whether the copy has not come to its end."""
+        return not select.select([self._stream], [], [], 0.0)[0]
+
+    def end(self) -> None:
+        """End the copy, whatever it is doing."""
+        self._stream.close()
+        os.kill(self.process, signal.SIGKILL)
+        os.waitpid(self.process, 0)
 
 
 def each(
@@ -61,7 +71,7 @@ def each(
     """
     if not 1 < len(items) < MOST:
         return [function(item) for item in items]
-    left = _numbers(len(items))
+    left = numbered(len(items))
     try:
         copy = copied(lambda: (write or written)(dict(_taken(function, items, left))))
         if copy is None:
@@ -76,7 +86,7 @@ def each(
     return [done[i] if i in done else function(item) for i, item in enumerate(items)]
 
 
-def _numbers(count: int) -> int:
+def numbered(count: int) -> int:
     """Return a pipe's end that gives each number below count once, to whoever reads it."""
     source, target = os.pipe()
     with os.fdopen(target, "wb") as stream:

@@ -116,4 +116,4 @@ def test_help_page_and_front_door_import_nothing_heavy():
         at_import = [n for n in tree.body if isinstance(n, (ast.Import, ast.ImportFrom))]
         modules = {getattr(n, "module", None) or n.names[0].name for n in at_import}
         own = {"fieldsid._version", "fieldsid.cli.catalogue", "fieldsid.cli.day"}
-        assert modules <= {"__future__", "atexit", "os", "sys", "typing", *own}
+        assert modules <= {"__future__", "atexit", "gc", "os", "sys", "typing", *own}

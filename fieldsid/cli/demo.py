@@ -16,7 +16,7 @@ import typer
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.options import Force, JsonFlag, OutputDir
-from fieldsid.cli.patience import compiling_first
+from fieldsid.cli.patience import compiling
 from fieldsid.errors import ArtifactError
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def command(
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
     """
     began = perf_counter()
-    with compiling_first():
+    with compiling():
         body = _tour(effect, output, began, force=force, quiet=as_json)
     return emit(body, as_json=as_json, render=lambda to: _render(to, body))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from fieldsid.logs.run import Run
 
 STDIN = Path("-")
+READING = ("pandas", "pyarrow")
+"""What takes most of the time of reading the first log. Once it is here a copy of the process has nothing to save."""
 
 
 def read_runs(
@@ -27,12 +30,13 @@ def read_runs(
 ) -> list[Run]:
     """Return the runs of the files, each with a name of its own, cut to `start` .. `end` s where given.
 
-    meanwhile: what this process does while a copy of it reads the files, where there can be one. Raises LogError for a file
-    that cannot be read, DataError where the cut leaves nothing.
+    meanwhile: what this process does while a copy of it reads the files, where there can be one and this process has not read
+    any before. Raises LogError for a file that cannot be read, DataError where the cut leaves nothing.
     """
     if list(paths).count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
-    known = _read_beside(paths, mapping, meanwhile) if meanwhile is not None and STDIN not in paths else None
+    pays = STDIN not in paths and not any(library in sys.modules for library in READING)
+    known = _read_beside(paths, mapping, meanwhile) if meanwhile is not None and pays else None
     runs = _apart(known or [_read(path, mapping) for path in paths], paths)
     if start is None and end is None:
         return runs

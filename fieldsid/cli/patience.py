@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -35,12 +35,25 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def compiling_first() -> Iterator[None]:
-    """Be inside what fits: the first time on a machine that compiles on two cores, and says so on a terminal."""
+def compiling() -> Iterator[Callable[[Sequence[Callable[..., object]]], None]]:
+    """Be inside what fits later: the first time on a machine a copy of this process compiles, and a terminal is told.
+
+    Yields what is to be called before the first fit, see `fitting.ahead.compiling_ahead`.
+    """
     from fieldsid.fitting.ahead import compiling_ahead
 
     console = messages()
-    with compiling_ahead(lambda text: console.print(text) if console.is_terminal else None):
+    with compiling_ahead(lambda text: console.print(text) if console.is_terminal else None) as help_along:
+        yield help_along
+
+
+@contextmanager
+def compiling_first() -> Iterator[None]:
+    """Be inside what fits at once: the first time on a machine that compiles on two cores."""
+    from fieldsid.fitting.ahead import DOORS
+
+    with compiling() as help_along:
+        help_along(DOORS)
         yield
 
 

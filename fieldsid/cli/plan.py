@@ -10,6 +10,7 @@ import typer
 
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.options import AxisOption, Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
+from fieldsid.cli.patience import compiling
 from fieldsid.models.axis import Axis
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ def command(
 
     Example: sysid plan --axis yaw --speeds 1.0,1.4,1.8 --want a22=5%,b2=3% --area 200x60 -o plan
     """
+    from fieldsid.planning.ahead import BESIDE, compile_plans
     from fieldsid.planning.ask import Asked, Limiting, planned
 
     limiting = Limiting(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
@@ -97,8 +99,11 @@ def command(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
         names_of(separate), diagnosis, seed, open_loop,
     )  # fmt: skip
-    with progress("planning", asked.legs) as step:
-        made = planned(asked, step)
+    with compiling() as help_along:
+        compile_plans()
+        help_along(BESIDE)
+        with progress("planning", asked.legs) as step:
+            made = planned(asked, step)
     files = [] if output is None else _written(made.plan, made.model, asked, output, write, figures=figures, force=force)
     body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
     result = emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body))

@@ -14,7 +14,10 @@ import numpy as np
 
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.errors import UsageError
-from fieldsid.fitting.fit import fit
+from fieldsid.fitting.descent import descend
+from fieldsid.fitting.layout import layout_of, speed_groups
+from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.start import start_vector
 from fieldsid.logs.run import FloatArray, Run
 from fieldsid.maneuvers import Limits, Maneuver, Schedule, all_maneuvers
 from fieldsid.models.axis import Axis
@@ -140,5 +143,6 @@ def misfit(model: Model, maneuver: Maneuver | None = None) -> float:
     The motion is that of the training maneuver if none is given.
     """
     record = record_of(flown(model, maneuver or training_maneuver(model), SPEED, SEED), model.axis)
-    left = fit([record], model.axis, method="output_error").predictions[0].residual
+    problem = Problem((record,), layout_of((record,), model.axis, (), speed_groups((record,))))
+    left, _ = problem.residual(descend(problem, start_vector((record,), problem.layout), NOISE).x, 0)
     return float(np.max(np.sqrt(np.mean(left**2, axis=1)) / (NOISE.angle, NOISE.rate)))

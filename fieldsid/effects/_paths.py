@@ -15,7 +15,7 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import FinPath
-from fieldsid.models.jit import jit
+from fieldsid.models.jit import inner, jit
 
 Map = Callable[[FloatArray], FloatArray]
 Part = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], object]
@@ -108,7 +108,7 @@ def join(pieces: FloatArray, lines: FloatArray, out: FloatArray) -> None:
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, lines[begins, 2], lines[k - 1, 3]
 
 
-@jit
+@inner
 def line_of_two_pieces(bend: float, first: float, middle: float, last: float) -> tuple[float, float]:
     """Return start and end of the line for a path first -> middle -> last that bends at the share `bend` in 0..1.
 

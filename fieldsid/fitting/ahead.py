@@ -1,32 +1,48 @@
-"""The first fit on a machine compiles for ten seconds: the motion's core in a second process, the noise's filters in this one."""
+"""The first fit on a machine compiles for ten seconds: in a copy of this process and, once it needs the result, in this one."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+import gc
+import os
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from time import sleep
 
 import numpy as np
 
+from fieldsid.copies import Copy, copied, numbered
 from fieldsid.effects import all_effects
 from fieldsid.fitting.descent import descend
-from fieldsid.fitting.kalman import filtered
+from fieldsid.fitting.kalman_abreast import abreast
+from fieldsid.fitting.kalman_both import both
+from fieldsid.fitting.kalman_sea import sea
+from fieldsid.fitting.kalman_sensors import sensors
 from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import estimate_noise
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
-from fieldsid.fitting.uncertainty import middle
-from fieldsid.fitting.whitening import noise_vector
+from fieldsid.fitting.uncertainty import middle, middle_of
+from fieldsid.fitting.whitening import noise_vector, whiten
 from fieldsid.models.axis import Axis
+from fieldsid.models.bent_core import bent_motion, bent_tangents
+from fieldsid.models.effect import effect_named, in_form
 from fieldsid.models.jit import is_compiled, is_loaded
-from fieldsid.models.kernels import tangents
+from fieldsid.models.lag import behind
+from fieldsid.models.linear_core import accumulate, linear_motion, linear_tangents
 from fieldsid.models.model import Noise
 from fieldsid.models.record import ROLES, Record
 
+Door = Callable[..., object]
 SAMPLES = 60
 WHITE = Noise(0.01, 0.01)
 STIRRED = Noise(0.01, 0.01, disturbance=0.01, disturbance_time=1.0)
+DOORS = (
+    linear_tangents, linear_motion, accumulate, bent_tangents, bent_motion, sea, sensors, both, abreast, middle_of, behind,
+)  # fmt: skip
+"""What a fit calls; JOBS compile it."""
+LOOK = 0.01
+"""Seconds from one look at what the other process has compiled to the next."""
 
 
 def a_record() -> Record:
@@ -40,9 +56,17 @@ def a_record() -> Record:
     )  # fmt: skip
 
 
-def compile_filters() -> None:
-    """Call what judges noise once."""
-    _estimate("disturbance")
+def _a_problem() -> tuple[Problem, Record]:
+    record = a_record()
+    return Problem((record,), layout_of((record,), Axis.YAW, (), speed_groups((record,)))), record
+
+
+def _linear() -> None:
+    problem, record = _a_problem()
+    x = start_vector((record,), problem.layout)
+    problem.linearise(x, 0)
+    problem.residual(x, 0)
+    descend(problem, x, WHITE, rounds=1)
 
 
 def _estimate(family: str) -> None:
@@ -50,52 +74,108 @@ def _estimate(family: str) -> None:
     estimate_noise([record], [(1.0, 0.0)], [record.both], family, STIRRED)
 
 
-def compile_motion() -> None:
-    """Call what moves, fits and says how sure it is once, then each effect, and last what few fits need."""
-    records = (a_record(),)
-    problem = Problem(records, layout_of(records, Axis.YAW, (), speed_groups(records)))
-    x = start_vector(records, problem.layout)
-    descend(problem, x, WHITE, rounds=1)
-    result = problem.linearise(x, 0)
-    problem.residual(x, 0)
-    middle(records[0], noise_vector(STIRRED), 1.0, 0.0, result.sensitivity)
+def _stirred() -> None:
+    record = a_record()
+    behind(record.steps, record.rate, 1.0)
+    _estimate("disturbance")
+
+
+def _all_noisy() -> None:
+    record = a_record()
+    whiten(record, replace(STIRRED, coloured_rate=0.01), 1.0, 0.0, record.both[None])
+    _estimate("both")
+
+
+def _sure() -> None:
+    middle(a_record(), noise_vector(STIRRED), 1.0, 0.0, np.ones((1, 2, SAMPLES)))
+
+
+def _bent() -> None:
+    problem, _ = _a_problem()
+    more = problem.with_effects((effect_named("quadratic_damping"),))
+    more.linearise(more.start(), 0)
+    more.residual(more.start(), 0)
+
+
+def _effects() -> None:
+    problem, _ = _a_problem()
     effects = all_effects(Axis.YAW).values()
-    for own in (*((e,) for e in effects), tuple(e for e in effects if e.fin is not None)):
+    at_fin = tuple(e for e in effects if e.fin is not None)
+    for own in (*((e,) for e in effects), at_fin, *((in_form(e, f),) for e in at_fin for f in e.forms)):
         more = problem.with_effects(own)
         more.linearise(more.start(), 0)
-    _estimate("both")
+
+
+JOBS: tuple[Callable[[], None], ...] = (
+    _linear, _stirred, _bent, _all_noisy, lambda: _estimate("coloured"), _sure, _effects,
+)  # fmt: skip
+"""Each calls once some of what fits and searches need, what is needed first before the rest."""
+
+
+def compile_all() -> None:
+    """Call everything once that a fit and a search for what is missing use."""
+    for job in JOBS:
+        job()
 
 
 def load_compiled() -> None:
     """Load what an earlier process compiled, once; nothing where that must still be done."""
-    if not is_loaded(tangents) and is_compiled(tangents) and is_compiled(filtered):
-        compile_filters()
-        compile_motion()
+    if not is_loaded(bent_tangents) and _are_compiled(DOORS):
+        compile_all()
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """Compiling under way: the jobs nobody has begun, and the copy of this process that does them one by one."""
+
+    left: int
+    copy: Copy | None
+
+    def help_along(self, doors: Sequence[Door] = DOORS) -> None:
+        """Do what nobody has begun until everything asked for is compiled, and wait for what the copy is at."""
+        while not _are_compiled(doors):
+            number = os.read(self.left, 1)
+            if number:
+                JOBS[number[0]]()
+            elif self.copy is None or not self.copy.is_at_work():
+                return
+            else:
+                sleep(LOOK)
+
+
+_UNDER_WAY: list[Ahead] = []
 
 
 @contextmanager
-def compiling_ahead(tell: Callable[[str], None] = lambda _text: None) -> Iterator[None]:
-    """Compile what a fit needs, in two processes, before and while what is inside runs, if this machine has not done so yet.
+def compiling_ahead(tell: Callable[[str], None] = lambda _text: None) -> Iterator[Callable[[Sequence[Door]], None]]:
+    """Compile what fits need in a copy of this process while what is inside runs, if this machine has not done so yet.
 
-    What is inside compiles itself what it needs sooner; the second process is ended with it.
+    Yields what is to be called before the first fit, with what is needed of DOORS: it helps. Where no copy is to be had it does
+    all of it; what is inside compiles itself what it needs sooner. The copy is ended with what is inside.
     """
-    if is_compiled(filtered):
-        yield
+    if _UNDER_WAY or _are_compiled(DOORS):
+        yield _UNDER_WAY[-1].help_along if _UNDER_WAY else lambda _doors: None
         return
     tell("first run on this machine: compiling, about ten seconds, once")
-    command, quiet = [sys.executable, "-P", "-m", __name__], subprocess.DEVNULL
+    left = numbered(len(JOBS))
+    copy = copied(lambda: _compiled(left))
+    _UNDER_WAY.append(Ahead(left, copy))
     try:
-        other = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
-    except OSError:  # where no second process is to be had, what is inside compiles it all
-        yield
-        return
-    with other:
-        try:
-            compile_filters()
-            yield
-        finally:
-            other.kill()
+        yield _UNDER_WAY[-1].help_along
+    finally:
+        _UNDER_WAY.pop()
+        os.close(left)
+        if copy is not None:
+            copy.end()
 
 
-if __name__ == "__main__":
-    compile_motion()
+def _compiled(left: int) -> bytes:
+    """Compile in a copy, without looking for what could be given back: it makes millions of things, and ends."""
+    gc.disable()
+    while number := os.read(left, 1):
+        JOBS[number[0]]()
+    return b""
+
+
+def _are_compiled(doors: Sequence[Door]) -> bool:
+    return all(is_compiled(door) for door in doors)

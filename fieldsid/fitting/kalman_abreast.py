@@ -1,6 +1,6 @@
 """The Kalman filter of one residual under eight noises abreast, all of sea and sensors that wander.
 
-What kalman_waking.py does sample by sample for one noise is done here in lanes of one loop, which a processor takes several
+What kalman_both.py does sample by sample for one noise is done here in lanes of one loop, which a processor takes several
 of at once. A wander of half a minute lets the gains settle nowhere in a run: nothing is gained by looking whether they have.
 """
 

@@ -43,19 +43,22 @@ def innovated(
     """
     if place.size < noise.size:
         errors, spreads = np.empty((1, *residual.shape)), np.empty(residual.shape)
-        filtered(record.even, record.ok, a, k, noise, np.ascontiguousarray(residual[None]), errors, spreads)
-        return _innovated(errors[0], spreads)
+        logs = filtered(record.even, record.ok, a, k, noise, np.ascontiguousarray(residual[None]), errors, spreads)
+        return _innovated(errors[0], spreads, logs)
     errors, spreads = np.empty((LANES, *residual.shape)), np.empty((LANES, *residual.shape))
     noises = np.tile(noise, (LANES, 1))
     noises[np.arange(1, place.size), place[1:]] *= MOVED
     abreast(record.even, record.ok, a, k, noises, residual, errors, spreads)
     # copies: the first rows become those of the first number moved
-    return _innovated(errors[0].copy(), spreads[0].copy(), (errors[: place.size], spreads[: place.size]))
+    wide = spreads[0].copy()
+    return _innovated(errors[0].copy(), wide, 2.0 * float(np.log(wide).sum()), (errors[: place.size], spreads[: place.size]))
 
 
-def _innovated(errors: FloatArray, spreads: FloatArray, moved: tuple[FloatArray, FloatArray] | None = None) -> Innovated:
-    e, s = errors.ravel(), spreads.ravel()
-    return Innovated(e, s, -0.5 * (2.0 * float(np.log(s).sum()) + float(e @ e)), moved)
+def _innovated(
+    errors: FloatArray, spreads: FloatArray, logs: float, moved: tuple[FloatArray, FloatArray] | None = None
+) -> Innovated:
+    e = errors.ravel()
+    return Innovated(e, spreads.ravel(), -0.5 * (logs + float(e @ e)), moved)
 
 
 def information(

@@ -17,7 +17,7 @@ from fieldsid.models.record import Record
 
 
 @jit
-def _middle(
+def middle_of(
     steps: FloatArray,
     ok: npt.NDArray[np.bool_],
     a: float,
@@ -75,7 +75,7 @@ def _middle(
 def middle(record: Record, noise: FloatArray, damping: float, stiffness: float, weighted: FloatArray) -> FloatArray:
     """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise vector (7,)."""
     out = np.zeros((weighted.shape[0], weighted.shape[0]))
-    _middle(
+    middle_of(
         record.even, record.ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
         np.ascontiguousarray(weighted), out,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""One typed door to numba: `@jit` compiles a function once, caches it on disk and keeps its signature."""
+"""One typed door to numba: `@jit` compiles a function once and caches it on disk, `@inner` what it calls."""
 
 from __future__ import annotations
 
@@ -15,6 +15,13 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function compiled by numba, without Python objects, division by zero giving inf as in NumPy."""
     numba: Any = import_module("numba")
     return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy")(function))
+
+
+def inner(function: Callable[P, R]) -> Callable[P, R]:
+    """Return the function as it is, which functions of `jit` may call: compiled with them, without a door from Python."""
+    numba: Any = import_module("numba.extending")
+    door = numba.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return cast("Callable[P, R]", door(function))
 
 
 def plain_of(function: Callable[P, R]) -> Callable[P, R]:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.jit import jit
+from fieldsid.models.jit import inner, jit
 
 IntArray = npt.NDArray[np.intp]
 PARAMETERS = ("damping", "stiffness", "authority", "trim", "angle0", "rate0")
@@ -22,7 +22,7 @@ FEWEST = 16
 """Intervals below which working the map out costs more than it saves."""
 
 
-@jit
+@inner
 def _slope(a: float, k: float, z: FloatArray, moment: float, out: FloatArray) -> None:
     """Fill out (6,) with the derivative of (y, p) and of its tangents by a and by k."""
     out[0], out[1] = z[1], -a * z[1] - k * z[0] + moment
@@ -30,7 +30,7 @@ def _slope(a: float, k: float, z: FloatArray, moment: float, out: FloatArray) ->
     out[4], out[5] = z[5], -a * z[5] - k * z[4] - z[0]
 
 
-@jit
+@inner
 def _unit_response(a: float, k: float, h: float, pieces: int, unit: int, z: FloatArray, room: FloatArray) -> None:
     """Fill z (6,) with what a unit of y (0), p (1), or of the moment at the start (2) or end (3) becomes over h."""
     z[:] = 0.0
@@ -49,13 +49,13 @@ def _unit_response(a: float, k: float, h: float, pieces: int, unit: int, z: Floa
             z[l] += s / 6.0 * (room[0, l] + 2.0 * room[1, l] + 2.0 * room[2, l] + room[3, l])
 
 
-@jit
+@inner
 def _small(value: float) -> float:
     """Return zero for what is too small to matter: numbers below the normal ones cost eightfold."""
     return 0.0 if abs(value) < 1e-150 else value
 
 
-@jit
+@inner
 def spoil(out: FloatArray, first: int) -> None:
     """Set the rows of out (n, p) from `first` on to NaN."""
     for i in range(first, out.shape[0]):
@@ -63,7 +63,42 @@ def spoil(out: FloatArray, first: int) -> None:
             out[i, l] = np.nan
 
 
-@jit
+@inner
+def spoil_all(sens: FloatArray, first: int) -> None:
+    """Set the samples of sens (P, 2, n) from `first` on to NaN."""
+    for j in range(sens.shape[0]):
+        for i in range(first, sens.shape[2]):
+            sens[j, 0, i] = sens[j, 1, i] = np.nan
+
+
+@inner
+def turns(c: FloatArray) -> bool:
+    """Whether any of the constants (14,) goes with the sine or the cosine of the angle."""
+    return bool(abs(c[3]) + abs(c[4]) + abs(c[5]) + abs(c[6]) + abs(c[11]) + abs(c[12]) != 0.0)
+
+
+@inner
+def crosses_by(c: FloatArray) -> bool:
+    """Whether any of the constants (14,) is of the cross state."""
+    return bool(abs(c[7]) + abs(c[8]) + abs(c[9]) != 0.0)
+
+
+@inner
+def crosses(drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
+    """Whether the cross state is anything but zero."""
+    push = abs(start[2])
+    for i in range(drive.shape[0]):
+        push += abs(drive[i, 5])
+    return push != 0.0 or crosses_by(c)
+
+
+@inner
+def is_linear(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
+    """Whether a motion is linear in (y, p) alone, and goes by even intervals."""
+    return c[0] == 0.0 and c[1] == 0.0 and is_even(steps, drive) and not (turns(c) or crosses(drive, c, start))
+
+
+@inner
 def is_even(steps: FloatArray, drive: FloatArray) -> bool:
     """Whether steps (n-1,), damping and stiffness, the first two of the drives (n-1, 8), are alike over many intervals."""
     if steps.shape[0] < FEWEST:
@@ -74,7 +109,7 @@ def is_even(steps: FloatArray, drive: FloatArray) -> bool:
     return True
 
 
-@jit
+@inner
 def _responses(a: float, k: float, h: float, pieces: int, u: FloatArray, room: FloatArray) -> None:
     """Fill u (4, 6) with what units of y, p, and of the moment at both ends become over h, and its tangents by a and k."""
     for unit in range(4):
@@ -82,14 +117,17 @@ def _responses(a: float, k: float, h: float, pieces: int, u: FloatArray, room: F
 
 
 @jit
-def linear_motion(steps: FloatArray, drive: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> None:
-    """Fill out (n, 3) with angle and rate over even intervals, NaN from where it diverges on."""
+def linear_motion(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> bool:
+    """Fill out (n, 3) as `kernels.simulate` does where the motion is linear and even; return whether it is."""
+    if not is_linear(steps, drive, c, start):
+        return False
     u, room = np.zeros((4, 6)), np.zeros((5, 6))
     _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, room)
     _move(u, drive, start, out)
+    return True
 
 
-@jit
+@inner
 def _move(u: FloatArray, drive: FloatArray, start: FloatArray, out: FloatArray) -> int:
     """Fill out (n, 3) by the responses of an interval; return the samples before the motion diverges."""
     y, p = start[0], start[1]
@@ -106,10 +144,17 @@ def _move(u: FloatArray, drive: FloatArray, start: FloatArray, out: FloatArray) 
 
 @jit
 def linear_tangents(
-    steps: FloatArray, drive: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
-    factor: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
-) -> None:  # fmt: skip
-    """Fill out (n, 3) and sens (P, 2, n) over even intervals, as `tangents` of models/kernels.py does."""
+    steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
+    factor: FloatArray, d_c: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
+) -> bool:  # fmt: skip
+    """Fill out (n, 3) and sens (P, 2, n) as `kernels.tangents` does where all is linear and even; return whether it is."""
+    bent = 0.0
+    for j in range(d_c.shape[0]):
+        bent += abs(d_start[j, 2]) + abs(factor[j, 5])
+        for l in range(d_c.shape[1]):
+            bent += abs(d_c[j, l])
+    if bent != 0.0 or not is_linear(steps, drive, c, start):
+        return False
     u, room = np.zeros((4, 6)), np.zeros((5, 6))
     _responses(drive[0, 0], drive[0, 1], steps[0], pieces, u, room)
     whole = _move(u, drive, start, out)
@@ -133,7 +178,8 @@ def linear_tangents(
                 to_p += k * (u[0, 5] * at_y + u[1, 5] * at_p + u[2, 5] * m0 + u[3, 5] * m1)
             y, p = _small(to_y), _small(to_p)
             sens[j, 0, i + 1], sens[j, 1, i + 1] = y, p
-        spoil(sens[j].T, whole)
+    spoil_all(sens, whole)
+    return True
 
 
 @jit

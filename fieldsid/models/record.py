@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -65,6 +66,8 @@ class Record:
     """Where they were measured, (2, n)."""
     is_whole: bool = field(init=False)
     """Whether both were measured throughout."""
+    lost: FloatArray | None = field(init=False)
+    """Share of the samples of each interval that the log has lost, (n-1,), None where it has lost none."""
     commanded: FinPath = field(init=False)
     """The fin as logged, as a path over the intervals."""
 
@@ -77,6 +80,7 @@ class Record:
         object.__setattr__(self, "both", np.stack([self.angle, self.rate]))
         object.__setattr__(self, "ok", np.stack([self.angle_ok, self.rate_ok]))
         object.__setattr__(self, "is_whole", bool(self.ok.all()))
+        object.__setattr__(self, "lost", _lost(steps, usual) if self.fin_is_held else None)
         object.__setattr__(self, "commanded", self.given(self.early))
 
     def __len__(self) -> int:
@@ -87,27 +91,33 @@ class Record:
         if not self.fin_is_held:
             return FinPath(self.fin[:-1], self.fin[1:])
         if early is None:
-            lost = self._lost()
-            return FinPath(self.fin[:-1], self.fin[:-1] if lost is None else self.fin[:-1] + np.diff(self.fin) * lost)
+            return FinPath(self.fin[:-1], self.fin[:-1] if self.lost is None else self.fin[:-1] + np.diff(self.fin) * self.lost)
         return _jumping(self.fin, np.clip(early[1:] / self.steps, 0.0, 1.0), np.clip(-early[:-1] / self.steps, 0.0, 1.0))
 
-    def _lost(self) -> FloatArray | None:
-        """Return the share of the samples of each interval that the log has lost, (n-1,), None where it has lost none.
-
-        What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
-        A log without a usual step has lost nothing that could be told.
-        """
-        usual = float(np.median(self.steps)) if self.steps.size else 0.0
-        if not np.mean(np.abs(self.steps - usual) < JITTER * usual) > REGULAR:
-            return None
-        count = np.rint(self.steps / usual)
-        return None if (count <= 1.0).all() else 1.0 - 1.0 / np.maximum(count, 1.0)
+    def with_fin(self, fin: FloatArray) -> Record:
+        """Return the record with another fin, (n,) rad, and all else as it is."""
+        other = copy(self)
+        object.__setattr__(other, "fin", fin)
+        object.__setattr__(other, "commanded", other.given(other.early))
+        return other
 
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""
         if role not in self.signals:
             raise EffectError(f"run {self.name!r} has no {role} signal", found=", ".join(sorted(self.signals)) or "none")
         return self.signals[role]
+
+
+def _lost(steps: FloatArray, usual: float) -> FloatArray | None:
+    """Return the share of the samples of each interval that a log of a usual step has lost, (n-1,), None where it has lost none.
+
+    What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
+    A log without a usual step has lost nothing that could be told.
+    """
+    if not np.count_nonzero(np.abs(steps - usual) < JITTER * usual) > REGULAR * steps.size:
+        return None
+    count = np.rint(steps / usual)
+    return None if (count <= 1.0).all() else 1.0 - 1.0 / np.maximum(count, 1.0)
 
 
 def _jumping(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers import Autopilot, Limits
-from fieldsid.models import kernels
+from fieldsid.models.bent_core import bent_motion
 from fieldsid.models.jit import jit
 from fieldsid.models.signal_path import Assembled, assemble, fin_path
 from fieldsid.planning.scene import Scene
@@ -61,7 +61,7 @@ def closed_loop(
         drive[i, 2] += push[i, 0] * start
         drive[i, 3] += push[i, 1] * end
         drive[i, 5] += push[i, 2] * 0.5 * (start + end)
-        kernels.simulate(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
+        bent_motion(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
         # Number by number: an array put into another compiles its own error message, two seconds of it.
         for l in range(3):
             state[l] = pair[1, l]

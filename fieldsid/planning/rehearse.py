@@ -43,7 +43,7 @@ class ModelPlant:
 
     def logged(self) -> Trajectory:
         """Return what the sensors log of the fin so far, the last one held to the record's end."""
-        return simulate(self.scene.model, replace(self.record, fin=self.fin), state=(0.0, 0.0, 0.0), effects=self.scene.effects)
+        return simulate(self.scene.model, self.record.with_fin(self.fin), state=(0.0, 0.0, 0.0), effects=self.scene.effects)
 
 
 def rehearse(

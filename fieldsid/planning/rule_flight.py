@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
 from fieldsid.models import kernels
+from fieldsid.models.bent_core import bent_motion
 from fieldsid.models.jit import jit
 from fieldsid.planning.loop import ACTUATOR_ROUNDS, fin_offset, prepared
 from fieldsid.planning.scene import Scene
@@ -28,7 +29,7 @@ def advance_all(
         now[0, 2] += push[i, 0] * start[i]
         now[0, 3] += push[i, 1] * end[i]
         now[0, 5] += push[i, 2] * 0.5 * (start[i] + end[i])
-        kernels.simulate(steps, now, c[i], state[i], pieces, pair)
+        bent_motion(steps, now, c[i], state[i], pieces, pair)
         for j in range(3):
             state[i, j] = pair[1, j]
 

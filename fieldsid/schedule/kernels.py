@@ -6,8 +6,8 @@ The integral is held while the fin is at its stop and the error would push it on
 from __future__ import annotations
 
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.jit import jit
-from fieldsid.models.kernels import power_drag
+from fieldsid.models.bent_core import power_drag
+from fieldsid.models.jit import inner, jit
 
 PLANT = 14
 """Columns of a plant's row: damping, stiffness, authority, offset, quadratic, beyond_square, crossflow, cross_damping,
@@ -16,7 +16,7 @@ LOOP = 8
 """Entries of a loop: kp, ki, kd, bias, reference gain, fin limit, depth gain, pitch limit."""
 
 
-@jit
+@inner
 def drag(p: float, of_power: float, beyond: float, square: float) -> float:
     """Return the drag at a rate: of_power p|p| (|p|/0.2)^beyond + square p|p|."""
     value = square * p * abs(p)

@@ -23,8 +23,14 @@ def files(tmp_path_factory):
     return [trial.flown(folder, seed=k, name=f"run{k}") for k in (1, 2)]
 
 
+@pytest.fixture
+def nothing_read(monkeypatch):
+    """As in a process that has not read a log before."""
+    monkeypatch.setattr(inputs, "READING", ())
+
+
 @needs_copies
-def test_runs_read_beside_other_work_are_those_read_alone(files):
+def test_runs_read_beside_other_work_are_those_read_alone(files, nothing_read):
     done: list[int] = []
     beside = read_runs(files, meanwhile=lambda: done.append(os.getpid()))
     assert done == [os.getpid()]
@@ -37,7 +43,7 @@ def test_runs_read_beside_other_work_are_those_read_alone(files):
 
 
 @needs_copies
-def test_the_files_are_read_in_the_copy(files, monkeypatch):
+def test_the_files_are_read_in_the_copy(files, nothing_read, monkeypatch):
     here = os.getpid()
     read = inputs._read
 
@@ -49,7 +55,13 @@ def test_the_files_are_read_in_the_copy(files, monkeypatch):
     assert [run.name for run in read_runs(files, meanwhile=lambda: None)] == ["run1", "run2"]
 
 
-def test_what_is_wrong_with_a_file_is_told_as_ever(files, tmp_path):
+def test_a_process_that_has_read_logs_before_reads_them_itself(files, monkeypatch):
+    read_runs(files)
+    monkeypatch.setattr(inputs, "copied", lambda _work: pytest.fail("a copy was made"))
+    assert [run.name for run in read_runs(files, meanwhile=lambda: None)] == ["run1", "run2"]
+
+
+def test_what_is_wrong_with_a_file_is_told_as_ever(files, nothing_read, tmp_path):
     (tmp_path / "cut.csv").write_text("time_s,yaw_rad\n")
     for meanwhile in (None, lambda: None):
         with pytest.raises(LogError):

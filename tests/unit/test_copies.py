@@ -45,7 +45,7 @@ def test_an_error_beside_a_copy_ends_it():
     with pytest.raises(ValueError, match="here"), copied(lambda: [threading.Event().wait(60.0), b""][1]) as copy:
         raise ValueError("here")
     with pytest.raises(ChildProcessError):
-        os.waitpid(copy._process, os.WNOHANG)
+        os.waitpid(copy.process, os.WNOHANG)
 
 
 @needs_copies

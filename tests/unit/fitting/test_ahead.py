@@ -1,25 +1,33 @@
-"""What is compiled ahead is what a fit uses, and a machine that has compiled it starts no second process."""
+"""What is compiled ahead is what a fit uses, and a machine that has compiled it makes no copy."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
 
 import pytest
 
-from fieldsid.fitting import ahead, kalman, uncertainty
-from fieldsid.models import kernels, linear_core
+from fieldsid.copies import can_copy
+from fieldsid.fitting import ahead
 from fieldsid.models.jit import is_compiled, plain_of
 
-USED = "filtered _middle simulate tangents accumulate"
+needs_copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
+EVERY = """
+from fieldsid.fitting import ahead
+ahead.compile_all()
+print(all(door.signatures for door in ahead.DOORS))
+"""
 
 AGAIN = """
-from fieldsid.fitting import ahead, kalman, uncertainty
-from fieldsid.models import kernels, linear_core
+from fieldsid.fitting import ahead
 import numpy as np
-doors = (kalman.filtered, uncertainty._middle, kernels.simulate, kernels.tangents, linear_core.accumulate)
-ahead.compile_filters()
-ahead.compile_motion()
+doors = ahead.DOORS
+ahead.compile_all()
 known = [d.signatures for d in doors]
 from dataclasses import replace
 from fieldsid.fitting.fit import fit
@@ -44,14 +52,9 @@ def test_a_fit_compiles_nothing_more():
     assert done.stdout.strip() == "True"
 
 
-@pytest.mark.parametrize(
-    "function",
-    [kalman.filtered, uncertainty._middle, kernels.simulate, kernels.tangents, linear_core.accumulate],
-    ids=USED.split(),
-)
+@pytest.mark.parametrize("function", ahead.DOORS, ids=lambda door: door.__name__)
 def test_a_function_counts_as_compiled_once_it_was_called(function):
-    ahead.compile_filters()
-    ahead.compile_motion()
+    ahead.compile_all()
     assert is_compiled(function)
     assert is_compiled(plain_of(function))
 
@@ -67,33 +70,72 @@ def test_what_was_never_called_is_not_compiled(tmp_path, monkeypatch):
     assert is_compiled(fresh.twice)
 
 
-def test_the_second_process_runs_only_where_nothing_is_compiled_and_ends_with_the_work(monkeypatch):
-    begun, told = [], []
-    real = subprocess.Popen
+@pytest.fixture
+def jobs(monkeypatch):
+    """Stand-ins for what is compiled: a job's door is open once the job is done, in whichever process."""
+    folder: list[Path] = []
 
-    def started(*args, **kwargs):
-        begun.append(real([sys.executable, "-c", "import time; time.sleep(60)"], **kwargs))
-        return begun[-1]
+    def made(tmp_path: Path, seconds: Sequence[float]) -> list[Path]:
+        def job(door: Path, length: float) -> None:
+            time.sleep(length)
+            door.write_text(str(os.getpid()))
 
-    monkeypatch.setattr(ahead.subprocess, "Popen", started)
+        folder[:] = [tmp_path / str(i) for i in range(len(seconds))]
+        monkeypatch.setattr(ahead, "DOORS", tuple(folder))
+        monkeypatch.setattr(ahead, "JOBS", tuple(partial(job, *of) for of in zip(folder, seconds, strict=True)))
+        monkeypatch.setattr(ahead, "is_compiled", lambda door: door.exists())
+        return folder
+
+    return made
+
+
+@needs_copies
+def test_a_copy_compiles_only_where_something_is_not_compiled_and_ends_with_the_work(jobs, monkeypatch, tmp_path):
+    made, told = [], []
+    real = ahead.copied
+    monkeypatch.setattr(ahead, "copied", lambda work: made.append(real(work)) or made[-1])
+    jobs(tmp_path, [])
     with ahead.compiling_ahead(told.append):
         pass
-    ahead.compile_filters()
-    assert len(begun) == len(told) <= 1
-    monkeypatch.setattr(ahead, "is_compiled", lambda _function: False)
-    with ahead.compiling_ahead(told.append):
-        assert begun[-1].poll() is None
-    assert begun[-1].poll() is not None
-    assert told[-1].startswith("first run")
+    assert made == told == []
+    jobs(tmp_path, [60.0])
+    with ahead.compiling_ahead(told.append), ahead.compiling_ahead(told.append):
+        (copy,) = made
+        assert copy.is_at_work()
+    with pytest.raises(ChildProcessError):
+        os.waitpid(copy.process, 0)
+    (said,) = told
+    assert said.startswith("first run")
 
 
-def test_without_a_second_process_the_work_goes_on(monkeypatch):
-    def refused(*_args, **_kwargs):
-        raise PermissionError
+@needs_copies
+def test_what_is_left_is_shared_with_the_copy_until_what_is_asked_for_is_there(jobs, tmp_path):
+    doors = jobs(tmp_path, [0.5, 0.0, 0.0])
+    with ahead.compiling_ahead() as help_along:
+        time.sleep(0.2)  # the copy is at the first
+        help_along(doors[1:2])
+        assert [door.exists() for door in doors] == [False, True, False]
+        help_along(doors[:1])
+        assert [door.exists() for door in doors] == [True, True, True]
+    assert doors[0].read_text() != doors[1].read_text() == doors[2].read_text() == str(os.getpid())
 
-    monkeypatch.setattr(ahead, "is_compiled", lambda _function: False)
-    monkeypatch.setattr(ahead.subprocess, "Popen", refused)
-    done = []
-    with ahead.compiling_ahead():
-        done.append(True)
-    assert done
+
+def test_without_a_copy_all_of_it_is_done_here(jobs, monkeypatch, tmp_path):
+    monkeypatch.setattr(ahead, "copied", lambda _work: None)
+    doors = jobs(tmp_path, [0.0, 0.0])
+    with ahead.compiling_ahead() as help_along:
+        assert not any(door.exists() for door in doors)
+        help_along(doors)
+    assert {door.read_text() for door in doors} == {str(os.getpid())}
+
+
+def test_what_no_job_compiles_is_not_waited_for(jobs, tmp_path):
+    doors = jobs(tmp_path, [0.0])
+    with ahead.compiling_ahead() as help_along:
+        help_along([*doors, tmp_path / "never"])
+    assert doors[0].exists()
+
+
+def test_every_job_calls_what_it_is_there_for():
+    called = subprocess.run([sys.executable, "-c", EVERY], capture_output=True, text=True, check=True)
+    assert called.stdout.split() == ["True"]

@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fieldsid.models import kernels
+from fieldsid.models.bent_core import bent_motion, bent_tangents
 from fieldsid.models.jit import plain_of
-from fieldsid.models.linear_core import accumulate
+from fieldsid.models.linear_core import accumulate, is_even, linear_motion, linear_tangents
 from fieldsid.models.signal_path import pieces_for
 
 N, H = 80, 0.05
@@ -66,7 +67,7 @@ def test_the_compiled_core_gives_the_numbers_of_its_python_source():
     steps, c, start = np.full(N - 1, H), np.array(list(C.values())), np.array([0.1, -0.05, 0.02])
     fast, slow = np.empty((N, 3)), np.empty((N, 3))
     kernels.simulate(steps, drive(), c, start, 1, fast)
-    plain_of(kernels.simulate)(steps, drive(), c, start, 1, slow)
+    plain_of(bent_motion)(steps, drive(), c, start, 1, slow)
     np.testing.assert_allclose(fast, slow, rtol=1e-12, atol=1e-15)
 
 
@@ -150,33 +151,63 @@ def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear
 
 @pytest.mark.parametrize("pieces", [1, 3])
 @pytest.mark.parametrize("what", ["a straight motion", "one without bound", "a single run's own start"])
-def test_the_linear_core_moves_as_the_general_one(monkeypatch, pieces, what):
+def test_the_linear_core_moves_as_the_general_one(pieces, what):
     rows, start, columns, places, factors, _ = drive(), np.array([0.1, -0.05, 0.0]), *pushed()
     steps, rows[:, 0] = np.full(N - 1, H), -9.0 if what == "one without bound" else 1.1
     rows[:, 4], rows[:, 5:] = 1.0, 0.0
     d_start = np.eye(4, 3) if what == "a single run's own start" else np.zeros((4, 3))
     d_start[:, 2], none = 0.0, np.zeros((4, 14))
     found = []
-    for even in (True, False):
+    for move, with_tangents in (
+        (kernels.simulate, kernels.tangents),
+        (plain_of(linear_motion), plain_of(linear_tangents)),
+        (bent_motion, bent_tangents),
+    ):
         path, out, sens = np.empty((N, 3)), np.empty((N, 3)), np.empty((4, 2, N))
-        if not even:
-            monkeypatch.setattr(kernels, "is_even", lambda *_: False)
-        assert plain_of(kernels.is_even)(steps, rows) == even
-        plain_of(kernels.simulate)(steps, rows, LINEAR, start, pieces, path)
-        plain_of(kernels.tangents)(steps, rows, LINEAR, start, pieces, columns, places, factors, none, d_start, out, sens)
-        np.testing.assert_array_equal(path, out)
+        move(steps, rows, LINEAR, start, pieces, path)
+        with_tangents(steps, rows, LINEAR, start, pieces, columns, places, factors, none, d_start, out, sens)
+        np.testing.assert_allclose(path, out, rtol=1e-12, atol=1e-15)
         found.append((out, sens))
     assert np.isnan(found[0][0]).any() == (what == "one without bound")
-    for fast, slow in zip(*found, strict=True):
-        np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-12)
+    for other in found[1:]:
+        for fast, slow in zip(found[0], other, strict=True):
+            np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [n for n in kernels.CONSTANTS if n not in {"length", "beyond_square", "heading_turn"}])
+def test_a_motion_that_any_constant_bends_is_not_taken_for_a_linear_one(name):
+    """Nor are its tangents, where only a parameter's derivative is of the constant."""
+    steps, rows, c, start, at = np.full(N - 1, H), drive(), LINEAR.copy(), np.zeros(3), kernels.CONSTANTS.index(name)
+    rows[:, 0], rows[:, 4], rows[:, 5:] = 1.1, 1.0, 0.0
+    out, sens = np.empty((N, 3)), np.empty((1, 2, N))
+    assert linear_motion(steps, rows, c, start, 1, out)
+    d_c, none = np.zeros((1, 14)), np.zeros((1, 3))
+    assert linear_tangents(steps, rows, c, start, 1, *NOTHING(1), d_c, none, out, sens)
+    d_c[0, at] = -1e-9
+    assert not linear_tangents(steps, rows, c, start, 1, *NOTHING(1), d_c, none, out, sens)
+    c[at] = -0.1
+    assert not linear_motion(steps, rows, c, start, 1, out)
+
+
+@pytest.mark.parametrize("what", ["a cross state", "a cross push", "a parameter's cross state", "a parameter's cross push"])
+def test_a_motion_with_a_cross_state_is_not_taken_for_a_linear_one(what):
+    steps, rows, start, (columns, place, factor) = np.full(N - 1, H), drive(), np.zeros(3), NOTHING(1)
+    rows[:, 0], rows[:, 4], rows[:, 5:] = 1.1, 1.0, 0.0
+    d_start = np.zeros((1, 3))
+    start[2] = 0.1 * (what == "a cross state")
+    rows[7, 5] = 0.1 * (what == "a cross push")
+    d_start[0, 2], factor[0, 5] = what == "a parameter's cross state", what == "a parameter's cross push"
+    out, sens = np.empty((N, 3)), np.empty((1, 2, N))
+    assert linear_motion(steps, rows, LINEAR, start, 1, out) == what.startswith("a parameter")
+    assert not linear_tangents(steps, rows, LINEAR, start, 1, columns, place, factor, np.zeros((1, 14)), d_start, out, sens)
 
 
 def test_few_intervals_or_unlike_ones_are_not_even():
     rows, steps = np.ones((N - 1, 8)), np.full(N - 1, H)
-    assert kernels.is_even(steps, rows)
-    assert not kernels.is_even(steps[:8], rows[:8])
-    assert not kernels.is_even(np.linspace(H, 1.001 * H, N - 1), rows)
+    assert is_even(steps, rows)
+    assert not is_even(steps[:8], rows[:8])
+    assert not is_even(np.linspace(H, 1.001 * H, N - 1), rows)
     for place in range(2):
         bent = rows.copy()
         bent[-1, place] = 2.0
-        assert not kernels.is_even(steps, bent)
+        assert not is_even(steps, bent)
