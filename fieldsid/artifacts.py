@@ -9,6 +9,8 @@ import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -106,10 +108,16 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
     return body
 
 
+@lru_cache(maxsize=32)
+def _parsed(text: str) -> object:
+    """Return what a YAML text says: a command asks a model's file again and again, and parsing it takes 25 ms."""
+    return YAML(typ="safe").load(text)
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """Read a YAML mapping; raises ArtifactError when it cannot be read or is not a mapping."""
     try:
-        body = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        body = deepcopy(_parsed(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise ArtifactError(
             f"`{path}` cannot be read: {error.strerror}", found=str(path), hint="check the path and its permissions"

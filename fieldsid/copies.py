@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -21,8 +21,14 @@ R = TypeVar("R")
 _IS_COPY = "FIELDSID_IS_COPY"
 WHOLE = b"that is all"
 """What ends the answer of a copy that came to its end."""
+MOST_AT_ONCE = 2
+"""Copies at work that was put off."""
 MOST = 256
 """Items that are shared out at most: their numbers are bytes."""
+_LATER: list[tuple[Copy, Callable[[], None]]] = []
+"""Work that was put off, and the copies that are at it."""
+_FINISHING: list[bool] = []
+"""Whether `finishing` is under way."""
 _ENDING: list[int] = []
 """Copies that have answered: giving its memory back takes one as long as making it, and nobody need wait for that."""
 
@@ -84,6 +90,47 @@ def each(
     if answer is not None:
         done |= (read or read_back)(answer)
     return [done[i] if i in done else function(item) for i, item in enumerate(items)]
+
+
+def later(work: Callable[[], None]) -> None:
+    """Do some work that leaves all it comes to on the disk: at once, or, inside `finishing`, beside what follows."""
+    busy = sum(copy.is_at_work() for copy, _ in _LATER)
+    copy = copied(lambda: _nothing(work)) if _FINISHING and busy < MOST_AT_ONCE else None
+    if copy is None:
+        work()
+    else:
+        _LATER.append((copy, work))
+
+
+@contextmanager
+def finishing() -> Iterator[None]:
+    """Be inside work of which `later` may put some off; it is done at the end, and what went wrong is met again and raised.
+
+    Inside another one nothing is waited for: that is left to the outer one.
+    """
+    if _FINISHING:
+        yield
+        return
+    _FINISHING.append(True)
+    is_well = False
+    try:
+        yield
+        is_well = True
+    finally:
+        _FINISHING.clear()
+        left = _LATER.copy()
+        _LATER.clear()
+        with ExitStack() as copies:
+            for copy, _ in left:
+                copies.enter_context(copy)
+            for copy, work in left:
+                if copy.answer() is None and is_well:
+                    work()
+
+
+def _nothing(work: Callable[[], None]) -> bytes:
+    work()
+    return b""
 
 
 def numbered(count: int) -> int:

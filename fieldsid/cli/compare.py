@@ -79,14 +79,12 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
 def _drawn(model: Model, name: Path, found: Sequence[Comparison], folder: Path | None, *, force: bool) -> list[str | None]:
     if folder is None:
         return [None] * len(found)
-    from fieldsid.copies import each
+    from fieldsid.copies import finishing
     from fieldsid.figures.canvas import save
     from fieldsid.figures.compare import figure
 
-    def drawn(c: Comparison) -> str:
-        return str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force))
-
-    return [*each(drawn, found)]
+    with finishing():
+        return [str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force)) for c in found]
 
 
 def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.options import Force, JsonFlag, OutputDir
 from fieldsid.cli.patience import compiling
+from fieldsid.copies import finishing
 from fieldsid.errors import ArtifactError
 
 if TYPE_CHECKING:
@@ -61,14 +62,15 @@ def _tour(effect: str, output: Path | None, began: float, *, force: bool, quiet:
     vehicle = hidden_vehicle(effect)
     known = dict(places(folder, vehicle.axis))
     _told(OPENING, quiet=quiet)
-    done = [_taken(1, PLAN, known, force=force, quiet=quiet)]
-    (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
-    trial = make_trial(vehicle, folder / "trial", leg, force=force)
-    _told(_flown(trial, folder, leg), quiet=quiet)
-    for step in (s for s in STEPS if vehicle.axis in s.axes):
-        if step.possible(known):
-            done.append(_taken(len(done) + 1, step, known, force=force, quiet=quiet))
-            known |= step.learns(done[-1]["result"])
+    with finishing():
+        done = [_taken(1, PLAN, known, force=force, quiet=quiet)]
+        (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
+        trial = make_trial(vehicle, folder / "trial", leg, force=force)
+        _told(_flown(trial, folder, leg), quiet=quiet)
+        for step in (s for s in STEPS if vehicle.axis in s.axes):
+            if step.possible(known):
+                done.append(_taken(len(done) + 1, step, known, force=force, quiet=quiet))
+                known |= step.learns(done[-1]["result"])
     return {
         "schema": "fieldsid/demo/1",
         "folder": str(folder),

@@ -102,14 +102,16 @@ def _written(
 ) -> list[Path | None]:
     if folder is None:
         return [None] * len(fits)
+    from fieldsid.copies import finishing
     from fieldsid.models.model import save_model
 
     paths: list[Path | None] = []
-    for fit, inputs in zip(fits, sources, strict=True):
-        stem = _stem(fit)
-        paths.append(save_model(fit.model, folder / f"{stem}.yaml", inputs=inputs, force=force))
-        if figures:
-            _draw(fit, folder, stem, force=force)
+    with finishing():
+        for fit, inputs in zip(fits, sources, strict=True):
+            stem = _stem(fit)
+            paths.append(save_model(fit.model, folder / f"{stem}.yaml", inputs=inputs, force=force))
+            if figures:
+                _draw(fit, folder, stem, force=force)
     return paths
 
 

@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fieldsid.artifacts import replacing
+from fieldsid.copies import later
 from fieldsid.logs.run import FloatArray
 
 MEASURED = "0.45"
@@ -66,14 +67,18 @@ def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> Non
 
 
 def save(figure: Figure, path: Path, *, force: bool = False) -> Path:
-    """Write a figure as PNG, whole or not at all; raises ArtifactError."""
+    """Write a figure as PNG, whole or not at all, inside `copies.finishing` later; raises ArtifactError."""
+    later(lambda: _write(figure, path, force=force))
+    return path
+
+
+def _write(figure: Figure, path: Path, *, force: bool) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:  # laid out here, once: left to the writer it costs a whole drawing that is thrown away
         engine.execute(figure)
         figure.set_layout_engine("none")
     with replacing(path, force=force) as temporary:
         figure.savefig(temporary, format="png", metadata={"Software": "fieldsid"})
-    return path
 
 
 def one(draw: Callable[[Axes], None], path: Path, *, width: float = 8.0, height: float = 5.0, force: bool = False) -> Path:

@@ -7,7 +7,6 @@ import numpy as np
 from fieldsid.fitting.kalman_sea import sea
 from fieldsid.models import kernels
 from fieldsid.models.linear_core import linear_tangents
-from fieldsid.planning.crowd import closed_loop_all
 from fieldsid.planning.loop import closed_loop
 from fieldsid.planning.rule_flight import ScenePlant
 
@@ -23,5 +22,4 @@ def compile_plans() -> None:
     drive, c = zero((m, n - 1, len(kernels.DRIVES))), zero((m, len(kernels.CONSTANTS)))
     push, off = zero((m, n - 1, 3)), zero((m, n - 1, 2))
     closed_loop(steps, drive[0].copy(), c[0], 1, zero(n), off[0], push[0], zero(3), zero(4), zero(n), zero((n, 3)))
-    closed_loop_all(steps, drive, c, 1, zero(n), off, push, zero(3), zero((m, 4)), zero((m, n)), zero((m, n)), zero((m, n)))
     ScenePlant(drive, c, 1, push, zero(m), off, zero((m, 3))).advance(zero(m), 0.05)

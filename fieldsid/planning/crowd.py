@@ -9,7 +9,6 @@ import numpy as np
 from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers import Autopilot, Schedule
 from fieldsid.models.axis import Axis
-from fieldsid.models.jit import jit
 from fieldsid.models.model import Model
 from fieldsid.planning.candidate import Candidate, Window, asked_of
 from fieldsid.planning.envelope import GRAVITY, Envelope
@@ -90,19 +89,6 @@ def fly_crowd(crowd: Crowd, candidate: Candidate, envelope: Envelope, autopilot:
     return _measured(crowd, angle, rate, run_up_m)
 
 
-@jit
-def closed_loop_all(
-    steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, asked: FloatArray, off: FloatArray,
-    push: FloatArray, gains: FloatArray, limits: FloatArray, command: FloatArray, angle: FloatArray, rate: FloatArray,
-) -> None:  # fmt: skip
-    """Fill command, angle and rate (m, n) of many vehicles under one asked command; arrays as of `closed_loop`, (m, ...)."""
-    out = np.empty((asked.shape[0], 3))
-    for i in range(drive.shape[0]):
-        closed_loop(steps, drive[i].copy(), c[i], pieces, asked, off[i], push[i], gains, limits[i], command[i], out)
-        for j in range(asked.shape[0]):
-            angle[i, j], rate[i, j] = out[j, 0], out[j, 1]
-
-
 def _open_loop(crowd: Crowd, asked: FloatArray, envelope: Envelope, autopilot: Autopilot) -> tuple[FloatArray, FloatArray]:
     """Return angle and rate (n, m)."""
     plant, time = crowd.plant, crowd.window.time
@@ -113,11 +99,14 @@ def _open_loop(crowd: Crowd, asked: FloatArray, envelope: Envelope, autopilot: A
     limits = np.column_stack([low, high, np.full(plant.size, fin_rate), plant.trim])
     gains = np.array([autopilot.angle_gain, autopilot.rate_gain, autopilot.fin])
     moving = any(e.fin is not None for s in crowd.scenes for e in s.effects)
-    off = plant.off
+    off, steps, out = plant.off, np.diff(time), np.empty((time.size, 3))
     for _ in range(ACTUATOR_ROUNDS if moving else 1):
-        closed_loop_all(
-            np.diff(time), plant.drive, plant.constants, plant.pieces, asked, off, plant.push, gains, limits, command, angle, rate
-        )
+        for i in range(plant.size):
+            closed_loop(
+                steps, plant.drive[i].copy(), plant.constants[i], plant.pieces, asked, off[i], plant.push[i], gains, limits[i],
+                command[i], out,
+            )  # fmt: skip
+            angle[i], rate[i] = out[:, 0], out[:, 1]
         if moving:
             off = np.stack([fin_offset(s, time, command[i]) for i, s in enumerate(crowd.scenes)])
     return angle.T, rate.T

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.copies import each
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.model import Model
 from fieldsid.turning.plant import Plant, plant_of
@@ -39,16 +40,23 @@ def settled_turns(
     for i, speed in enumerate(entry):
         for index, share in source.near(float(speed)):
             weight[index, i] = share
+    known = [
+        (index, model, np.flatnonzero(share)) for index, (model, share) in enumerate(zip(source.models, weight, strict=True))
+    ]
+    plants = [
+        (index, used, *_plant_and_slowing(model, rudder, surge, draws, rng, entry[used]))
+        for index, model, used in known if used.size
+    ]  # fmt: skip
+    asked = [(side, *of) for of in plants for side in SIDES]
+
+    def turned(of: tuple[str, int, npt.NDArray[np.int_], Plant, Slowing]) -> tuple[SteadyTurn, Transient]:
+        side, _, used, plant, slowing = of
+        turn = steady_turn(plant, slowing, entry[used], SIDES[side])
+        return turn, turn_transient(plant, slowing, entry[used], SIDES[side], rudder)
+
     sums = {side: _Sums(draws, entry.size) for side in SIDES}
-    for index, model in enumerate(source.models):
-        used = np.flatnonzero(weight[index])
-        if not used.size:
-            continue
-        plant, slowing = _plant_and_slowing(model, rudder, surge, draws, rng, entry[used])
-        for side, total in sums.items():
-            turn = steady_turn(plant, slowing, entry[used], SIDES[side])
-            after = turn_transient(plant, slowing, entry[used], SIDES[side], rudder)
-            total.add(used, weight[index, used], turn, after)
+    for (side, index, used, _, _), (turn, after) in zip(asked, each(turned, asked), strict=True):
+        sums[side].add(used, weight[index, used], turn, after)
     effects = tuple(sorted({e for m in source.models for e in m.effects}))
     return {side: total.turns(entry, effects) for side, total in sums.items()}
 

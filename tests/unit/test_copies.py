@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from fieldsid import copies
-from fieldsid.copies import can_copy, copied, read_back, written
+from fieldsid.copies import MOST_AT_ONCE, can_copy, copied, finishing, later, read_back, written
 
 needs_copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
 
@@ -104,3 +105,61 @@ def test_mappings_that_are_read_only_are_read_back_as_such():
     assert isinstance(again["signals"], MappingProxyType)
     np.testing.assert_array_equal(again["signals"]["yaw_rad"], np.arange(3.0))
     assert again["name"] == "run7"
+
+
+def signed(path, seconds=0.0):
+    """Return work that takes so long and leaves who has done it."""
+    return lambda: (time.sleep(seconds), path.write_text(str(os.getpid())))
+
+
+def test_what_could_be_put_off_is_done_at_once_outside_of_a_tour(tmp_path):
+    later(signed(tmp_path / "a"))
+    assert (tmp_path / "a").read_text() == str(os.getpid())
+
+
+@needs_copies
+def test_what_is_put_off_is_done_in_copies_and_waited_for(tmp_path):
+    files = [tmp_path / str(i) for i in range(MOST_AT_ONCE + 1)]
+    with finishing():
+        with finishing():
+            later(signed(files[0], 0.3))
+        assert not files[0].exists()  # an inner one leaves it to the outer one
+        for file in files[1:]:
+            later(signed(file, 0.3))
+        assert files[-1].read_text() == str(os.getpid())  # no more copies than there may be
+    assert len({file.read_text() for file in files}) == len(files)
+
+
+@needs_copies
+def test_what_went_wrong_in_a_copy_is_met_again_here(tmp_path):
+    def refused():
+        raise PermissionError("no")
+
+    def tour():
+        with finishing():
+            later(refused)
+            later(signed(tmp_path / "after"))
+
+    with pytest.raises(PermissionError, match="no"):
+        tour()
+    with finishing():  # and leaves nothing behind
+        later(signed(tmp_path / "again"))
+    assert (tmp_path / "again").exists()
+
+
+@needs_copies
+def test_after_an_error_nothing_that_was_put_off_is_done_again():
+    done = []
+
+    def failing():
+        done.append(os.getpid())
+        raise PermissionError("no")
+
+    def tour():
+        with finishing():
+            later(failing)
+            raise ValueError("the tour")
+
+    with pytest.raises(ValueError, match="the tour"):
+        tour()
+    assert done == []

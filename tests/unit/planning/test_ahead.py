@@ -7,10 +7,9 @@ import sys
 
 AGAIN = """
 from fieldsid.planning import ahead
-from fieldsid.planning.crowd import closed_loop_all
 from fieldsid.planning.loop import closed_loop
 from fieldsid.planning.rule_flight import advance_all
-doors = closed_loop_all, closed_loop, advance_all
+doors = closed_loop, advance_all
 ahead.compile_plans()
 known = [d.signatures for d in doors]
 from fieldsid.cli.app import run
