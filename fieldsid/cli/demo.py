@@ -47,7 +47,7 @@ def command(
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
     """
     began = perf_counter()
-    with compiling():
+    with compiling(_compile_loops):
         body = _tour(effect, output, began, force=force, quiet=as_json)
     return emit(body, as_json=as_json, render=lambda to: _render(to, body))
 
@@ -80,6 +80,12 @@ def _tour(effect: str, output: Path | None, began: float, *, force: bool, quiet:
         "files": sorted(str(p) for p in folder.rglob("*") if p.is_file()),
         "seconds": perf_counter() - began,
     }
+
+
+def _compile_loops() -> None:
+    from fieldsid.schedule.kernels import compile_loops
+
+    compile_loops()
 
 
 def _folder(asked: Path | None, *, force: bool) -> Path:

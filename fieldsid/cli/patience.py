@@ -35,7 +35,7 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def compiling() -> Iterator[Callable[[Sequence[Callable[..., object]]], None]]:
+def compiling(*besides: Callable[[], None]) -> Iterator[Callable[[Sequence[Callable[..., object]]], None]]:
     """Be inside what fits later: the first time on a machine a copy of this process compiles, and a terminal is told.
 
     Yields what is to be called before the first fit, see `fitting.ahead.compiling_ahead`.
@@ -43,7 +43,7 @@ def compiling() -> Iterator[Callable[[Sequence[Callable[..., object]]], None]]:
     from fieldsid.fitting.ahead import compiling_ahead
 
     console = messages()
-    with compiling_ahead(lambda text: console.print(text) if console.is_terminal else None) as help_along:
+    with compiling_ahead(lambda text: console.print(text) if console.is_terminal else None, besides) as help_along:
         yield help_along
 
 

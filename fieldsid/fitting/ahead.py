@@ -21,6 +21,7 @@ from fieldsid.fitting.kalman_sensors import sensors
 from fieldsid.fitting.layout import layout_of, speed_groups
 from fieldsid.fitting.noise import estimate_noise
 from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.scoring import slopes_of
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.uncertainty import middle, middle_of
 from fieldsid.fitting.whitening import noise_vector, whiten
@@ -38,7 +39,8 @@ SAMPLES = 60
 WHITE = Noise(0.01, 0.01)
 STIRRED = Noise(0.01, 0.01, disturbance=0.01, disturbance_time=1.0)
 DOORS = (
-    linear_tangents, linear_motion, accumulate, bent_tangents, bent_motion, sea, sensors, both, abreast, middle_of, behind,
+    linear_tangents, linear_motion, accumulate, bent_tangents, bent_motion, behind, sea, sensors, both, abreast, slopes_of,
+    middle_of,
 )  # fmt: skip
 """What a fit calls; JOBS compile it."""
 LOOK = 0.01
@@ -74,16 +76,14 @@ def _estimate(family: str) -> None:
     estimate_noise([record], [(1.0, 0.0)], [record.both], family, STIRRED)
 
 
-def _stirred() -> None:
+def _whiten(noise: Noise) -> None:
+    record = a_record()
+    whiten(record, noise, 1.0, 0.0, record.both[None])
+
+
+def _lag() -> None:
     record = a_record()
     behind(record.steps, record.rate, 1.0)
-    _estimate("disturbance")
-
-
-def _all_noisy() -> None:
-    record = a_record()
-    whiten(record, replace(STIRRED, coloured_rate=0.01), 1.0, 0.0, record.both[None])
-    _estimate("both")
 
 
 def _sure() -> None:
@@ -107,14 +107,15 @@ def _effects() -> None:
 
 
 JOBS: tuple[Callable[[], None], ...] = (
-    _linear, _stirred, _bent, _all_noisy, lambda: _estimate("coloured"), _sure, _effects,
+    _linear, lambda: _whiten(STIRRED), _bent, _lag, lambda: _estimate("disturbance"), lambda: _estimate("coloured"),
+    lambda: _whiten(replace(STIRRED, coloured_rate=0.01)), lambda: _estimate("both"), _sure,
 )  # fmt: skip
-"""Each calls once some of what fits and searches need, what is needed first before the rest."""
+"""Each calls some of DOORS once, what is needed first before the rest."""
 
 
 def compile_all() -> None:
     """Call everything once that a fit and a search for what is missing use."""
-    for job in JOBS:
+    for job in (*JOBS, _effects):
         job()
 
 
@@ -147,18 +148,21 @@ _UNDER_WAY: list[Ahead] = []
 
 
 @contextmanager
-def compiling_ahead(tell: Callable[[str], None] = lambda _text: None) -> Iterator[Callable[[Sequence[Door]], None]]:
+def compiling_ahead(
+    tell: Callable[[str], None] = lambda _text: None, besides: Sequence[Callable[[], None]] = ()
+) -> Iterator[Callable[[Sequence[Door]], None]]:
     """Compile what fits need in a copy of this process while what is inside runs, if this machine has not done so yet.
 
-    Yields what is to be called before the first fit, with what is needed of DOORS: it helps. Where no copy is to be had it does
-    all of it; what is inside compiles itself what it needs sooner. The copy is ended with what is inside.
+    Yields what is to be called before the first fit, with what is needed of DOORS: it helps, and does all of it where no copy is
+    to be had. What effects add is left to the copy, and what is given as `besides`; what is inside compiles itself what it needs
+    sooner. The copy is ended with what is inside.
     """
     if _UNDER_WAY or _are_compiled(DOORS):
         yield _UNDER_WAY[-1].help_along if _UNDER_WAY else lambda _doors: None
         return
     tell("first run on this machine: compiling, about ten seconds, once")
     left = numbered(len(JOBS))
-    copy = copied(lambda: _compiled(left))
+    copy = copied(lambda: _compiled(left, besides))
     _UNDER_WAY.append(Ahead(left, copy))
     try:
         yield _UNDER_WAY[-1].help_along
@@ -169,11 +173,13 @@ def compiling_ahead(tell: Callable[[str], None] = lambda _text: None) -> Iterato
             copy.end()
 
 
-def _compiled(left: int) -> bytes:
+def _compiled(left: int, besides: Sequence[Callable[[], None]]) -> bytes:
     """Compile in a copy, without looking for what could be given back: it makes millions of things, and ends."""
     gc.disable()
     while number := os.read(left, 1):
         JOBS[number[0]]()
+    for job in (_effects, *besides):
+        job()
     return b""
 
 

@@ -76,7 +76,7 @@ def information(
     count()
     errors, spreads = here.moved or _moved(record, a, k, noise, place, residual)
     steep, wide = errors.reshape(place.size, -1), spreads.reshape(place.size, -1)
-    score = _slopes(record.ok.ravel(), here.errors, 1.0 / here.spreads, IS_SIZE[place], steep, wide)
+    score = slopes_of(record.ok.ravel(), here.errors, 1.0 / here.spreads, IS_SIZE[place], steep, wide)
     return score, 2.0 * wide @ wide.T + steep @ steep.T
 
 
@@ -94,7 +94,7 @@ def _moved(
 
 
 @jit
-def _slopes(
+def slopes_of(
     seen: npt.NDArray[np.bool_], e: FloatArray, over: FloatArray, is_size: npt.NDArray[np.bool_],
     steep: FloatArray, wide: FloatArray,
 ) -> FloatArray:  # fmt: skip

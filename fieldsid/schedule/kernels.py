@@ -5,6 +5,8 @@ The integral is held while the fin is at its stop and the error would push it on
 
 from __future__ import annotations
 
+import numpy as np
+
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.bent_core import power_drag
 from fieldsid.models.jit import inner, jit
@@ -71,3 +73,8 @@ def close_loop(
             x += step * (-(c + c_q * abs(xm)) * xm - c_r * pm + c_f * held)
             z -= speed * 0.5 * (before + y) * step
             fin = new
+
+
+def compile_loops() -> None:
+    """Call once, on a plant that does not move, what checking a schedule calls."""
+    close_loop(np.zeros((1, PLANT)), np.zeros(LOOP), 0.0, 0.0, 1.0, 0.02, np.zeros((1, 2, 3)))

@@ -16,6 +16,7 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.schedule.controller import KINDS, Gains, least_damping
 from fieldsid.schedule.design import Wish, design_gains
+from fieldsid.schedule.kernels import close_loop, compile_loops
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.margins import control_margins, margins
 from fieldsid.schedule.plant import FinLimits, LinearPlant, plants_at
@@ -255,3 +256,11 @@ def test_the_trim_offset_holds_the_propellers_moment_at_each_speeds_thrust():
         authority = model.at_speed(speed)["b2"]
         wanted = (0.016 * law.trim_factor(speed) + 0.02 * 2.0 * speed**2) / authority
         assert offset == pytest.approx(wanted)
+
+
+def test_what_the_tour_compiles_ahead_is_what_a_step_and_a_dive_call():
+    compile_loops()
+    row = design_schedule_row()
+    step_response(plant(), row, reference=0.1, seconds=1.0)
+    depth_response(plant(), row, step=1.0, seconds=1.0, pitch_limit=0.3)
+    assert len(close_loop.signatures) == 1
