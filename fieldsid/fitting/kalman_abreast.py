@@ -37,7 +37,7 @@ def abreast(
             room[_SIZES + 16 + l], room[_SIZES + 24 + l], room[_SIZES + 32 + l]
         )  # fmt: skip
     last_h = -1.0
-    yy, yp, py, pp, yw, pw = transition(a, k, 1e-3)
+    yy, yp, py, pp, yw, pw = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
     for i in range(n):
         if i < n - 1 and abs(steps[i] - last_h) > 1e-7 * steps[i]:
             last_h = steps[i]

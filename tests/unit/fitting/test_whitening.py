@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from fieldsid.fitting import kalman
 from fieldsid.fitting.kalman import filtered
 from fieldsid.fitting.kalman_abreast import abreast
 from fieldsid.fitting.kalman_state import transition
@@ -14,6 +15,7 @@ from fieldsid.fitting.scoring import information, innovated
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.whitening import noise_vector, whiten
 from fieldsid.models.axis import Axis
+from fieldsid.models.jit import plain_of
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
@@ -35,11 +37,13 @@ def record(*, gaps: bool) -> Record:
     return Record("short", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], {}, 1.0)
 
 
-def settled_record() -> Record:
-    """Long enough for the gains to settle, twice: the step changes on the way."""
+def settled_record(*, gaps: bool = False) -> Record:
+    """Long enough for the gains to settle, twice: the step changes on the way, and with gaps each channel is lost for a while."""
     time = np.cumsum(np.concatenate([np.full(250, 0.05), np.full(150, 0.08)]))
-    zero, ok = np.zeros(400), np.ones(400, dtype=bool)
-    return Record("long", Axis.YAW, time, zero, True, False, zero, zero, ok, ok, {}, 1.0)
+    zero, ok = np.zeros(400), np.ones((2, 400), dtype=bool)
+    if gaps:
+        ok[0, 150:153], ok[1, 330:331] = False, False
+    return Record("long", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], {}, 1.0)
 
 
 def dense(log: Record, noise: Noise) -> np.ndarray:
@@ -68,7 +72,11 @@ def seen(log: Record) -> np.ndarray:
     return np.concatenate([log.angle_ok, log.rate_ok])
 
 
-@pytest.mark.parametrize("log", [record(gaps=False), record(gaps=True), settled_record()], ids=["even", "gaps", "settled"])
+@pytest.mark.parametrize(
+    "log",
+    [record(gaps=False), record(gaps=True), settled_record(), settled_record(gaps=True)],
+    ids=["even", "gaps", "settled", "settled with gaps"],
+)
 @pytest.mark.parametrize("family", NOISES)
 def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(family, log):
     rng = np.random.default_rng(1)
@@ -80,6 +88,31 @@ def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(f
     mine = white.reshape(3, -1) @ white.reshape(3, -1).T
     np.testing.assert_allclose(mine, flat @ np.linalg.solve(cov, flat.T), rtol=1e-5)
     assert logs == pytest.approx(np.linalg.slogdet(cov)[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("log", [record(gaps=True), settled_record(gaps=True)], ids=["gaps", "settled with gaps"])
+@pytest.mark.parametrize("family", NOISES)
+def test_the_spreads_add_up_to_the_determinant_and_are_one_where_nothing_was_measured(family, log):
+    out, spreads = np.empty((1, 2, len(log))), np.empty((2, len(log)))
+    logs = filtered(log.even, log.ok, A, K, noise_vector(NOISES[family]), np.ones((1, 2, len(log))), out, spreads)
+    assert (spreads[~log.ok] == 1.0).all()
+    assert (out[0][~log.ok] == 0.0).all()
+    assert logs == pytest.approx(2.0 * float(np.log(spreads).sum()), rel=1e-12)
+
+
+@pytest.mark.parametrize("family", NOISES)
+def test_a_compiled_filter_gives_the_numbers_of_its_python_source(family, monkeypatch):
+    log, noise = settled_record(gaps=True), noise_vector(NOISES[family])
+    series = np.random.default_rng(8).standard_normal((2, 2, len(log)))
+    found = []
+    for plain in (False, True):
+        if plain:
+            for name in ("sea", "sensors", "both"):
+                monkeypatch.setattr(kalman, name, plain_of(getattr(kalman, name)))
+        out, spreads = np.empty_like(series), np.empty((2, len(log)))
+        found.append((filtered(log.even, log.ok, A, K, noise, series, out, spreads), out, spreads))
+    for fast, slow in zip(*found, strict=True):
+        np.testing.assert_allclose(fast, slow, rtol=1e-12, atol=1e-14)
 
 
 def test_the_likelihood_is_that_of_the_dense_gaussian():
