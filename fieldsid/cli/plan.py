@@ -99,11 +99,13 @@ def command(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
         names_of(separate), diagnosis, seed, open_loop,
     )  # fmt: skip
-    with compiling() as help_along:
-        compile_plans()
-        help_along(BESIDE)
-        with progress("planning", asked.legs) as step:
-            made = planned(asked, step)
+    with compiling() as help_along, progress("planning", asked.legs) as step:
+
+        def ready() -> None:
+            compile_plans()
+            help_along(BESIDE)
+
+        made = planned(asked, step, ready)
     files = [] if output is None else _written(made.plan, made.model, asked, output, write, figures=figures, force=force)
     body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
     result = emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body))

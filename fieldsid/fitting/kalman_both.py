@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.fitting.kalman_state import SETTLED, settled_until, stays, transition
+from fieldsid.fitting.kalman_state import SETTLED, settled_until, stay, stays, transition
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import inner, jit
 
@@ -62,9 +62,7 @@ def both(
                     y, p, w, m, q = y + b0 * e, p + b1 * e, w + b2 * e, m + b3 * e, q + b4 * e
                     y, p, w, m, q = yy * y + yp * p + yw * w, py * y + pp * p + pw * w, ww * w, mm * m, mm * q
                 state[j, 0], state[j, 1], state[j, 2], state[j, 3], state[j, 4] = y, p, w, m, q
-            for l in range(i, stop):
-                spreads[0, l], spreads[1, l] = of_angle, of_rate
-            log_sum += 2.0 * (stop - i) * np.log(of_angle) + 2.0 * (stop - i) * np.log(of_rate)
+            log_sum += stay(spreads[0], i, stop, of_angle) + stay(spreads[1], i, stop, of_rate)
             i = stop
             continue
         seen, felt = ok[0, i], ok[1, i]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.fitting.kalman_state import SETTLED, settled_until, stays, transition
+from fieldsid.fitting.kalman_state import SETTLED, settled_until, stay, stays, transition
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import inner, jit
 
@@ -77,9 +77,7 @@ def sea(
                 y, p, w = y + b0 * e, p + b1 * e, w + b2 * e
                 m[0, c], m[1, c], m[2, c] = yy * y + yp * p + yw * w, py * y + pp * p + pw * w, ww * w
             _settled(series, out, i, stop, state, m, a1, 1.0 / of_angle, 1.0 / of_rate)
-            for l in range(i, stop):
-                spreads[0, l], spreads[1, l] = of_angle, of_rate
-            log_sum += 2.0 * (stop - i) * np.log(of_angle) + 2.0 * (stop - i) * np.log(of_rate)
+            log_sum += stay(spreads[0], i, stop, of_angle) + stay(spreads[1], i, stop, of_rate)
             i = stop
             continue
         seen, felt = ok[0, i], ok[1, i]

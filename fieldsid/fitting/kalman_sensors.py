@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.fitting.kalman_state import SETTLED, settled_until, stays
+from fieldsid.fitting.kalman_state import SETTLED, settled_until, stay, stays
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.jit import jit
 
@@ -32,9 +32,7 @@ def sensors(
                         out[j, ch, l] = (series[j, ch, l] - m) * over
                         m = own * m + push * series[j, ch, l]
                     state[j] = m
-                for l in range(i, stop):
-                    spreads[ch, l] = spread
-                log_sum += 2.0 * (stop - i) * np.log(spread)
+                log_sum += stay(spreads[ch], i, stop, spread)
                 i = stop
                 continue
             seen = ok[ch, i]

@@ -52,3 +52,11 @@ def settled_until(steps: FloatArray, ok: npt.NDArray[np.bool_], first: int, h: f
     while i < n and ok[0, i] and ok[1, i] and (i == n - 1 or abs(steps[i] - h) <= 1e-7 * h):
         i += 1
     return i
+
+
+@inner
+def stay(spreads: FloatArray, first: int, stop: int, spread: float) -> float:
+    """Fill a channel's spreads over samples first..stop - 1, where they stay, and return the sum of their log variances."""
+    for i in range(first, stop):
+        spreads[i] = spread
+    return 2.0 * (stop - first) * float(np.log(spread))

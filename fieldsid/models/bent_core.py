@@ -75,7 +75,7 @@ def _total(steps: FloatArray) -> float:
 
 @jit
 def bent_motion(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray) -> None:
-    """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on."""
+    """Fill out (n, 3) as `kernels.simulate` does, whatever the motion and the clock."""
     n = steps.shape[0] + 1
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
@@ -152,24 +152,12 @@ def _map_rates(row: int, stages: FloatArray, push: FloatArray, rows: FloatArray)
 
 @jit
 def bent_tangents(
-    steps: FloatArray,
-    drive: FloatArray,
-    c: FloatArray,
-    start: FloatArray,
-    pieces: int,
-    columns: FloatArray,
-    place: IntArray,
-    factor: FloatArray,
-    d_c: FloatArray,
-    d_start: FloatArray,
-    out: FloatArray,
-    sens: FloatArray,
-) -> None:
-    """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
+    steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
+    factor: FloatArray, d_c: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
+) -> None:  # fmt: skip
+    """Fill out (n, 3) and sens (P, 2, n) as `kernels.tangents` does, whatever the motion and the clock.
 
-    A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says; none goes
-    with the flow. d_c (P, 14) are those of the constants, d_start (P, 3) those of the initial state. All parameters go
-    through one linear map a step, see `_map_row`.
+    All parameters go through one linear map a step, see `_map_row`.
     """
     n, count = steps.shape[0] + 1, d_c.shape[0]
     s, has_c = np.zeros((count, 3)), np.zeros(count)

@@ -84,11 +84,14 @@ class Made:
     body: Mapping[str, Any]
 
 
-def planned(asked: Asked, step: Callable[[], None] = lambda: None) -> Made:
-    """Return the plan that was asked for; raises FieldsidError with what would be possible."""
+def planned(asked: Asked, step: Callable[[], None] = lambda: None, ready: Callable[[], None] = lambda: None) -> Made:
+    """Return the plan that was asked for; raises FieldsidError with what would be possible.
+
+    ready is called once what was asked for is read and understood, before the search.
+    """
     vehicle = _vehicle(asked.vehicle)
     if asked.separate or asked.diagnosis:
-        return _separating(asked, vehicle)
+        return _separating(asked, vehicle, ready)
     model = _signed(believed(asked), vehicle)
     speeds = _speeds(asked, model)
     known = [*NAMES[asked.axis].base, *(c.name for e in effects_of(model) for c in e.shared)]
@@ -107,6 +110,7 @@ def planned(asked: Asked, step: Callable[[], None] = lambda: None) -> Made:
         slowest=vehicle.speed_min_m_s if vehicle else None,
         fastest=vehicle.speed_max_m_s if vehicle else None,
     )
+    ready()
     plan = make_plan(model, request, step)
     return Made(plan, model, plan_body(plan))
 
@@ -147,7 +151,7 @@ def envelope_of(axis: Axis, limiting: Limiting, vehicle: Vehicle | None, *, free
     )
 
 
-def _separating(asked: Asked, vehicle: Vehicle | None) -> Made:
+def _separating(asked: Asked, vehicle: Vehicle | None, ready: Callable[[], None]) -> Made:
     if asked.diagnosis is not None:
         rivals = rivals_from(asked.diagnosis, asked.separate)
     else:
@@ -155,8 +159,9 @@ def _separating(asked: Asked, vehicle: Vehicle | None) -> Made:
     envelope = envelope_of(rivals[0].axis, asked.limiting, vehicle, free_heading=True)
     window = Window(asked.window, rate_hz=asked.rate)
     speeds = _speeds(asked, rivals[0])
-    name = vehicle.name if vehicle else "vehicle"
-    plan, separation = separating_plan(rivals, envelope, speeds, window, _run_up(asked.run_up), name, asked.seed)
+    name, run_up = vehicle.name if vehicle else "vehicle", _run_up(asked.run_up)
+    ready()
+    plan, separation = separating_plan(rivals, envelope, speeds, window, run_up, name, asked.seed)
     return Made(plan, rivals[0], {**plan_body(plan), "separation": separation.plain(), "says": separation.says()})
 
 

@@ -40,14 +40,12 @@ def settled_turns(
     for i, speed in enumerate(entry):
         for index, share in source.near(float(speed)):
             weight[index, i] = share
-    known = [
-        (index, model, np.flatnonzero(share)) for index, (model, share) in enumerate(zip(source.models, weight, strict=True))
-    ]
-    plants = [
-        (index, used, *_plant_and_slowing(model, rudder, surge, draws, rng, entry[used]))
-        for index, model, used in known if used.size
-    ]  # fmt: skip
-    asked = [(side, *of) for of in plants for side in SIDES]
+    asked = []
+    for index, model in enumerate(source.models):
+        used = np.flatnonzero(weight[index])
+        if used.size:
+            plant, slowing = _plant_and_slowing(model, rudder, surge, draws, rng, entry[used])
+            asked += [(side, index, used, plant, slowing) for side in SIDES]
 
     def turned(of: tuple[str, int, npt.NDArray[np.int_], Plant, Slowing]) -> tuple[SteadyTurn, Transient]:
         side, _, used, plant, slowing = of
