@@ -1,5 +1,72 @@
-"""fieldsid: from a short excitation log of an underwater vehicle to a model, its missing effect, a radius and gains."""
+"""fieldsid: from a short excitation log of an underwater vehicle to a model, its missing effect, a radius and gains.
+
+    import fieldsid as fs
+
+    runs = fs.load("runs/pulses_*.parquet")
+    (fit,) = fs.identify(runs, "yaw", joint=True)
+    print(fit.summary())
+
+The functions take the arguments of the commands of their names (`sysid identify --help`) and return records: `summary()` is a
+record in words, `to_frame()` a pandas table, `plot()` a matplotlib figure. A name is loaded when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from fieldsid._version import __version__
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from fieldsid.comparison.compare import Comparison
+    from fieldsid.diagnosis import Candidate, Diagnosis
+    from fieldsid.errors import FieldsidError
+    from fieldsid.extension import Extension
+    from fieldsid.face.files import load_model, save
+    from fieldsid.face.fits import compare, diagnose, extend, identify
+    from fieldsid.face.gains import design_schedule, fit_laws, turn_radius, verify_schedule
+    from fieldsid.face.runs import load
+    from fieldsid.face.several import Several
+    from fieldsid.fitting.fit import Fit
+    from fieldsid.logs import Run
+    from fieldsid.models.axis import Axis
+    from fieldsid.models.model import Model
+    from fieldsid.schedule import Schedule, Verification
+    from fieldsid.turning import Laws, TurnPrediction
+
+_ROOMS = {
+    "fieldsid.comparison.compare": ("Comparison",),
+    "fieldsid.diagnosis": ("Candidate", "Diagnosis"),
+    "fieldsid.errors": ("FieldsidError",),
+    "fieldsid.extension": ("Extension",),
+    "fieldsid.face.files": ("load_model", "save"),
+    "fieldsid.face.fits": ("compare", "diagnose", "extend", "identify"),
+    "fieldsid.face.gains": ("design_schedule", "fit_laws", "turn_radius", "verify_schedule"),
+    "fieldsid.face.runs": ("load",),
+    "fieldsid.face.several": ("Several",),
+    "fieldsid.fitting.fit": ("Fit",),
+    "fieldsid.logs": ("Run",),
+    "fieldsid.models.axis": ("Axis",),
+    "fieldsid.models.model": ("Model",),
+    "fieldsid.schedule": ("Schedule", "Verification"),
+    "fieldsid.turning": ("Laws", "TurnPrediction"),
+}
+"""Where the names are: the same as above, which is for mypy and editors alone."""
+
+__all__ = [
+    "Axis", "Candidate", "Comparison", "Diagnosis", "Extension", "FieldsidError", "Fit", "Laws", "Model", "Run", "Schedule",
+    "Several", "TurnPrediction", "Verification", "__version__", "compare", "design_schedule", "diagnose", "extend", "fit_laws",
+    "identify", "load", "load_model", "save", "turn_radius", "verify_schedule",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    room = next((room for room, names in _ROOMS.items() if name in names), None)
+    if room is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found = getattr(import_module(room), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import io
 import math
@@ -12,11 +13,13 @@ from contextlib import contextmanager
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.scalarstring import LiteralScalarString
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError
@@ -33,6 +36,21 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
+def check_output(path: Path, *, force: bool = False) -> None:
+    """Raise ArtifactError where a file cannot be written: it exists and `force` is false, or its place cannot hold it."""
+    if os.path.exists(path) and not force:  # noqa: PTH110 - says no where a folder is closed, and does not raise
+        raise ArtifactError(
+            f"`{path}` exists", found=f"{path.stat().st_size} bytes", hint="add `--force`, or name another output"
+        )
+    above = next((p for p in path.parents if os.path.lexists(p)), Path())
+    if not above.is_dir():
+        raise ArtifactError(f"`{above}` is a file, not a folder", found=f"{above.stat().st_size} bytes", hint="name a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise ArtifactError(
+            f"`{path}` cannot be written: Permission denied", found=f"folder `{above}`", hint="name a place that can be written"
+        )
+
+
 @contextmanager
 def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
     """Yield a temporary path beside `path` and move it into place when the block ends without an error.
@@ -40,10 +58,7 @@ def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
     Raises ArtifactError when `path` exists and `force` is false, or when it cannot be written; then nothing
     is left behind and an existing file is as it was.
     """
-    if path.exists() and not force:
-        raise ArtifactError(
-            f"`{path}` exists", found=f"{path.stat().st_size} bytes", hint="add `--force`, or name another output"
-        )
+    check_output(path, force=force)
     temporary: Path | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -57,7 +72,7 @@ def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
         raise ArtifactError(
             f"`{path}` cannot be written: {error.strerror or error}",
             found=f"folder `{path.parent}`",
-            hint="choose a folder that can be written, with `-o DIR`",
+            hint="name a place that can be written",
         ) from error
     finally:
         if temporary is not None:
@@ -101,10 +116,13 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
         raise ArtifactError(
             f"`{path}` is not a {kind} file",
             found=f"schema: {schema!r}",
-            hint=f"give a file whose first line is `schema: {kind}/1`",
+            hint=f"give a file with a line `schema: {kind}/1`",
         )
     if schema != f"{kind}/1":
-        raise ArtifactError(f"`{path}` has a newer schema than this version reads", found=schema, hint="update fieldsid")
+        number = schema.rpartition("/")[2]
+        if number.isdecimal() and int(number) > 1:
+            raise ArtifactError(f"`{path}` has a newer schema than this version reads", found=schema, hint="update fieldsid")
+        raise ArtifactError(f"`{path}` has a schema that there is not", found=schema, hint=f"such a file has `schema: {kind}/1`")
     return body
 
 
@@ -116,20 +134,60 @@ def _parsed(text: str) -> object:
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """Read a YAML mapping; raises ArtifactError when it cannot be read or is not a mapping."""
+    return yaml_mapping(read_text(path), path)
+
+
+def read_text(path: Path) -> str:
+    """Read a text file; raises ArtifactError when it cannot be read or is no text."""
     try:
-        body = deepcopy(_parsed(path.read_text(encoding="utf-8")))
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise ArtifactError(
-            f"`{path}` cannot be read: {error.strerror}", found=str(path), hint="check the path and its permissions"
+            f"`{path}` cannot be read: {error.strerror}",
+            found=f"in `{path.parent}`",
+            hint=near_files(path) if isinstance(error, FileNotFoundError) else "check its permissions",
         ) from error
-    except (YAMLError, UnicodeDecodeError) as error:
-        place = str(getattr(error, "problem_mark", "") or error).strip()
-        raise ArtifactError(f"`{path}` is not valid YAML", found=place, hint="mend the line named above") from error
-    if not isinstance(body, dict):
+    except UnicodeDecodeError as error:
         raise ArtifactError(
-            f"`{path}` does not hold a mapping", found=type(body).__name__, hint="the file must have `key: value` lines"
-        )
+            f"`{path}` is not YAML, nor any text", found=str(error), hint="give a file with `key: value` lines"
+        ) from error
+
+
+def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
+    """Return the mapping that a YAML text holds; raises ArtifactError naming the file it came from."""
+    try:
+        body = deepcopy(_parsed(text))
+    except YAMLError as error:
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+        found = str(error).strip() if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
+        raise ArtifactError(f"`{path}` is not valid YAML", found=found, hint="mend the line named above") from error
+    except (ValueError, RecursionError) as error:  # a date that there is not, brackets without end
+        found = f"{type(error).__name__}: {error}"
+        raise ArtifactError(f"`{path}` holds a value that YAML cannot read", found=found, hint="put text in quotes") from error
+    if not isinstance(body, dict):
+        raise ArtifactError(f"`{path}` holds no keys with values", found=_shape_of(body), hint="write `key: value` lines")
     return body
+
+
+def near_files(path: Path) -> str:
+    """Return what a file that is not there may have meant."""
+    names = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() and os.access(path.parent, os.R_OK) else []
+    close = difflib.get_close_matches(path.name, names, n=1)
+    return f"did you mean `{quote(str(path.parent / close[0]))}`?" if close else "check the path"
+
+
+def _shape_of(body: object) -> str:
+    return "nothing" if body is None else "a list" if isinstance(body, list) else f"the text {str(body)[:40]!r}"
+
+
+def inputs_of(path: Path) -> tuple[Path, ...]:
+    """Return the files that a record says it was made from, those that are still there; none where it cannot be read."""
+    try:
+        inputs = read_yaml(path).get("inputs")
+        named = [Path(str(entry["path"])) for entry in inputs or ()]
+    except (ArtifactError, TypeError, KeyError):
+        return ()
+    return tuple(p for p in dict.fromkeys(named) if p.exists())
 
 
 def to_yaml(body: Mapping[str, Any]) -> str:
@@ -156,7 +214,13 @@ def plain(value: Any) -> Any:  # noqa: PLR0911 - one return per kind of value
         return int(value)
     if isinstance(value, (float, np.floating)):
         return float(value) if math.isfinite(value) else None
-    return None if value is None else str(value)
+    return value if value is None or isinstance(value, LiteralScalarString) else str(value)
+
+
+def block(text: str) -> str:
+    """Return a text of several lines that `to_yaml` writes line by line, not as one quoted line."""
+    literal: str = LiteralScalarString(text)
+    return literal
 
 
 def _umask() -> int:

@@ -49,5 +49,9 @@ class ModelError(FieldsidError):
     """A model that cannot be built or simulated."""
 
 
+class DivergenceError(ModelError):
+    """A fit or a search that came to a motion without bound, or to a number that is none."""
+
+
 class EffectError(FieldsidError):
     """An effect, ours or a user's, that is wrong or cannot take part."""

@@ -4,16 +4,33 @@ from __future__ import annotations
 
 import difflib
 import pkgutil
-from collections.abc import Mapping
+import sys
+import traceback
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
-from importlib.metadata import entry_points
+from importlib import import_module, metadata
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
 from fieldsid.errors import FieldsidError, UsageError
 
 _added: dict[str, dict[str, Any]] = {}
+_refused: dict[str, dict[str, FieldsidError]] = {}
+"""Why what was to be added takes no part, by the name it would be asked for by."""
+_unfit: dict[str, dict[str, FieldsidError]] = {}
+"""The same of entry points, for as long as the process lasts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """Where an entry point leads: what it says, the distribution with its version, the file; empty where that is not known."""
+
+    value: str
+    distribution: str
+    file: str
 
 
 def add(package: str, item: Any) -> None:
@@ -21,9 +38,26 @@ def add(package: str, item: Any) -> None:
     _added.setdefault(package, {})[item.name] = item
 
 
+def refuse(package: str, name: str, error: FieldsidError) -> None:
+    """Keep why what was to be added under a name takes no part: whoever asks for that name is told so by `pick`."""
+    _refused.setdefault(package, {})[name] = error
+
+
+def refusal(package: str, name: str) -> FieldsidError | None:
+    """Return why the member of a name takes no part, None where none of that name was refused or failed."""
+    return _refused.get(package, {}).get(name) or _unfit.get(package, {}).get(name)
+
+
+def refused() -> tuple[FieldsidError, ...]:
+    """Return why members take no part, of all registries read so far: what was refused, and entry points that failed."""
+    found = [error for why in (_refused, _unfit) for errors in why.values() for error in errors.values()]
+    return tuple({id(error): error for error in found}.values())
+
+
 def forget(package: str) -> None:
-    """Forget the members of a registry that were added in this process."""
+    """Forget the members of a registry that were added in this process, and those refused."""
     _added.pop(package, None)
+    _refused.pop(package, None)
 
 
 def members(package: str, attribute: str) -> Mapping[str, Any]:
@@ -35,37 +69,98 @@ def members(package: str, attribute: str) -> Mapping[str, Any]:
 def _installed(package: str, attribute: str) -> Mapping[str, Any]:
     """Return the objects named `attribute` of a package's modules, by name, then those of entry points.
 
-    A module whose name starts with an underscore is a helper and is passed over. Entry points of the group
-    named like the package add members from outside. Raises FieldsidError where a file's name and its
-    object's name differ, or where two members share one name.
+    A module whose name starts with an underscore is a helper and is passed over; so is a folder, a room of helpers. Entry
+    points of the group named like the package add members from outside; one that cannot be loaded, or whose name is taken,
+    takes no part: see `refused`. Raises FieldsidError where a file of the package's own and its object are named differently.
     """
     found: dict[str, Any] = {}
     for info in pkgutil.iter_modules(import_module(package).__path__):
-        if info.name.startswith("_"):
+        if info.ispkg or info.name.startswith("_"):
             continue
         module = import_module(f"{package}.{info.name}")
         found[info.name] = _named(getattr(module, attribute, None), attribute, info.name)
-    for point in entry_points(group=package):
-        if point.name in found:
-            raise FieldsidError(
-                f"two members of `{package}` are named {point.name!r}",
-                found=f"the second comes from `{point.value}`",
-                hint="rename the entry point",
-            )
-        found[point.name] = _named(point.load(), attribute, point.name)
-    return MappingProxyType(found)
+    kind = type(next(iter(found.values()))) if found else object
+    return MappingProxyType({**found, **_from_outside(package, attribute, kind, frozenset(found))})
+
+
+def _from_outside(package: str, attribute: str, kind: type, taken: frozenset[str]) -> dict[str, Any]:
+    """Return the members of entry points by name; keep why each other one takes no part."""
+    unfit = _unfit[package] = {}
+    found: dict[str, Any] = {}
+    points = sorted(entry_points(group=package), key=lambda point: (point.name, point.value))
+    count = Counter(point.name for point in points)
+    for point in points:
+        try:
+            if point.name in taken or count[point.name] > 1:
+                raise _taken_name(package, point, points)
+            found[point.name] = _loaded(point, attribute, kind)
+        except FieldsidError as error:
+            unfit.setdefault(point.name, error)
+    return found
+
+
+def _taken_name(package: str, point: EntryPoint, points: Sequence[EntryPoint]) -> FieldsidError:
+    others = [other.value for other in points if other.name == point.name and other.value != point.value]
+    return FieldsidError(
+        f"the entry point `{point.name} = {point.value}`: the name {point.name!r} is taken in `{package}`",
+        found=f"another one at {', '.join(f'`{o}`' for o in others) or f'`{package}.{point.name}`'}",
+        hint="rename one of them, or uninstall its package",
+    )
+
+
+def _loaded(point: EntryPoint, attribute: str, kind: type) -> Any:
+    """Return what an entry point leads to, knowing where it came from; raises FieldsidError, whatever the code there raises."""
+    place = f"the entry point `{point.name} = {point.value}`"
+    try:
+        item = _named(point.load(), attribute, point.name)
+    except FieldsidError as error:
+        raise FieldsidError(f"{place}: {error.what}", found=error.found, hint=error.hint) from error
+    except (Exception, SystemExit) as error:  # code of somebody else's may raise anything
+        raise FieldsidError(
+            f"{place} cannot be loaded",
+            found=f"{_place_of(error) or _distribution(point)}: {type(error).__name__}: {error}",
+            hint=f"mend it, or uninstall {_distribution(point)}",
+        ) from error
+    if not isinstance(item, kind):
+        raise FieldsidError(
+            f"{place} leads to no {kind.__name__}",
+            found=type(item).__name__,
+            hint=f"let it lead to an object of `{kind.__module__}.{kind.__name__}`",
+        )
+    placed = getattr(item, "placed", None)
+    file = getattr(sys.modules.get(point.module), "__file__", None) or ""
+    return item if placed is None else placed(Outside(point.value, _distribution(point), file))
+
+
+def _place_of(error: BaseException) -> str:
+    """Return the file and line that an error comes from; empty where it comes from importing itself."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}:{error.lineno}"
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return "" if last.filename.startswith("<") or last.filename == metadata.__file__ else f"{last.filename}:{last.lineno}"
+
+
+def _distribution(point: EntryPoint) -> str:
+    return "an unknown package" if point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
 def pick(package: str, attribute: str, name: str) -> Any:
-    """Return one member by name; raises UsageError naming the near matches."""
+    """Return one member by name; raises UsageError naming the near matches, or what is wrong with the one of that name."""
     known = members(package, attribute)
     if name in known:
         return known[name]
+    if (why := refusal(package, name)) is not None:
+        raise why
     raise UsageError(
         f"there is no {attribute.lower()} named {name!r}",
         found=", ".join(sorted(known)),
         hint=near(name, known),
     )
+
+
+def define(package: str, text: str, file: str) -> Any:
+    """Return the member of a registry that a text defines, as the package's own `define` reads it; file is where it lived."""
+    return import_module(package).define(text, file)
 
 
 def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:

@@ -1,4 +1,7 @@
-"""A value and its error, rounded together by the rule of the Particle Data Group (Review of Particle Physics, 5.3)."""
+"""A value and its error, rounded together by the rule of the Particle Data Group (Review of Particle Physics, 5.3).
+
+And a number as it decides: processors add up in different orders, and of two that are equal but for that the first is taken.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,11 @@ def digits_of_error(error: float) -> int:
     if leading >= 950:
         return -exponent
     return 1 - exponent if leading <= 354 else -exponent
+
+
+def nine_digits(value: float) -> float:
+    """Return a number to nine digits: those beyond hang on the order in which a sum was added up."""
+    return float(f"{value:.8e}")
 
 
 def with_error(value: float, error: float, *, sign: str = "+/-") -> str:
@@ -46,3 +54,8 @@ def number(value: float | None, digits: int = 4) -> str:
     if -5 <= exponent < 7:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
     return f"{value:.{digits - 1}e}"
+
+
+def in_unit(unit: str) -> str:
+    """Return a unit as it is printed behind a number: nothing where the number is a plain one, whose unit is 1."""
+    return "" if unit == "1" else unit

@@ -36,7 +36,13 @@ def validated(model: type[M], body: Mapping[str, Any], *, place: str, error: typ
 
 def read_model(model: type[M], path: Path, *, error: type[FieldsidError]) -> M:
     """Read a YAML file as a `model`; raises ArtifactError for bad YAML and `error` for a body that does not fit."""
-    return validated(model, read_yaml(path), place=f"`{path}`", error=error)
+    body = read_yaml(path)
+    wanted, schema = model.model_fields.get("schema_"), str(body.get("schema", ""))
+    if wanted is not None and schema.startswith("fieldsid/") and schema != wanted.default:
+        raise error(
+            f"`{path}` is another kind of file", found=f"schema: {schema}", hint=f"give one with `schema: {wanted.default}`"
+        )
+    return validated(model, body, place=f"`{path}`", error=error)
 
 
 def _explained(model: type[StrictModel], failure: ValidationError, place: str, error: type[FieldsidError]) -> FieldsidError:
@@ -56,13 +62,13 @@ def _explained(model: type[StrictModel], failure: ValidationError, place: str, e
         return error(
             f"{place} lacks `{where}`",
             found="no such key",
-            hint=f"add a line `{first['loc'][-1]}: ...`; `sysid init` writes an example",
+            hint=f"add a line `{first['loc'][-1]}: ...`; `sysid init NAME` writes an example",
         )
     value = first["input"]
     return error(
         f"{place}: `{where or 'the file'}` is not valid: {_lower(first['msg'])}",
         found=f"{value!r} ({type(value).__name__})",
-        hint=f"correct `{where or 'the file'}`; `sysid init` writes an example",
+        hint=f"correct `{where or 'the file'}`; `sysid init NAME` writes an example",
     )
 
 

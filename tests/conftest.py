@@ -73,6 +73,14 @@ def run_cli(capfd: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
 
 
 @pytest.fixture(scope="session")
+def guide_session(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Return what the command lines of the guide gave, each run once: its pages are compared with it, its schemas check it."""
+    from guide.make import everything_run
+
+    return everything_run(tmp_path_factory.mktemp("guide"))
+
+
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Return the folder of third-party data; skips, saying why, where it is absent."""
     folder = ROOT.parent / "shared" / "data"

@@ -26,10 +26,12 @@ class Files:
     unseen: Path
 
 
-def flown(name, maneuver, speed, seed, *, lag=LAG):
-    """A run at 10 Hz over 33 s; damping grows with the speed, authority with its square."""
+def flown(name, maneuver, speed, seed, *, lag=LAG, quadratic=0.0):
+    """A run at 10 Hz over 33 s; damping grows with the speed, authority with its square, drag with the rate's."""
     scale = speed / REFERENCE
-    physics = Physics(damping=1.1 * scale, authority=-1.2 * scale**2, trim=0.01, servo_tau=lag, nominal_speed=speed)
+    physics = Physics(
+        damping=1.1 * scale, authority=-1.2 * scale**2, trim=0.01, servo_tau=lag, nominal_speed=speed, quadratic=quadratic
+    )
     motion, rng = fly(physics, CLOCK, maneuver), np.random.default_rng(seed)
     n = CLOCK.samples
     signals = {
@@ -41,15 +43,15 @@ def flown(name, maneuver, speed, seed, *, lag=LAG):
     return Run(name, motion.time, signals)
 
 
-def runs(*, lag=LAG):
+def runs(**hull):
     """Two training runs and one unseen run."""
-    train = [flown(f"pulses_{u}", maneuvers.pulses(CLOCK.time), u, i, lag=lag) for i, u in enumerate((1.0, 1.8))]
-    return train, flown("zigzag", maneuvers.zigzag(CLOCK.time, 0.25, 0.4), 1.4, 9, lag=lag)
+    train = [flown(f"pulses_{u}", maneuvers.pulses(CLOCK.time), u, i, **hull) for i, u in enumerate((1.0, 1.8))]
+    return train, flown("zigzag", maneuvers.zigzag(CLOCK.time, 0.25, 0.4), 1.4, 9, **hull)
 
 
-def files(folder, *, lag=LAG):
+def files(folder, **hull):
     """The same as Parquet files in a folder."""
-    train, unseen = runs(lag=lag)
+    train, unseen = runs(**hull)
     return Files(tuple(save_run(r, folder / f"{r.name}.parquet") for r in train), save_run(unseen, folder / "zigzag.parquet"))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from cli import trial
 
+import fieldsid
 from fieldsid.cli.catalogue import entries
 from fieldsid.cli.front import command_list
 from fieldsid.fitting.fit import estimators
@@ -57,4 +58,14 @@ def test_the_python_example_of_the_readme_runs_as_written(tmp_path, monkeypatch,
     trial.flown(tmp_path / "runs", spec="zigzag", name="zigzag")
     (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     exec(compile(example, "README.md", "exec"), {})  # noqa: S102 - the example is ours
-    assert capsys.readouterr().out.startswith("zigzag: rate fit 9")
+    said = capsys.readouterr().out
+    assert said.startswith("zigzag: rate fit 9")
+    assert "\nParameters at 1.40 m/s\n" in said
+    assert (tmp_path / "parameters.csv").read_text().startswith("parameter,value,std_error,low95,high95,unit\na22,")
+    assert (tmp_path / "pulses.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_functions_the_readme_names_are_there():
+    named = set(re.findall(r"\bfs\.([a-z_]+)", README)) | set(re.findall(r"There are (.+?) as well", README)[0].split("`")[1::2])
+    assert {"load", "identify", "compare", "diagnose", "turn_radius", "save"} <= named
+    assert [name for name in named if not hasattr(fieldsid, name)] == []

@@ -25,6 +25,7 @@ millions that stay: looking at Python's own pace takes a fifth of the time of co
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line and return its exit code; data go to stdout, all else to stderr."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    raised: Exception | None = None
     try:
         code = _dispatch(arguments)
         sys.stdout.flush()
@@ -34,11 +35,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         # The reader went away (`| head`): point stdout elsewhere so that the interpreter's last flush is quiet.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return DONE
+        code = DONE
     except Exception as error:  # noqa: BLE001 - the one boundary: every error becomes a message and an exit code
         from fieldsid.cli.failure import explain
 
-        return explain(error, arguments)
+        code, raised = explain(error, arguments), error
+    _tell_refused(raised)
     return code
 
 
@@ -79,7 +81,8 @@ def run(arguments: Sequence[str]) -> Any:
 
     from fieldsid.cli.own import load_own_effects
 
-    load_own_effects()
+    if "--help" not in arguments:
+        load_own_effects()
     module = import_module(known[name].module)
     program = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     if isinstance(module.command, typer.Typer):
@@ -105,6 +108,19 @@ def _dispatch(arguments: list[str]) -> int:
     if result == INTERRUPTED:  # typer makes a number of it
         raise KeyboardInterrupt
     return result if isinstance(result, int) else DONE
+
+
+def _tell_refused(raised: Exception | None) -> None:
+    """Say once, at the end of a command, which effects and plug-ins took no part and why; not what was raised already."""
+    if "fieldsid.registry" not in sys.modules:
+        return
+    from fieldsid.registry import refused
+
+    errors = refused()
+    if errors:
+        from fieldsid.cli.failure import tell_refused
+
+        tell_refused(errors, raised)
 
 
 def _unknown(name: str, known: tuple[str, ...]) -> Exception:

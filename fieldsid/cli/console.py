@@ -6,10 +6,11 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, TypeVar
 
 from rich.console import Console, RenderableType
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -79,12 +80,19 @@ def progress(says: str, total: int) -> Iterator[Callable[[], None]]:
         yield lambda: bar.advance(task)
 
 
-def tracked(items: Sequence[T], says: str) -> Iterator[T]:
-    """Yield the items while a bar on a terminal shows how many are done."""
-    with progress(says, len(items)) as step:
-        for item in items:
-            yield item
-            step()
+def tracked(items: Sequence[T], says: str) -> Iterator[tuple[T, Callable[[float], None]]]:
+    """Yield the items while a bar on a terminal shows how far it is, each with a function that tells how much of it is done."""
+    console = messages()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(says, total=len(items))
+        for i, item in enumerate(items):
+            yield item, partial(_show_share, bar, task, i)
+            bar.update(task, completed=i + 1)
+
+
+def _show_share(bar: Progress, task: TaskID, done: int, share: float) -> None:
+    bar.update(task, completed=done + share)
 
 
 def _console(*, stderr: bool) -> Console:

@@ -8,6 +8,6 @@ DAY: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("From run to model", ("identify", "compare", "simulate")),
     ("The missing effect", ("diagnose", "extend", "history", "effects")),
     ("Turning and gains", ("fit", "turn-radius", "schedule")),
-    ("Log book, live, tour", ("report", "online", "demo")),
+    ("Tour and manual", ("demo", "guide")),
 )
 """Headings and, under each, the names of its commands."""

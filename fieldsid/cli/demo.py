@@ -41,7 +41,7 @@ EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The e
 def command(
     effect: EffectName = HIDDEN, output: OutputDir = None, force: Force = False, as_json: JsonFlag = False
 ) -> Mapping[str, Any]:
-    """Take a tour: every command as you would type it, with its result and what it means.
+    """Take a tour: the command of each step as you would type it, with its result and what it means.
 
     The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.

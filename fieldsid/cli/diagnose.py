@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
-from fieldsid.cli.options import AxisOption, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
-from fieldsid.cli.patience import compiling_first, get_ready, refuse_existing, trying
+from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.cli.patience import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,15 +24,11 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 MOST_PLACES, MOST_SPOKEN = 5, 3
-LIKELY = 0.05
-"""Probability from which on the evidence for a rival is spoken out."""
 NAME_WIDTH = 30
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
 ]
-FigureFile = Annotated[Path | None, typer.Option("--figure", metavar="PNG", help="Draw the candidates.", show_default=False)]
-
 Thorough = Annotated[
     bool, typer.Option("--thorough", help="Go on for as long as there is something to try, half a minute where much is left.")
 ]
@@ -52,28 +48,38 @@ def command(
 ) -> Mapping[str, Any]:
     """Say which physical effect the model is missing, how sure that is, and what else it could be.
 
-    Every effect of the catalogue, and every one in `effects/*.yaml`, is added to a model fitted to all runs together, and judged
-    by its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis is kept
-    for `sysid plan --from FILE`.
+    Every effect of the catalogue, and every one of your own in `effects/`, is added to a model fitted to all runs together, and
+    judged by its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis
+    is kept for `sysid plan --from FILE`.
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import files_of, read_runs
+    from fieldsid.cli.inputs import files_of, read_groups
+    from fieldsid.cli.own import check_effects
+    from fieldsid.cli.skips import Skips
 
-    refuse_existing(output, figure, force=force)
+    refuse_existing(output, force=force)
+    refuse_figure(figure, force=force)
     known = _known(model, axis)
-    logs = read_runs([*runs, *(validate or [])], mapping=mapping, meanwhile=partial(get_ready, "fieldsid.diagnosis"))
+    skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
+    held = partial(check_effects, [(model, known)] if model and known else [])
+    training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
     from fieldsid.diagnosis import diagnose
+    from fieldsid.models.definition import NONE
 
-    training, unseen = logs[: len(runs)], logs[len(runs) :]
+    effects = known.effects if known else ()
     with compiling_first(), trying("diagnosing") as report:
-        found = diagnose(training, axis, unseen, known=known.effects if known else (), report=report, thorough=thorough)
-    inputs = [*files_of(logs), *([model] if model else [])]
-    body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model)
+        own = known.own if known else NONE
+        found = diagnose(training, axis, unseen, known=effects, own=own, report=report, thorough=thorough, unfit=skips.skip)
+    training, unseen = skips.left_of(training), skips.left_of(unseen)
+    inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
+    body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
     body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, force=force)}
     if not as_json:
         warn(found.notes)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, found, body))
+    emit(body, as_json=as_json, render=lambda to: _render(to, found, body))
+    skips.end(len(training) + len(unseen))
+    return body
 
 
 def _known(path: Path | None, axis: Axis) -> Model | None:
@@ -152,7 +158,7 @@ def _candidates(found: Diagnosis) -> Any:
             _probability(c.probability),
             _times(c.errors.train.over(floor)),
             _times(c.errors.validation.over(floor)),
-            f"{100 * c.explained:.0f} %",
+            "worse" if c.worse else f"{100 * c.explained:.0f} %",
             f"{c.score:+.0f}",
         )
         for c in found.candidates
@@ -163,6 +169,8 @@ def _candidates(found: Diagnosis) -> Any:
 def _render_words(to: Console, found: Diagnosis) -> None:
     """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
     from rich.text import Text
+
+    from fieldsid.diagnosis.verdict import LIKELY
 
     if found.verdict == "sufficient":
         return

@@ -10,7 +10,9 @@ import typer
 
 from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.options import Force, JsonFlag
-from fieldsid.cli.own import OWN_EFFECTS
+from fieldsid.cli.own import OWN_EFFECTS, load_own_effects
+from fieldsid.cli.patience import refuse_existing
+from fieldsid.errors import UsageError
 from fieldsid.models.axis import Axis
 
 if TYPE_CHECKING:
@@ -22,9 +24,15 @@ command = typer.Typer(help="List the physical effects, show one, start one of yo
 
 EffectName = Annotated[str, typer.Argument(metavar="NAME", help="Name of an effect, as in `sysid effects list`.")]
 OneAxis = Annotated[Axis | None, typer.Option("--axis", help="Only the effects of this plane.", show_default=False)]
+NewName = Annotated[
+    str, typer.Argument(metavar="NAME", help="Name that yours shall have: a small letter, then letters, digits, _.")
+]
+NewAxis = Annotated[Axis, typer.Option("--axis", help="The plane that it acts on.")]
 NewFile = Annotated[
     Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="File to write; effects/NAME.yaml if not given.", show_default=False),
+    typer.Option(
+        "-o", "--output", metavar="FILE", help="YAML file to write; effects/NAME.yaml if not given.", show_default=False
+    ),
 ]
 
 
@@ -49,16 +57,66 @@ def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
 
 
 @command.command("new", short_help="Start an effect of your own.")
-def new(name: EffectName, axis: OneAxis = None, output: NewFile = None, force: Force = False) -> None:
-    """Write a file for an effect of your own, to be edited; it takes part in diagnose, extend and compare."""
+def new(
+    name: NewName, axis: NewAxis = Axis.YAW, output: NewFile = None, force: Force = False, as_json: JsonFlag = False
+) -> Mapping[str, Any]:
+    """Write a file for an effect of your own, to be edited: a YAML file with a moment as an expression.
+
+    Every command that is run in the folder that `effects/` is in knows it, and a model that holds it takes it along.
+
+    Example: sysid effects new tether_drag --axis yaw
+    """
     from fieldsid.artifacts import write_text
+
+    path = output or Path(OWN_EFFECTS) / f"{name}.yaml"
+    _refuse_name(name, path)
+    refuse_existing(path, force=force)
+    write_text(path, _started(name, axis, path), force=force)
+    load_own_effects()  # what was broken in a file that is replaced is so no more
+    body = {"schema": "fieldsid/new-effect/1", "name": name, "axis": axis, "file": str(path)}
+    return emit(body, as_json=as_json, render=lambda _to: say(f"wrote {path}: edit it, then {_look_at(path, name)}"))
+
+
+def _refuse_name(name: str, path: Path) -> None:
+    """Refuse a name that no effect can have, or that one has which is not in the file to be written; raises FieldsidError."""
+    from fieldsid.effects import all_effects
+    from fieldsid.effects._user import checked_name, name_like
+    from fieldsid.models.effect import REGISTRY
+    from fieldsid.registry import refusal
+
+    effects = all_effects()
+    checked_name(name, effects)
+    known = effects.get(name)
+    if known is not None and Path(known.origin).resolve() != path.resolve():
+        what = f"there is an effect named {name!r} already"
+        raise UsageError(what, found=known.origin, hint=f"call it `{name_like(name, effects)}`")
+    if (why := refusal(REGISTRY, name)) is not None and not path.exists():
+        raise why
+
+
+def _started(name: str, axis: Axis, path: Path) -> str:
+    """Return the text of a new effect; raises FieldsidError where the file would not be read as that effect."""
+    from fieldsid.effects import all_effects, refuse_clash
+    from fieldsid.effects._user import SUFFIXES, effect_of_text
     from fieldsid.templates import template_path
 
+    if path.suffix not in SUFFIXES:
+        raise UsageError(
+            f"`{path}` is no YAML file", found=path.suffix or "no suffix", hint=f"write `-o {path.with_suffix('.yaml')}`"
+        )
     text = template_path("effect.yaml").read_text(encoding="utf-8")
-    for old, own in _changes(name, axis or Axis.YAW):
+    for old, own in _changes(name, axis):
         text = text.replace(old, own)
-    path = write_text(output or Path(OWN_EFFECTS) / f"{name}.yaml", text, force=force)
-    say(f"wrote {path}: edit it, then `sysid effects show {name}`")
+    others = [e for e in all_effects().values() if e.name != name]  # whose that name is, `_refuse_name` has asked
+    refuse_clash(effect_of_text(text, path, origin=str(path)), others)
+    return text
+
+
+def _look_at(path: Path, name: str) -> str:
+    """Return what to do when it is edited: outside the working folder's own it is not read from here."""
+    if path.parent.resolve() == Path(OWN_EFFECTS).resolve():
+        return f"`sysid effects show {name}`"
+    return f"put it in the `{OWN_EFFECTS}/` of the folder you work in"
 
 
 def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
@@ -115,6 +173,9 @@ def _render_list(to: Console, known: Iterable[Effect]) -> None:
         if rows:
             to.print(table(stage.capitalize(), ("effect", "axes", "in plain words"), rows, left=3))
             to.print()
+    for effect in known:
+        if effect.definition is not None:
+            to.print(f"{effect.name} is not built in: {effect.origin}", soft_wrap=True)
     to.print("`sysid effects show NAME` tells the equation, the telltale and what excites it.")
 
 
@@ -126,6 +187,8 @@ def _form_in_words(effect: Effect, form: Form) -> str:
 
 
 def _render_one(to: Console, effect: Effect) -> None:
+    from fieldsid.rounding import in_unit
+
     facts = [
         ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
         ("equation", effect.equation),
@@ -140,7 +203,8 @@ def _render_one(to: Console, effect: Effect) -> None:
     to.print(f"{effect.name}: {effect.says}\n")
     to.print(table("", ("", ""), facts, left=2))
     rows = [
-        (c.name, c.unit, f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else "")) for c in effect.every
+        (c.name, in_unit(c.unit), f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
+        for c in effect.every
     ]
     to.print()
     to.print(table("", ("coefficient", "unit", "range", "is"), rows, left=4))

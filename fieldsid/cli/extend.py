@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,6 +16,7 @@ import typer
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
 from fieldsid.cli.patience import compiling_first, get_ready, refuse_existing, trying
+from fieldsid.cli.skips import Skips
 from fieldsid.errors import ArtifactError, UsageError
 
 if TYPE_CHECKING:
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 SCHEMA = "fieldsid/extend/1"
+AT_THE_FLOOR = {"yaw": "turn-radius", "pitch": "schedule design"}
+"""What a model is for once it leaves no more than the noise."""
+MORE = "more is missing than the sensors' noise explains"
 NEAR = 1e-6
 """Share of a coefficient's range from its bound within which it lies at it."""
 MUCH, SMALL = 100.0, 1e-3
@@ -67,12 +72,15 @@ def command(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
         return _undone(model, output, force=force, as_json=as_json)
+    skips = Skips()
     body, notes = _extended(
-        model, runs or [], _names(add), validate or [], keep=keep, mapping=mapping, output=output, force=force
+        model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
     )
     if not as_json:
         warn(notes)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    skips.end(len(runs or []) + len(validate or []) - len(skips.records))
+    return body
 
 
 def _names(given: Sequence[str] | None) -> list[str]:
@@ -85,32 +93,63 @@ def _extended(
     runs: Sequence[Path],
     names: Sequence[str],
     validate: Sequence[Path],
+    skips: Skips,
     *,
     keep: bool,
     mapping: Path | None,
     output: Path | None,
     force: bool,
 ) -> tuple[dict[str, Any], Sequence[Any]]:
-    from fieldsid.cli.inputs import read_runs
+    from fieldsid.cli.inputs import read_groups, refuse_swapped
+    from fieldsid.models.model import load_model
 
+    refuse_swapped("extend", path, runs)
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
     target = output or path.with_name(f"{path.stem}+{'+'.join(dict.fromkeys(names))}.yaml")
-    refuse_existing(target, force=force)
-    logs = read_runs([*runs, *validate], mapping=mapping, meanwhile=partial(get_ready, "fieldsid.extension"))
-    from fieldsid.extension import extend, save_extension
-    from fieldsid.models.model import load_model
-
     known = load_model(path)
-    training, unseen = logs[: len(runs)], logs[len(runs) :]
+    refuse_existing(target, force=force)
+    check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
+    training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
+    from fieldsid.extension import extend, save_extension
+
     with compiling_first(), trying("extending") as report:
-        found = extend(known, names, training, unseen, report=report)
+        found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
+    training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
         save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
-    return _body(found, known, path, target if kept else None), found.notes
+    body = _body(found, known, path, target if kept else None) | {"skipped_runs": skips.records}
+    return body | _left(found, body, runs, validate, mapping), found.notes
+
+
+def _check(path: Path, model: Model, names: Sequence[str]) -> None:
+    from fieldsid.cli.own import check_effects
+    from fieldsid.extension.extend import new_effects
+
+    check_effects([(path, model)])
+    new_effects(model, names)
+
+
+def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
+    """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
+    from fieldsid.diagnosis.verdict import VISIBLE
+
+    fitted, unseen = found.gain.left(kept=body["kept"])
+    more = any(error > VISIBLE for error in (fitted, unseen))
+    if more:
+        options = [
+            f"--axis {body['axis']}",
+            f"--model {quote(body['model'])}",
+            *(f"--validate {quote(str(p))}" for p in validate),
+        ]
+        options += [f"--mapping {quote(str(mapping))}"] if mapping is not None else []
+        command = " ".join(["sysid diagnose", *(quote(str(p)) for p in runs), *options])
+    else:
+        command = f"sysid {AT_THE_FLOOR[body['axis']]} {quote(body['model'])}"
+    return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}
 
 
 def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> dict[str, Any]:
@@ -182,7 +221,7 @@ def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
-    from fieldsid.rounding import number
+    from fieldsid.rounding import in_unit, number
 
     before, after = body["over_floor"]["before"], body["over_floor"]["after"]
     where = "unseen data" if body["unseen"] else "the runs fitted to"
@@ -201,11 +240,22 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     ]
     to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
     to.print()
-    found = [(n, _value(c["value"], c["std_error"], at_bound=c["at_bound"]), c["unit"]) for n, c in body["coefficients"].items()]
+    found = [
+        (n, _value(c["value"], c["std_error"], at_bound=c["at_bound"]), in_unit(c["unit"]))
+        for n, c in body["coefficients"].items()
+    ]
     to.print(table("", ("coefficient", "value", "unit"), found, left=2))
     to.print()
     to.print(Text(_verdict(body)))
+    to.print(Text(_says_left(body)))
     to.print(f"model: {body['model']}", soft_wrap=True)
+    to.print(Text(f"next: {body['next']}"), soft_wrap=True)
+
+
+def _says_left(body: Mapping[str, Any]) -> str:
+    sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
+    said = ", ".join(f"{error:.2f} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    return f"left: {said}: " + (MORE if body["left"]["more_than_noise"] else "that is the noise")
 
 
 def _verdict(body: Mapping[str, Any]) -> str:

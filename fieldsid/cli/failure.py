@@ -20,6 +20,9 @@ from fieldsid.errors import FieldsidError, UsageError
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What the system answers where a disk, or a user's share of it, is full."""
 
+CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EIO)
+"""What it answers where a path leads nowhere that may be read or written."""
+
 
 def explain(error: Exception, arguments: Sequence[str]) -> int:
     """Print an error on stderr and return its exit code."""
@@ -30,6 +33,8 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
         error = _as_usage(error, arguments)
     if isinstance(error, OSError) and error.errno in FULL:
         error = _as_full(error)
+    if isinstance(error, OSError) and error.errno in CLOSED and error.filename:
+        error = UsageError(f"`{error.filename}` cannot be reached: {error.strerror}", hint="check the path and its permissions")
     if isinstance(error, FieldsidError):
         sys.stderr.write(f"error: {error}\n")
         return BAD_INPUT
@@ -39,6 +44,19 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
         f"  found: the trace is in `{trace}`\n\nhint: send us that file with the log that caused it\n"
     )
     return OUR_BUG
+
+
+def tell_refused(errors: Sequence[FieldsidError], raised: Exception | None) -> None:
+    """Print on stderr why parts that are not built in took none, but for the one that an error was raised for."""
+    told: list[BaseException] = []
+    cause: BaseException | None = raised
+    while cause is not None:
+        told.append(cause)
+        cause = cause.__cause__
+    for error in errors:
+        if not any(error is one for one in told):
+            found, hint = (f"\n  {word}: {said}" if said else "" for word, said in (("found", error.found), ("hint", error.hint)))
+            sys.stderr.write(f"warning: {error.what}; it takes no part{found}{hint}\n")
 
 
 def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageError:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +15,7 @@ from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFil
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.turning.law import ParameterLaw
+    from fieldsid.turning.law import ParameterLaw, PointCheck
     from fieldsid.turning.laws import Laws
 
 Unweighted = Annotated[bool, typer.Option("--unweighted", help="Let every point count alike, standard errors or not.")]
@@ -32,7 +33,8 @@ def command(
     """Fit the laws that carry a model from one speed to the next: authority against u^2, damping and trim against u.
 
     Takes model files of one axis, or one CSV table with speed_m_s and any of a22,b2,C0,c22,c23,d2,Cb (`<name>_std_error` where
-    known; `-` is standard input). With `-o FILE` the laws are written for `turn-radius` and `schedule`, a figure beside them.
+    known; `-` is standard input). With `-o FILE` the laws are written for `turn-radius` and `schedule`, the models with their
+    effects and errors inside, a figure beside them.
 
     Example: sysid fit models/*.yaml -o law.yaml
     """
@@ -41,12 +43,13 @@ def command(
     from fieldsid.turning.source import load_source
 
     source = load_source(models)
-    if not source.models and source.laws is not None and str(models[0]).endswith((".yaml", ".yml")):
+    if source.is_fit_file:
         raise UsageError("this is a fit file already", found=str(models[0]), hint="give models or a table")
     laws = fit_laws(source.axis, source.points, weighted=not unweighted)
     body: dict[str, Any] = {"schema": "fieldsid/fit/1", **report(laws), "file": None, "figure": None}
     if output is not None:
-        body["file"] = str(save_laws(laws, output, inputs=[p for p in source.paths if p.is_file()], force=force))
+        there = [p for p in source.paths if p.is_file()]
+        body["file"] = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
         if figures:
             body["figure"] = str(_draw(laws, output.with_suffix(".png"), force=force))
     if not as_json:
@@ -104,14 +107,21 @@ def _render_left_out(to: Console, law: ParameterLaw) -> None:
             number(p.value),
             number(p.predicted_without),
             number(p.leading_coefficient_without),
-            f"{p.studentised:+.1f}",
+            f"{p.studentised:+.1f}" if isfinite(p.limit) else "-",
             "" if p.belongs else "does not belong",
         )
         for p in law.points
     ]
-    title = f"leave one out, |{law.name}|: out of place beyond +/-{law.points[0].limit:.1f}"
-    to.print(table(title, ("point", "m/s", "value", "without it", "slope", "student", ""), rows))
-    to.print()
+    to.print(table(f"leave one out, |{law.name}|", ("point", "m/s", "value", "without it", "slope", "off", ""), rows))
+    to.print(f"off: how far from the law of the others, in standard errors; {_odd(law.points)}\n")
+
+
+def _odd(points: Sequence[PointCheck]) -> str:
+    """Return from how far off a point does not belong, and what that limit means."""
+    limit = points[0].limit
+    if not isfinite(limit):
+        return f"{len(points)} points are too few to say which does not belong"
+    return f"one of {len(points)} points is beyond +/-{limit:.1f} by chance in 1 law of 20, there it does not belong"
 
 
 def _formula(law: ParameterLaw, index: int) -> str:

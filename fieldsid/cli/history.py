@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.console import emit, say, table
-from fieldsid.cli.options import Force, JsonFlag, ModelFile
+from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
+from fieldsid.cli.patience import refuse_figure
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,10 +17,6 @@ if TYPE_CHECKING:
     from fieldsid.extension import Generation
 
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
-
-FigureFile = Annotated[
-    Path | None, typer.Option("--figure", metavar="PNG", help="Draw the error falling to the noise floor.", show_default=False)
-]
 
 
 def command(model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
@@ -31,14 +26,17 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False, a
 
     Example: sysid history models/joint_yaw+servo_lag.yaml --figure history.png
     """
+    from fieldsid.cli.own import read_model
+
+    refuse_figure(figure, force=force)
+    known = read_model(model)
     from fieldsid.extension import history_of
-    from fieldsid.models.model import load_model
 
     line = history_of(model)
     body = {
         "schema": "fieldsid/history/1",
         "model": str(model),
-        "axis": load_model(model).axis.value,
+        "axis": known.axis.value,
         "generations": [_entry(g) for g in line],
         "intact": all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
         "figure": _drawn(line, model, figure, force=force),

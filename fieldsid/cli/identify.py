@@ -24,7 +24,7 @@ from fieldsid.cli.options import (
     VehicleFile,
     names_of,
 )
-from fieldsid.cli.patience import compiling_first, get_ready
+from fieldsid.cli.patience import compiling_first, get_ready, refuse_closed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,11 +32,7 @@ if TYPE_CHECKING:
     from fieldsid.fitting.fit import Fit
     from fieldsid.fitting.merit import Merit
     from fieldsid.fitting.predict import Prediction
-    from fieldsid.logs import Note, Run
-    from fieldsid.models.axis import Axis
-
-NO_WARNING = ("mapping", "noise_model", "fin_measured_used")
-"""Notes that tell how it went, not what is wrong."""
+    from fieldsid.logs import Run
 
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
 Joint = Annotated[bool, typer.Option("--joint", help="One model for all runs: damping and trim shared, authority by speed.")]
@@ -66,18 +62,23 @@ def command(
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
     With `-o` each model is written to DIR/RUN_AXIS.yaml with its figure beside it. `auto` is output error, and prediction error
-    (pem) where the residuals show a disturbance.
+    (pem) where the residuals show a disturbance. Of several runs one that cannot be used is skipped with its reason, and the
+    exit code is 1.
 
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
     from fieldsid.cli.inputs import files_of, read_runs
+    from fieldsid.cli.skips import Skips
 
-    ready = partial(get_ready, "fieldsid.fitting.identify")
-    known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready)
-    from fieldsid.fitting.identify import identify
+    refuse_closed(output)
+    skips, ready = Skips(), partial(get_ready, "fieldsid.fitting.identify")
+    known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready, refused=skips.skip)
+    from fieldsid.fitting.identify import check_joint, identify
     from fieldsid.fitting.method import Options
     from fieldsid.vehicle import find_vehicle, load_vehicle
 
+    if joint:
+        check_joint([run.name for run in known], len(runs))
     with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
         fits = identify(
             known,
@@ -89,12 +90,16 @@ def command(
             whole=whole or start is not None or end is not None,
             options=Options(bandwidth, forgetting),
             done=step,
+            unfit=skips.skip,
         )
-    groups = [known] if joint else [[run] for run in known]
+    used = skips.left_of(known)
+    groups = [used] if joint else [[run] for run in used]
     models = _written(fits, [files_of(group) for group in groups], output, figures=figures, force=force)
     entries = [_entry(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True)]
-    body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries}
-    return emit(body, as_json=as_json, render=lambda to: _render(to, entries))
+    body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries, "skipped_runs": skips.records}
+    emit(body, as_json=as_json, render=lambda to: _render(to, entries))
+    skips.end(len(used))
+    return body
 
 
 def _written(
@@ -133,9 +138,10 @@ def _stem(fit: Fit) -> str:
 
 def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
     from fieldsid.fitting.merit import merit
+    from fieldsid.fitting.notes import is_warning
 
     m, model = merit(fit.predictions), fit.model
-    notes = [n for n in (*fit.notes, *(n for run in logs for n in run.notes)) if _matters(n, model.axis)]
+    notes = [n for n in (*fit.notes, *(n for run in logs for n in run.notes)) if is_warning(n, model.axis)]
     return {
         "run": "+".join(model.runs),
         "model": None if path is None else str(path),
@@ -150,15 +156,6 @@ def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
         "runs": [_of_run(p) for p in fit.predictions],
         "settled_s": None if fit.history is None else dict(fit.history.settled_s),
     }
-
-
-def _matters(note: Note, axis: Axis) -> bool:
-    """Whether a note is a warning, and about a signal that this axis uses where it is about a signal."""
-    from fieldsid.models.axis import NAMES
-
-    names = NAMES[axis]
-    used = {names.angle, names.rate, names.fin, names.fin_measured, names.cross, "surge_m_s"}
-    return note.code not in NO_WARNING and note.data.get("signal", names.angle) in used
 
 
 def _of_run(p: Prediction) -> dict[str, Any]:
@@ -178,20 +175,19 @@ def _merit(m: Merit) -> dict[str, float]:
 
 
 def _parameters(fit: Fit) -> dict[str, dict[str, Any]]:
-    from fieldsid.fitting.offset import offset_of
+    from fieldsid.fitting.estimates import estimates
 
-    out: dict[str, dict[str, Any]] = {}
-    for name, value in fit.model.values.items():
-        out[name] = _parameter(value, fit.model.std_error(name), fit.model.units.get(name, ""))
-    for name, known in dict(fit.model.info.get("law_parameters", {})).items():
-        out[name] = _parameter(known["value"], known["std_error"], "1/s^2" if "@" in name else "1")
-    offset = offset_of(fit.model)
-    out[offset.name] = _parameter(offset.value, offset.std_error, "rad")
-    return out
-
-
-def _parameter(value: float, error: float, unit: str) -> dict[str, Any]:
-    return {"value": value, "std_error": error, "interval95": [value - 1.96 * error, value + 1.96 * error], "unit": unit}
+    law = fit.model.info.get("law_parameters", {})
+    return {
+        e.name: {
+            "value": e.value,
+            "std_error": e.std_error,
+            "interval95": list(e.interval95),
+            "unit": e.unit,
+            "shown": e.name if e.name in law else fit.model.shown(e.name),
+        }
+        for e in estimates(fit.model)
+    }
 
 
 def _render_warnings(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
@@ -213,13 +209,19 @@ def _label(entry: Mapping[str, Any]) -> str:
 
 
 def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
-    from fieldsid.rounding import interval, number, with_error
+    from fieldsid.rounding import in_unit, interval, number, with_error
 
     _render_warnings(to, entries)
     rows = [
-        (_label(e) if i == 0 else "", name, with_error(p["value"], p["std_error"]), p["unit"], interval(*p["interval95"]))
+        (
+            _label(e) if i == 0 else "",
+            p["shown"],
+            with_error(p["value"], p["std_error"]),
+            in_unit(p["unit"]),
+            interval(*p["interval95"]),
+        )
         for e in entries
-        for i, (name, p) in enumerate(e["parameters"].items())
+        for i, p in enumerate(e["parameters"].values())
     ]
     to.print(table("", ("run", "parameter", "value", "unit", "95 % interval"), rows, left=2))
     to.print()

@@ -48,24 +48,32 @@ def command(
     Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
     """
     from fieldsid.cli.console import emit, tracked, warn
+    from fieldsid.cli.inputs import between, mapping_of
+    from fieldsid.cli.skips import Skips
     from fieldsid.logs.importing import Importer
+    from fieldsid.logs.naming import refuse_twice
+    from fieldsid.logs.sifting import attempt, sifted
 
-    importer = Importer(mapping, tuple(channel or ()), msg_path, from_s, to_s, max_gap, salvage=salvage)
+    importer = Importer(mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage=salvage)
     limits = _fin_limits(vehicle)
-    targets = importer.targets(logs, output, format_, force=force)
-    runs = [importer.read(log, limits) for log in tracked(logs, "reading")]
-    done = [importer.write(run, target, force=force) for run, target in zip(runs, targets, strict=True)]
-    emit({"schema": "fieldsid/import/1", "runs": [d.record() for d in done]}, as_json=as_json, render=lambda c: _render(done, c))
+    targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
+    skips = Skips()
+    shown = tracked(logs, "reading")
+    outcomes = (attempt(lambda log_and_bar: importer.read(log_and_bar[0], limits, log_and_bar[1]), pair) for pair in shown)
+    runs = sifted(logs, outcomes, skips.skip)
+    refuse_twice([run for _, run in runs], [log for log, _ in runs])
+    done = [importer.write(run, targets[log], force=force) for log, run in runs]
+    body = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
+    emit(body, as_json=as_json, render=lambda c: _render(done, c))
     for item in done:
         warn(item.warnings, of=item.run.name)
+    skips.end(len(done))
 
 
 def _fin_limits(vehicle: Path | None) -> dict[str, float]:
-    from fieldsid.vehicle import find_vehicle, load_vehicle
+    from fieldsid.face.given import signal_limits, vehicle_of
 
-    known = load_vehicle(vehicle) if vehicle is not None else find_vehicle(Path())
-    limits = {} if known is None else {"rudder_rad": known.rudder_max_rad, "elevator_rad": known.elevator_max_rad}
-    return {signal: limit for signal, limit in limits.items() if limit is not None}
+    return signal_limits(vehicle_of(vehicle))
 
 
 def _render(done: list[Imported], console: Console) -> None:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fieldsid.copies import copied, read_back, written
-from fieldsid.errors import UsageError
+from fieldsid.errors import FieldsidError, UsageError
 
 if TYPE_CHECKING:
+    from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
+    from fieldsid.logs.sifting import Refused
 
 STDIN = Path("-")
 READING = ("pandas", "pyarrow")
@@ -26,26 +30,82 @@ def read_runs(
     mapping: Path | None = None,
     start: float | None = None,
     end: float | None = None,
+    check: Callable[[], None] = lambda: None,
     meanwhile: Callable[[], None] | None = None,
+    refused: Refused[Path] | None = None,
 ) -> list[Run]:
     """Return the runs of the files, each with a name of its own, cut to `start` .. `end` s where given.
 
-    meanwhile: what this process does while a copy of it reads the files, where there can be one and this process has not read
-    any before. Raises LogError for a file that cannot be read, DataError where the cut leaves nothing.
+    check: what can be wrong with all else that was given: what it raises waits for no file, and comes before what is wrong with
+    one. meanwhile: what this process does while a copy of it reads the files, where there can be one and this process has not
+    read any before. refused is told of each of several files that cannot be read; without it, and where none can, raises
+    LogError, MappingError, and DataError where the cut leaves nothing. Raises UsageError where two files hold the same data.
     """
-    if list(paths).count(STDIN) > 1:
+    (runs,) = read_groups([paths], mapping=mapping, start=start, end=end, check=check, meanwhile=meanwhile, refused=refused)
+    return runs
+
+
+def read_groups(
+    groups: Sequence[Sequence[Path]],
+    *,
+    mapping: Path | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    check: Callable[[], None] = lambda: None,
+    meanwhile: Callable[[], None] | None = None,
+    refused: Refused[Path] | None = None,
+) -> list[list[Run]]:
+    """Return the runs of several groups of files, each with a name no other has; as `read_runs` does, for each group."""
+    from fieldsid.logs.naming import refuse_twice
+    from fieldsid.logs.sifting import attempt, sifted
+
+    paths = [path for group in groups for path in group]
+    if paths.count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
+    read = partial(_read, mapping=mapping_of(mapping), part=between(start, end))
     pays = STDIN not in paths and not any(library in sys.modules for library in READING)
-    known = _read_beside(paths, mapping, meanwhile) if meanwhile is not None and pays else None
-    runs = _apart(known or [_read(path, mapping) for path in paths], paths)
-    if start is None and end is None:
-        return runs
-    return [run.between(-float("inf") if start is None else start, float("inf") if end is None else end) for run in runs]
+    known = _read_beside(read, paths, check, meanwhile) if meanwhile is not None and pays else None
+    if known is None:
+        check()
+    outcomes = iter(known or (attempt(read, path) for path in paths))
+    kept = [sifted(group, islice(outcomes, len(group)), refused) for group in groups]
+    used, runs = [path for group in kept for path, _ in group], [run for group in kept for _, run in group]
+    refuse_twice(runs, used)
+    named = iter(_apart(runs, used, paths))
+    return [list(islice(named, len(group))) for group in kept]
+
+
+def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> list[Run]:
+    """Return the runs with names that no two share, the same whichever of the files can be read."""
+    from fieldsid.logs.naming import names_apart, stem_of
+
+    own = dict(zip(paths, names_apart([stem_of(path) for path in paths], paths), strict=True))
+    return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
 
 
 def read_run(path: Path, *, mapping: Path | None = None) -> Run:
     """Return the run of one file; raises LogError."""
-    return _read(path, mapping)
+    return _read(path, mapping_of(mapping), between(None, None))
+
+
+def mapping_of(path: Path | None) -> ChannelMap | None:
+    """Return what a mapping file says: what is wrong with it is wrong for all logs."""
+    if path is None:
+        return None
+    from fieldsid.logs.mapping import load_mapping
+
+    return load_mapping(path)
+
+
+def refuse_swapped(command: str, model: Path, runs: Sequence[Path]) -> None:
+    """Raise UsageError where a model stands among the runs and something else in its place."""
+    from fieldsid.logs.strangers import own_kind
+
+    models = [path for path in runs if own_kind(path) == "model"]
+    if own_kind(model) == "model" or not models:
+        return
+    words = ["sysid", command, str(models[0]), str(model), *(str(path) for path in runs if path != models[0])]
+    raise UsageError("the model comes first, then the runs", found=f"`{model}` first", hint=f"`{shlex.join(words)}`")
 
 
 def files_of(runs: Sequence[Run]) -> list[Path]:
@@ -53,31 +113,28 @@ def files_of(runs: Sequence[Run]) -> list[Path]:
     return [run.source for run in runs if run.source is not None and run.source.exists()]
 
 
-def _read(path: Path, mapping: Path | None) -> Run:
+def between(start: float | None, end: float | None) -> tuple[float, float]:
+    """Return the part of a log that `--from` and `--to` ask for, in s."""
+    return (-float("inf") if start is None else start, float("inf") if end is None else end)
+
+
+def _read(path: Path, mapping: ChannelMap | None, part: tuple[float, float]) -> Run:
     from fieldsid.logs import load_run
 
-    return load_run(path, mapping)
+    return load_run(path, mapping, part=part)
 
 
-def _read_beside(paths: Sequence[Path], mapping: Path | None, meanwhile: Callable[[], None]) -> list[Run] | None:
-    """Return the runs as a copy of this process read them; None where it did not: an error is met again, and told, here."""
-    copy = copied(lambda: written([_read(path, mapping) for path in paths]))
+def _read_beside(
+    read: Callable[[Path], Run], paths: Sequence[Path], check: Callable[[], None], meanwhile: Callable[[], None]
+) -> list[Run | FieldsidError] | None:
+    """Return the runs as a copy of this process read them, or why not; None where it did not: what is wrong is met again here."""
+    from fieldsid.logs.sifting import attempt
+
+    copy = copied(lambda: written([attempt(read, path) for path in paths]))
     if copy is None:
         return None
     with copy:
+        check()
         meanwhile()
         answer = copy.answer()
     return None if answer is None else read_back(answer)
-
-
-def _apart(runs: list[Run], paths: Sequence[Path]) -> list[Run]:
-    """Put the folder's name before the names that several files share."""
-    count = Counter(run.name for run in runs)
-    named = [
-        run if count[run.name] == 1 else replace(run, name=f"{path.resolve().parent.name}_{run.name}")
-        for run, path in zip(runs, paths, strict=True)
-    ]
-    again = [name for name, n in Counter(run.name for run in named).items() if n > 1]
-    if again:
-        raise UsageError(f"run {again[0]!r} is given twice", found=", ".join(map(str, paths)), hint="give each run once")
-    return named

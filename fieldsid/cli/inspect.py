@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -31,14 +32,15 @@ def command(
 
     Example: sysid inspect run7.mcap --write-mapping mapping.yaml
     """
-    from fieldsid.cli.console import emit, say
+    from fieldsid.cli.console import emit, say, tracked
     from fieldsid.logs.inspection import inspect_log, write_proposal
 
-    found = inspect_log(log, mapping=mapping, msg_path=msg_path)
+    for path, on_share in tracked([log], "reading"):
+        found = inspect_log(path, mapping=mapping, msg_path=msg_path, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     emit(found.record(written), as_json=as_json, render=lambda console: _render(found, console))
     if written is not None:
-        say(f"wrote {written}; check it, then: sysid import {log} --mapping {written} -o runs/")
+        say(f"wrote {written}; check it, then: sysid import {quote(str(log))} --mapping {quote(str(written))} -o runs/")
 
 
 def _render(found: Inspection, console: Console) -> None:

@@ -35,6 +35,10 @@ EffectNames = Annotated[
     str | None,
     typer.Option("--effects", metavar="A,B", help="Effects in the model: see `sysid effects list`.", show_default=False),
 ]
+FigureFile = Annotated[
+    Path | None,
+    typer.Option("--figure", metavar="FILE", help="Draw a figure: .png, .svg or .pdf, by the suffix.", show_default=False),
+]
 FromS = Annotated[float | None, typer.Option("--from", metavar="S", help="Use samples from this time on.", show_default=False)]
 ToS = Annotated[float | None, typer.Option("--to", metavar="S", help="Use samples up to this time.", show_default=False)]
 OutputDir = Annotated[

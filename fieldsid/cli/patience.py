@@ -9,17 +9,30 @@ from pathlib import Path
 
 from rich.live import Live
 
+from fieldsid.artifacts import check_output
 from fieldsid.cli.console import messages
-from fieldsid.errors import ArtifactError
 
 
 def refuse_existing(*paths: Path | None, force: bool) -> None:
-    """Refuse outputs that exist before the work is done and not after it; raises ArtifactError."""
+    """Refuse outputs that exist, or cannot be written, before the work is done and not after it; raises ArtifactError."""
     for path in paths:
-        if path is not None and path.exists() and not force:
-            raise ArtifactError(
-                f"`{path}` exists", found=f"{path.stat().st_size} bytes", hint="add `--force`, or name another output"
-            )
+        if path is not None:
+            check_output(path, force=force)
+
+
+def refuse_closed(folder: Path | None) -> None:
+    """Refuse a folder that nothing can be written to, before the work is done and not after it; raises ArtifactError."""
+    if folder is not None:
+        check_output(folder / "-", force=True)
+
+
+def refuse_figure(path: Path | None, *, force: bool) -> None:
+    """Refuse a figure's file that exists, or of a kind that is not drawn, before the work; raises ArtifactError or UsageError."""
+    from fieldsid.figures.kinds import kind_of
+
+    if path is not None:
+        kind_of(path)
+    refuse_existing(path, force=force)
 
 
 @contextmanager

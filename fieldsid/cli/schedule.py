@@ -10,6 +10,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, say, table
 from fieldsid.cli.options import Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
+from fieldsid.cli.patience import refuse_figure
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from fieldsid.schedule.verify import Check, Verification
     from fieldsid.turning.source import Source
 
-command = typer.Typer(help="Gains per speed: design them, verify them, export them to the vehicle.")
+command = typer.Typer(help="Gains per speed: design them, verify them, write them for the vehicle's software.")
 
 ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
 Controller = Annotated[str, typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr.")]
@@ -28,10 +29,15 @@ Speeds = Annotated[
     str | None, typer.Option("--speeds", metavar="LIST", help="Speeds of the rows, m/s; those of the models if not given.")
 ]
 FinLimit = Annotated[
-    float | None, typer.Option("--fin-limit", metavar="RAD", help="Largest fin angle; the vehicle's limit if not given.")
+    str | None,
+    typer.Option(
+        "--fin-limit",
+        metavar="ANGLE",
+        help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
+    ),
 ]
 FinRate = Annotated[
-    float | None, typer.Option("--fin-rate", metavar="RAD_S", help="Fastest fin; the model's or vehicle's if not given.")
+    str | None, typer.Option("--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.")
 ]
 FinLag = Annotated[
     float | None, typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.")
@@ -44,6 +50,9 @@ OwnLaw = Annotated[
 Models = Annotated[
     list[Path] | None,
     typer.Option("--model", metavar="MODEL", help="Models to verify on; those it was designed from if not given."),
+]
+MarginFigure = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a figure: .png, .svg or .pdf, by the suffix.")
 ]
 NeedPhase = Annotated[float | None, typer.Option("--require-phase-margin", metavar="DEG", help="Exit 1 when any speed has less.")]
 NeedGain = Annotated[float | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less.")]
@@ -79,13 +88,15 @@ def design(
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
-    """Design gains per speed: the paper's P with feed-forward, or PD, PI, PID, LQR; heading or pitch, by the models' axis.
+    """Design gains per speed: P with feed-forward, or PD, PI, PID, LQR; heading or pitch, by the models' axis.
 
     Gains are slowed until damping and phase margin hold with the fin's lag and delay. The feed-forward cancels the trim.
 
     Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
     """
-    from fieldsid.cli.speeds import speeds_of
+    from fieldsid.angles import FIN, FIN_RATE, parse_angle
+    from fieldsid.cli.own import check_effects
+    from fieldsid.face.speeds import speeds_of
     from fieldsid.schedule.design import Wish
     from fieldsid.schedule.make import design_schedule
     from fieldsid.schedule.plant import FinLimits
@@ -93,8 +104,11 @@ def design(
     from fieldsid.schedule.verify import STEP
     from fieldsid.turning.source import load_source
 
+    given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
+    fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE)
     source = load_source(models, laws=law or ())
-    limit, rate = _limits(fin_limit, fin_rate, vehicle, source)
+    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
+    limit, rate = _limits(given, fastest, vehicle, source)
     schedule = design_schedule(
         source,
         limit,
@@ -107,7 +121,7 @@ def design(
     if output is not None:
         inputs = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
-    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, body))
+    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, source, body))
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -118,34 +132,44 @@ def verify(
     require_gain_margin: NeedGain = None,
     require_delay_margin: NeedDelay = None,
     max_overshoot: MostOvershoot = None,
-    output: OutputFile = None,
+    output: MarginFigure = None,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
     """Check a schedule at its knots and between, over the errors of the models, against one constant gain.
 
-    Margins by python-control; steps with the fin's limit, rate, lag and delay. A gate that fails makes the exit code 1. With
-    `-o FILE.png` a figure is drawn.
+    The first line is the verdict, the second what it rests on. Margins by python-control; steps with the fin's limit, rate,
+    lag and delay. A gate that fails makes the exit code 1. With `-o FILE` a figure is drawn.
 
     Example: sysid schedule verify gains.yaml --require-phase-margin 40 -o gains.png
     """
+    from fieldsid.cli.own import check_effects
+    from fieldsid.face.given import designed_from
     from fieldsid.schedule.record import load_schedule
+    from fieldsid.schedule.verdict import gates_of, rests_on, verdict_of
     from fieldsid.schedule.verify import verify_schedule
     from fieldsid.turning.source import load_source
 
+    refuse_figure(output, force=force)
     known = load_schedule(schedule)
-    source = load_source(models or _designed_from(known, schedule))
+    source = load_source(models or designed_from(known, str(schedule)))
+    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     checked = verify_schedule(known, source)
-    gates = _gates(checked, require_phase_margin, require_gain_margin, require_delay_margin, max_overshoot)
+    wanted = (require_phase_margin, require_gain_margin, require_delay_margin, max_overshoot)
+    gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
+    verdict, says = verdict_of(checked, known, gates)
     body = {
         "schema": "fieldsid/verification/1",
+        "verdict": verdict,
+        "says": says,
+        "rests_on": rests_on(checked, known, source),
         "axis": known.axis.value,
         "controller": known.kind,
         "worst": checked.worst,
         "scheduled": [c.record() for c in checked.scheduled],
         "constant": [c.record() for c in checked.constant],
-        "gates": gates,
-        "passed": all(g["passed"] for g in gates),
+        "gates": [g.record() for g in gates],
+        "passed": all(g.passed for g in gates),
         "figure": None if output is None else _draw(known, checked, output, force=force),
     }
     emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body))
@@ -212,51 +236,9 @@ def _export_into(schedule: Schedule, into: Path, key: str, *, write: bool, as_js
 
 def _limits(fin_limit: float | None, fin_rate: float | None, vehicle: Path | None, source: Source) -> tuple[float, float | None]:
     """Return fin limit and fin rate: the options, else the vehicle's, else the largest fin the models were trained on."""
-    from fieldsid.errors import UsageError
-    from fieldsid.vehicle import find_vehicle, load_vehicle
+    from fieldsid.face.given import fin_limits_of, vehicle_of
 
-    known = load_vehicle(vehicle) if vehicle is not None else find_vehicle(Path())
-    rate = fin_rate if fin_rate is not None or known is None else known.fin_rate_rad_s
-    if fin_limit is not None:
-        return fin_limit, rate
-    if known is not None and (limit := known.fin_max_rad(source.axis.value)) is not None:
-        return limit, rate
-    trained = [m.trained["fin_max"] for m in source.models if m.trained.get("fin_max", 0.0) > 0]
-    if trained:
-        messages().print(f"fin limit: {max(trained):.4g} rad, the largest in the models' runs; `--fin-limit` takes another")
-        return max(trained), rate
-    raise UsageError("how far does the fin go", found="no --fin-limit and no vehicle.yaml", hint="add `--fin-limit 0.26`")
-
-
-def _designed_from(schedule: Schedule, path: Path) -> list[Path]:
-    from fieldsid.errors import ArtifactError
-
-    named = [Path(str(m["path"])) for m in schedule.provenance.get("models", [])]
-    missing = [p for p in named if not p.is_file()]
-    if not named or missing:
-        raise ArtifactError(
-            f"the models of `{path}` are not where they were",
-            found=", ".join(map(str, missing)) or "none named",
-            hint=f"name them: `sysid schedule verify {path} --model models/a.yaml`",
-        )
-    return named
-
-
-def _gates(
-    checked: Verification, phase: float | None, gain: float | None, delay: float | None, overshoot: float | None
-) -> list[dict[str, Any]]:
-    wanted = (
-        ("phase_margin_deg", phase, 1),
-        ("gain_margin_db", gain, 1),
-        ("delay_margin_s", delay, 1),
-        ("overshoot_percent", overshoot, -1),
-    )
-    worst = checked.worst
-    return [
-        {"gate": name, "wanted": limit, "found": worst[name], "passed": bool(sign * (worst[name] - limit) >= 0)}
-        for name, limit, sign in wanted
-        if limit is not None
-    ]
+    return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, messages().print)
 
 
 def _draw(schedule: Schedule, checked: Verification, path: Path, *, force: bool) -> str:
@@ -266,8 +248,9 @@ def _draw(schedule: Schedule, checked: Verification, path: Path, *, force: bool)
     return str(save(figure(schedule, checked), path, force=force))
 
 
-def _render_design(to: Console, schedule: Schedule, body: Mapping[str, Any]) -> None:
+def _render_design(to: Console, schedule: Schedule, source: Source, body: Mapping[str, Any]) -> None:
     from fieldsid.rounding import number
+    from fieldsid.schedule.verdict import fin_of, lost
 
     extra = ("kz",) if schedule.depth else ()
     rows = [
@@ -288,6 +271,7 @@ def _render_design(to: Console, schedule: Schedule, body: Mapping[str, Any]) -> 
     columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "data")
     to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
+    to.print(f"counted with: {'; '.join((fin_of(schedule.actuator), *lost(source)))}")
     slowed = [r for r in schedule.rows if r.slowed < 1.0]
     if slowed:
         to.print(
@@ -300,6 +284,11 @@ def _render_design(to: Console, schedule: Schedule, body: Mapping[str, Any]) -> 
 
 
 def _render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    to.print(Text(f"{body['verdict']}: {body['says']}", style="bold"), soft_wrap=True)
+    to.print(Text(body["rests_on"]), soft_wrap=True)
+    to.print()
     columns = ("m/s", "phase", "least", "gain dB", "delay s", "over %", "most", "settle s", "constant", "knot")
     rows = [_verify_row(a, b) for a, b in zip(checked.scheduled, checked.constant, strict=True)]
     to.print(table("margins and steps; constant: settling with one gain for all speeds", columns, rows, left=0))
@@ -310,9 +299,9 @@ def _render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) 
     if depth:
         over, settle = max(100 * c.depth_overshoot for c in depth), max(c.depth_settling for c in depth)
         to.print(f"depth step of 2 m: overshoot up to {over:.0f} %, settled within {settle:.0f} s")
-    for gate in body["gates"]:
-        word = "passed" if gate["passed"] else "FAILED"
-        to.print(f"{word}: {gate['gate']} {gate['found']:.3g}, wanted {gate['wanted']:.3g}")
+    for gate in body["gates"] if not body["passed"] else ():
+        if gate["passed"]:
+            to.print(f"passed: {gate['gate']} {gate['found']:.3g}, wanted {gate['wanted']:.3g}")
     if body["figure"]:
         to.print(f"figure: {body['figure']}", soft_wrap=True)
 

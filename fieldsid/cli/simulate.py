@@ -26,7 +26,7 @@ FinOf = Annotated[Path | None, typer.Option("--run", metavar="RUN", help="Replay
 Speed = Annotated[
     float | None, typer.Option("--speed", metavar="M_S", help="Speed; the model's own if not given.", show_default=False)
 ]
-FinMax = Annotated[float, typer.Option("--fin-max", metavar="RAD", help="Largest fin angle about trim.")]
+FinMax = Annotated[str, typer.Option("--fin-max", metavar="ANGLE", help="Largest fin angle about trim, `20deg` or `0.35rad`.")]
 RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", min=1.0, max=1000.0, help="Samples per second of a maneuver.")]
 NoiseSeed = Annotated[
     int | None, typer.Option("--noise", metavar="SEED", help="Add the model's sensor noise from this seed.", show_default=False)
@@ -39,7 +39,7 @@ def command(
     run: FinOf = None,
     mapping: MappingFile = None,
     speed: Speed = None,
-    fin_max: FinMax = 0.35,
+    fin_max: FinMax = "0.35rad",
     rate: RateHz = 20.0,
     noise: NoiseSeed = None,
     output: OutputFile = None,
@@ -53,7 +53,7 @@ def command(
 
     Example: sysid simulate model.yaml --maneuver zigzag:amplitude=15deg --speed 1.4 -o zigzag.csv
     """
-    from fieldsid.models.model import load_model
+    from fieldsid.cli.own import read_model
 
     if (maneuver is None) == (run is None):
         raise UsageError(
@@ -61,7 +61,7 @@ def command(
             found="both" if run else "neither",
             hint="`--maneuver square_pulses` or `--run RUN`",
         )
-    known = load_model(model)
+    known = read_model(model)
     made = _flown(known, maneuver or "", speed, fin_max, rate) if run is None else _replayed(known, run, mapping, speed)
     if noise is not None:
         from fieldsid.planning.rehearse import with_noise
@@ -86,7 +86,8 @@ def command(
     return emit(body, as_json=as_json, render=lambda to: _render(to, body))
 
 
-def _flown(model: Model, spec: str, speed: float | None, fin_max: float, rate: float) -> Run:
+def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
+    from fieldsid.angles import FIN, parse_angle
     from fieldsid.maneuvers import Limits, Schedule, parse_spec
     from fieldsid.planning.rehearse import rehearse
 
@@ -94,7 +95,7 @@ def _flown(model: Model, spec: str, speed: float | None, fin_max: float, rate: f
         model,
         *parse_spec(spec),
         speed=model.law.reference if speed is None else speed,
-        limits=Limits(fin_max),
+        limits=Limits(parse_angle(fin_max, "--fin-max", FIN)),
         schedule=Schedule(rate_hz=rate),
     )
 

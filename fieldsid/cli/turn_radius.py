@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.console import emit, say, table, warn
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
+from fieldsid.cli.patience import refuse_closed
+from fieldsid.cli.skips import Skips
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,7 +25,12 @@ Speeds = Annotated[
     typer.Option("--speeds", metavar="LIST", help="Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given."),
 ]
 RudderMax = Annotated[
-    float | None, typer.Option("--rudder-max", metavar="RAD", help="Rudder held in the turn; the vehicle's limit if not given.")
+    str | None,
+    typer.Option(
+        "--rudder-max",
+        metavar="ANGLE",
+        help="Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest.",
+    ),
 ]
 Measured = Annotated[
     list[Path] | None, typer.Option("--measured", metavar="RUN", help="Run of a turning circle to compare with; may repeat.")
@@ -37,7 +44,7 @@ OwnLaw = Annotated[
     list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
 ]
 FinZero = Annotated[
-    float, typer.Option("--fin-zero", metavar="RAD", min=0.0, help="Fin offsets below this are not counted in the formula.")
+    str, typer.Option("--fin-zero", metavar="ANGLE", help="Fin offsets below this, `1deg`, are not counted in the formula.")
 ]
 
 
@@ -49,7 +56,7 @@ def command(
     runs: Runs = None,
     method: Method = "auto",
     law: OwnLaw = None,
-    fin_zero: FinZero = 0.0175,
+    fin_zero: FinZero = "0.0175rad",
     mapping: MappingFile = None,
     vehicle: VehicleFile = None,
     output: OutputDir = None,
@@ -59,67 +66,75 @@ def command(
 ) -> Mapping[str, Any]:
     """Predict the turning radius over speed, port and starboard apart, with 95 % bands.
 
-    Models that carry effects are simulated to the settled circle, with the speed lost in the turn; a table, a fit file or
-    first-order models go by the u-turn formula. Rows say what they rest on: measured, identified or extrapolated.
+    Models that carry effects, in a fit file too, are simulated to the settled circle, with the speed lost in the turn; a table
+    or first-order models go by the u-turn formula. Rows say what they rest on: measured, identified or extrapolated.
 
     Example: sysid turn-radius models/*.yaml --rudder-max 0.35 --measured circle.parquet -o turning/
     """
+    from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.inputs import read_runs
-    from fieldsid.cli.speeds import speeds_of
+    from fieldsid.cli.own import check_effects
+    from fieldsid.face.speeds import speeds_of
     from fieldsid.turning.radius import turn_radius
     from fieldsid.turning.source import load_source
 
-    source = load_source(models, laws=law or ())
+    refuse_closed(output)
+    given = None if rudder_max is None else parse_angle(rudder_max, "--rudder-max", FIN)
+    source, skips = load_source(models, laws=law or ()), Skips()
+    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     prediction = turn_radius(
         source,
         speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
-        _rudder(rudder_max, vehicle, source),
-        runs=_runs(runs, source, mapping),
-        measured=read_runs(measured, mapping=mapping) if measured else (),
+        _rudder(given, vehicle, source),
+        runs=_runs(runs, source, mapping, skips),
+        measured=read_runs(measured, mapping=mapping, refused=skips.skip) if measured else (),
         method=method,
-        fin_zero=fin_zero,
+        fin_zero=_fin_zero(fin_zero),
+        unfit=skips.skip,
     )
     body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
+    body["skipped_runs"] = skips.records
     if output is not None:
         body["figures"] = _written(prediction, body, output, source, figures=figures, force=force)
     if not as_json:
         warn(prediction.notes)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body))
+    emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body))
+    skips.end(len(runs or []) + len(measured or []) - len(skips.records))
+    return body
+
+
+def _fin_zero(text: str) -> float:
+    from fieldsid.angles import FIN, parse_angle
+    from fieldsid.errors import UsageError
+
+    angle = parse_angle(text, "--fin-zero", FIN)
+    if angle < 0.0:
+        raise UsageError("a tolerance is not negative", found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
+    return angle
 
 
 def _rudder(given: float | None, vehicle: Path | None, source: Source) -> float:
     """Return the rudder of the turn: the option, the vehicle's limit, or the largest the models were trained on."""
-    from fieldsid.errors import UsageError
-    from fieldsid.vehicle import find_vehicle, load_vehicle
+    from fieldsid.face.given import rudder_of, vehicle_of
 
-    if given is not None:
-        return given
-    known = load_vehicle(vehicle) if vehicle is not None else find_vehicle(Path())
-    if known is not None and known.rudder_max_rad is not None:
-        return known.rudder_max_rad
-    trained = [m.trained["fin_max"] for m in source.models if m.trained.get("fin_max", 0.0) > 0]
-    if trained:
-        messages().print(f"rudder: {max(trained):.4g} rad, the largest in the models' runs; `--rudder-max` takes another")
-        return max(trained)
-    raise UsageError(
-        "how far does the rudder go in the turn", found="no --rudder-max and no vehicle.yaml", hint="add `--rudder-max 0.26`"
-    )
+    return given if given is not None else rudder_of(vehicle_of(vehicle), source, say)
 
 
-def _runs(given: Sequence[Path] | None, source: Source, mapping: Path | None) -> Sequence[Run]:
-    """Return the runs the models came from: those given, else the inputs the model files name, where they still are."""
-    from fieldsid.artifacts import read_yaml
-    from fieldsid.cli.inputs import read_runs
+def _runs(given: Sequence[Path] | None, source: Source, mapping: Path | None, skips: Skips) -> Sequence[Run]:
+    """Return the runs the models came from: those given, else the inputs the model files name, where they can still be read."""
+    from fieldsid.cli.inputs import mapping_of, read_runs
+    from fieldsid.face.given import run_files
+    from fieldsid.logs import Run, load_run
+    from fieldsid.logs.sifting import attempt
 
     if given:
-        return read_runs(given, mapping=mapping)
-    if not any(m.effects for m in source.models):
-        return ()
-    named = [Path(i["path"]) for p in source.paths for i in read_yaml(p).get("inputs", [])]
-    there = [p for p in dict.fromkeys(named) if p.is_file() or p.is_dir()]
-    if len(there) < len(dict.fromkeys(named)):
-        messages().print("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
-    return read_runs(there, mapping=mapping) if there else ()
+        return read_runs(given, mapping=mapping, refused=skips.skip)
+    chosen = mapping_of(mapping)
+    outcomes = {path: attempt(lambda p: load_run(p, chosen), path) for path in run_files(source, say)}
+    lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
+    if lost:
+        say(f"runs of the models that cannot be read again: {', '.join(lost)}: name them with `--runs` for the loss of speed")
+    return [outcome for outcome in outcomes.values() if isinstance(outcome, Run)]
 
 
 def _written(
@@ -162,9 +177,8 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
     _render_measured(to, prediction)
     for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
         to.print(f"extrapolated: {reason}")
-    settle = next((r.settle_with for r in prediction.rows if r.because), "")
-    if settle:
-        to.print(f"what would settle it: {settle}")
+    for settling in prediction.settling:
+        to.print(f"what would settle it: {settling}")
     for side, best in body["minimum"].items():
         if best:
             to.print(f"tightest at higher speed, {side}: {best['radius_m']:.2f} m at {best['speed_m_s']:.2f} m/s")

@@ -5,86 +5,104 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, Stretch, places, stretches
 from fieldsid.comparison.metrics import Metrics, metrics
 from fieldsid.comparison.residuals import Companion, companions
+from fieldsid.display import Brief, Plotted
 from fieldsid.fitting.merit import Merit, merit
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import Prediction, predict
 from fieldsid.logs.run import Run
+from fieldsid.logs.sifting import Refused, attempt, sifted
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.models.simulate import base_at
 
-CHANNELS = ("angle", "rate")
-DOWN_TO_NOISE = 1.3
-"""Rms over the noise below which a channel has nothing left to show."""
+DOWN_TO_NOISE = 1.15
+"""Rms over the noise up to which a channel has nothing left to show: the noise is itself an estimate."""
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """One run: the free run, its merit, the run's own noise floor, metrics of the channel judged, and where it fails."""
+@dataclass(frozen=True, slots=True, repr=False)
+class Channel(Brief):
+    """One measured channel, `angle` or `rate`: its rms over its noise floor, its metrics, and where its error falls."""
+
+    name: str
+    over_floor: float
+    metrics: Metrics
+    where: tuple[Place, ...]
+    worst: tuple[Stretch, ...]
+
+    @property
+    def fails(self) -> bool:
+        """Whether more is left than the sensor's noise."""
+        return self.over_floor > DOWN_TO_NOISE
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Comparison(Plotted):
+    """One run: free run, merit, noise floor, its channels, the one furthest above its floor first, and the model."""
 
     shown: Prediction
     merit: Merit
     floor: Noise
-    channel: str
-    metrics: Metrics
-    where: tuple[Place, ...]
-    worst: tuple[Stretch, ...]
+    channels: tuple[Channel, ...]
     moves_with: tuple[Companion, ...]
+    model: Model
 
     @property
     def run(self) -> str:
         """The run's name."""
         return self.shown.record.name
 
+    @property
+    def leading(self) -> Channel:
+        """The channel furthest above its noise floor."""
+        return self.channels[0]
 
-def compare(model: Model, runs: Sequence[Run]) -> tuple[Comparison, ...]:
+    @property
+    def failing(self) -> tuple[Channel, ...]:
+        """The channels that have more left than their noise, the worst first."""
+        return tuple(c for c in self.channels if c.fails)
+
+    @property
+    def where(self) -> tuple[Place, ...]:
+        """Where the error of the leading channel falls."""
+        return self.leading.where
+
+
+def compare(model: Model, runs: Sequence[Run], *, unfit: Refused[Run] | None = None) -> tuple[Comparison, ...]:
     """Return the comparison of a model with each run.
 
     Its initial state, per-run nuisances, the command's times between samples and, within its measurement's error, the run's
-    speed are refitted, nothing else.
+    speed are refitted, nothing else. unfit is told of each of several runs that cannot be compared with; without it, for a
+    single run, and where none is left, its error is raised.
     Raises DataError for a run without the signals, EffectError for one without a signal that an effect needs,
     ModelError when the model grows without bound.
     """
-    return tuple(compare_one(model, run) for run in runs)
+    made = (attempt(lambda one: compare_one(model, one), run) for run in runs)
+    return tuple(found for _, found in sifted(runs, made, unfit))
 
 
 def compare_one(model: Model, run: Run) -> Comparison:
     """Return the comparison of a model with one run; raises as `compare` does."""
     record = record_of(run, model.axis)
     shown = predict(model, record)
-    floor = floor_of([record])
-    channel = judged(shown, floor)
-    ok = record.ok[channel]
-    square = shown.residual[channel] ** 2
     base = base_at(model, record.speed)
     trim = -base.trim / base.authority if base.authority != 0.0 else 0.0
-    return Comparison(
-        shown=shown,
-        merit=merit([shown]),
-        floor=floor,
-        channel=CHANNELS[channel],
-        metrics=metrics(shown, channel),
-        where=places(record.time, square, ok, conditions(record, shown.rate, trim)),
-        worst=stretches(record.time, square, ok),
-        moves_with=companions(shown, base.damping),
-    )
+    floor = floor_of([record])
+    return Comparison(shown, merit([shown]), floor, _channels(shown, floor, trim), companions(shown, base.damping), model)
 
 
-def judged(shown: Prediction, floor: Noise) -> int:
-    """Return the channel that shows the fault: 1 the rate, or 0 the angle where the rate is down to its noise or missing.
-
-    An error of the rate adds up in the angle and stays there, so the angle tells badly when the fault acted.
-    """
-    record, rms = shown.record, np.sqrt(np.mean(shown.residual**2, axis=1))
-    if not record.rate_ok.any():
-        return 0
-    if not record.angle_ok.any():
-        return 1
-    angle, rate = rms[0] / floor.angle, rms[1] / floor.rate
-    return 0 if rate < DOWN_TO_NOISE < angle else 1
+def _channels(shown: Prediction, floor: Noise, trim: float) -> tuple[Channel, ...]:
+    """Return the measured channels, the one furthest above its floor first; trim is the fin at rest in rad."""
+    record, found = shown.record, merit([shown])
+    parts = (("angle", found.angle_rms / floor.angle), ("rate", found.rate_rms / floor.rate))
+    cases = conditions(record, shown.rate, trim)
+    channels = []
+    for i, (name, over) in enumerate(parts):
+        ok, square = record.ok[i], shown.residual[i] ** 2
+        if ok.any():
+            falls = places(record.time, square, ok, cases), stretches(record.time, square, ok)
+            channels.append(Channel(name, over, metrics(shown, i), *falls))
+    return tuple(sorted(channels, key=lambda c: -c.over_floor))

@@ -17,6 +17,7 @@ from fieldsid.demo.trial import CHECK_SPEEDS, PLANNED_SPEED
 from fieldsid.demo.vehicle import LIMITS
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.axis import Axis
+from fieldsid.planning.leg import error_in_words
 from fieldsid.rounding import number, with_error
 
 Result = Mapping[str, Any]
@@ -77,7 +78,7 @@ def _planned(result: Result) -> str:
     window = leg["window"]
     seconds = window["length_s"] - window["lead_s"] - window["recover_s"]
     bought = [e | {"name": name} for name, e in leg["expected"].items() if e["relative"] and e["baseline"]]
-    errors = ", ".join(f"{e['name']} to {100 * e['relative']:.1f} %" for e in bought)
+    errors = ", ".join(f"{e['name']} to {error_in_words(e['value'], e['std_error'], e['relative'])}" for e in bought)
     hardest = max(bought, key=lambda e: (e["baseline"] / e["std_error"]) ** 2)
     figure = next(f for f in result["files"] if f.endswith(".png"))
     return (
@@ -119,14 +120,21 @@ def _joined(result: Result) -> str:
 
 
 def _compared(result: Result) -> str:
-    run = max(result["runs"], key=lambda r: float(r["rate_rms_rad_s"]))
+    run = max(result["runs"], key=lambda r: float(r["over_floor"][r["judged_by"]]))
+    opening = f"On {run['run']}, which the fit has not seen, the {_fits(run, run['over_floor'])}. "
+    if not run["failing"]:
+        return opening + "That is the noise: here the model lacks nothing."
     worst = run["where"][0]
     return (
-        f"On {run['run']}, which the fit has not seen, the rate fit is {number(run['rate_fit_percent'], 3)} %. "
-        f"{100 * worst['share_of_error']:.0f} % of the squared error falls on `{worst['condition']}` "
-        f"({worst['rms_ratio']:.1f} x the run's own rms, worst from {worst['t_start_s']:.1f} to {worst['t_end_s']:.1f} s): "
-        "that is where to look for what the model lacks."
+        f"{opening}{100 * worst['share_of_error']:.0f} % of the {run['judged_by']}'s squared error falls on "
+        f"`{worst['condition']}` ({worst['rms_ratio']:.1f} x the run's own rms, worst from {worst['t_start_s']:.1f} to "
+        f"{worst['t_end_s']:.1f} s): that is where to look for what the model lacks."
     )
+
+
+def _fits(run: Result, over: Mapping[str, float]) -> str:
+    """Return the fit of each channel and its error over its noise, the one that is followed worse first."""
+    return " and the ".join(f"{n} fit is {number(run[f'{n}_fit_percent'], 3)} % ({x:.1f} x its noise)" for n, x in over.items())
 
 
 def _diagnosed(result: Result) -> str:
@@ -150,7 +158,7 @@ def _extended(result: Result) -> str:
             f"On runs not seen the error goes from {before:.2f} to {after:.2f} x the noise: it does not pay, so nothing is kept."
         )
     return f"On runs not seen the error falls from {before:.2f} to {after:.2f} x the noise. 1 is where the sensors end, so " + (
-        "nothing is left to find." if after <= NEAR_NOISE else "something is left to find."
+        f"something is left to find: `{result['next']}`." if result["left"]["more_than_noise"] else "nothing is left to find."
     )
 
 
@@ -166,8 +174,8 @@ def _remembered(result: Result) -> str:
 
 
 def _held(result: Result) -> str:
-    fits = [float(run["rate_fit_percent"]) for run in result["runs"]]
-    return f"The same runs again, now with the effect: the rate fit is {' and '.join(number(f, 3) for f in fits)} %."
+    said = "; ".join(f"on {run['run']} the {_fits(run, run['over_floor'])}" for run in result["runs"])
+    return f"The same runs again, now with the effect: {said}."
 
 
 def _refitted(result: Result) -> str:

@@ -9,19 +9,23 @@ import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.verdict import Verdict
+from fieldsid.diagnosis.verdict import VISIBLE, Verdict
 from fieldsid.errors import FieldsidError
 from fieldsid.models.effect import effect_named
+from fieldsid.models.model import Noise
 
 MOST_RIVALS = 3
 DECIDES = 3.0
 """Log odds below which a maneuver is not worth a dive: 20 to 1 for the right one."""
 
 
-def next_maneuver(search: Search, verdict: Verdict, found: Hypothesis, skipped: Mapping[str, str]) -> dict[str, Any] | None:
+def next_maneuver(
+    search: Search, verdict: Verdict, found: Hypothesis, skipped: Mapping[str, str], floor: Noise
+) -> dict[str, Any] | None:
     """Return what to fly next; None where nothing is open.
 
-    Rivals: the maneuver inside the fin angles already flown whose refitted predictions stay furthest apart.
+    Rivals: the maneuver inside the fin angles already flown whose refitted predictions stay furthest apart. A signal that the
+    logs lack is missed only where the effects named leave something above the noise floor.
     """
     if verdict.word == "undecided":
         return _deciding(search, [found, *verdict.rivals][:MOST_RIVALS])
@@ -30,9 +34,11 @@ def next_maneuver(search: Search, verdict: Verdict, found: Hypothesis, skipped: 
             "maneuver": "repeat the run",
             "why": "what comes back at the same fin is the vehicle, what does not is the sea or a fault",
         }
-    if skipped:
+    left = found.judging.over(floor)
+    if skipped and verdict.word == "effect" and left > VISIBLE:
         name = min(skipped)
-        return {"maneuver": "log the missing signal", "why": f"{name} could not be tried: {skipped[name]}"}
+        why = f"{left:.2f} x the noise floor is left, and {name} could not be tried: {skipped[name]}"
+        return {"maneuver": "log the missing signal", "why": why}
     return None
 
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
-from fieldsid.copies import each
 from fieldsid.diagnosis.advise import next_maneuver
 from fieldsid.diagnosis.floor import shown_floor
 from fieldsid.diagnosis.freely import freely
@@ -23,18 +22,21 @@ from fieldsid.diagnosis.search import Search
 from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import Judged
 from fieldsid.diagnosis.usable import usable
-from fieldsid.diagnosis.verdict import MOSTLY, Verdict, added, explained, probabilities, verdict_of
+from fieldsid.diagnosis.verdict import LIKELY, MOSTLY, Verdict, added, explained, probabilities, verdict_of, worsens
 from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.diagnosis.words import evidence, headline
 from fieldsid.diagnosis.worth import asks_for_more
-from fieldsid.effects import all_effects
-from fieldsid.errors import DataError, ModelError
-from fieldsid.fitting.fit import check
+from fieldsid.effects import all_effects, apart_from
+from fieldsid.errors import DataError, DivergenceError
+from fieldsid.fitting.fit_runs import records_of
 from fieldsid.fitting.predict import as_flown, predict
 from fieldsid.logs.run import Note, Run
+from fieldsid.logs.sifting import Refused
 from fieldsid.models.axis import Axis
+from fieldsid.models.definition import NONE, Definition
+from fieldsid.models.effect import effect_held
 from fieldsid.models.model import Model, Noise
-from fieldsid.models.record import Record, left_out, record_of
+from fieldsid.models.record import Record, left_out
 
 SHOWN = 8
 UNTRIED = Note(
@@ -49,21 +51,26 @@ def diagnose(
     validation: Sequence[Run] = (),
     *,
     known: Sequence[str] = (),
+    own: Mapping[str, Definition] = NONE,
     report: Callable[[str], None] = lambda _text: None,
     thorough: bool = False,
+    unfit: Refused[Run] | None = None,
 ) -> Diagnosis:
     """Return which catalogued effect the base model lacks on some runs, judged on runs it was not fitted to.
 
-    known names effects the model has already: they are part of the base. report is told what is being tried. thorough: for as
-    long as there is something to try, see allowance.py.
+    known names effects the model has already: they are part of the base; own defines those of them that are not built in, as a
+    model holds them. report is told what is being tried. thorough: for as long as there is something to try, see allowance.py.
+    unfit is told of each of several runs that cannot be fitted; without it, and where no run to learn from or none of those to
+    judge by is left, its error is raised.
     Raises DataError when a run cannot be fitted on the axis, EffectError for a user's effect that fails.
     """
-    both = each(lambda run: record_of(run, axis), (*training, *validation))
-    records, unseen = both[: len(training)], tuple(both[len(training) :])
-    check([*records, *unseen], axis)
+    fitted, checked = records_of([training, validation], axis, unfit)
+    records, unseen = [record for _, record in fitted], tuple(record for _, record in checked)
     learned, unseen, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
-    notes = (*notes, *left_out([*training, *validation], axis))
-    catalogue, skipped = usable(all_effects(axis).values(), [*learned, *unseen])
+    notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], axis))
+    effects, clashes = apart_from(all_effects(axis).values(), [effect_held(name, own) for name in known])
+    notes = (*notes, *(Note("effect_left_out", f"not tried: {why}", {"effect": name}) for name, why in clashes.items()))
+    catalogue, skipped = usable(effects, [*learned, *unseen])
     missing = [n for n in known if n in skipped]
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
@@ -136,7 +143,7 @@ def _said(end: _Ending, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> 
         model=model,
         base_model=base_model,
         where=where,
-        next_maneuver=next_maneuver(work, verdict, found, skipped),
+        next_maneuver=next_maneuver(work, verdict, found, skipped, floor),
         skipped=skipped,
         notes=(*notes, *diverged, *flown, *([UNTRIED] if work.allowance.ended and asks_for_more(found, work.floor) else [])),
     )
@@ -161,22 +168,33 @@ def _candidates(end: _Ending, floor: Noise) -> tuple[Candidate, ...]:
             probability=p.get(id(h), 0.0),
             parameters=dict(h.model.values),
             errors=pair,
-            explained=explained(work, h),
+            explained=explained(work, h, floor),
             score=h.score - base.score,
-            evidence=evidence(work, h, floor),
-            confusable_with=confusable(work, h, end.shown),
+            evidence=evidence(work, h, pair, floor),
+            confusable_with=confusable(work, h, end.shown, p, floor),
+            worse=worsens(work, h, floor),
         )
         for h, pair in zip(end.shown, end.errors, strict=False)
     )
 
 
-def confusable(work: Search, h: Hypothesis, others: Sequence[Hypothesis]) -> tuple[str, ...]:
-    """Return the other hypotheses of the same size that take away nearly as much of the error on these data."""
-    mine = explained(work, h)
+def confusable(
+    work: Search, h: Hypothesis, others: Sequence[Hypothesis], p: Mapping[int, float], floor: Noise
+) -> tuple[str, ...]:
+    """Return the other hypotheses of the same size that take away nearly as much of the error, and are as good as likely.
+
+    p are probabilities by the hypotheses' id: what the evidence tells from one is no rival of it.
+    """
+    mine, own = explained(work, h, floor), p.get(id(h), 0.0)
+
+    def as_likely(other: Hypothesis) -> bool:
+        its = p.get(id(other), 0.0)
+        return min(own, its) > 0.0 and min(own, its) >= LIKELY * max(own, its)
+
     return tuple(
         "+".join(n for n in o.names if n not in work.known)
         for o in others
-        if o is not h and len(o.names) == len(h.names) and mine > 0.0 and explained(work, o) > 0.8 * mine
+        if o is not h and len(o.names) == len(h.names) and as_likely(o) and mine > 0.0 and explained(work, o, floor) > 0.8 * mine
     )[:4]
 
 
@@ -186,7 +204,7 @@ def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[tuple[Place, ...
     for record in records:
         try:
             shown.append(predict(h.model, record))
-        except ModelError as error:
+        except DivergenceError as error:
             notes.append(Note("grows_without_bound", f"{error.what}: {error.found}", {"run": record.name}))
     if not shown:
         return (), tuple(notes)
@@ -215,6 +233,7 @@ def body_of(d: Diagnosis) -> dict[str, Any]:
                 **_pair(c.errors),
                 "explained": c.explained,
                 "log_evidence": c.score,
+                "worse": c.worse,
                 "evidence": c.evidence,
                 "confusable_with": list(c.confusable_with),
             }

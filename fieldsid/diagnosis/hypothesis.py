@@ -21,7 +21,7 @@ from fieldsid.fitting.own_speed import at_own_speed, speed_doubt
 from fieldsid.fitting.predict import frozen_problem, refit_own, with_times
 from fieldsid.fitting.problem import Problem
 from fieldsid.logs.run import FloatArray
-from fieldsid.models.effect import Effect
+from fieldsid.models.effect import Effect, definitions_of
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 
@@ -134,15 +134,15 @@ def unseen_likelihood(judged: Judged, validation: Sequence[Record], flown: Flown
     return predictive(judged, runs, validation)
 
 
-def left_over(problem: Problem, x: FloatArray) -> FloatArray:
-    """Return the residual (2, n) of a one-run problem; where the motion grows without bound, all that was measured.
+def left_over(problem: Problem, x: FloatArray, run: int = 0) -> FloatArray:
+    """Return the residual (2, n) of a run; where the motion grows without bound, all that was measured.
 
     A model that diverges says nothing of the run: it is judged as one that predicts no motion at all.
     """
-    residual, _ = problem.residual(x, 0)
+    residual, _ = problem.residual(x, run)
     if np.isfinite(residual).all():
         return residual
-    r = problem.records[0]
+    r = problem.records[run]
     return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in zip(r.both, r.ok, strict=True)])
 
 
@@ -188,7 +188,7 @@ def training_errors(trial: Trial) -> Errors:
     problem = trial.problem
     left = []
     for run, record in enumerate(problem.records):
-        left.append(problem.residual(refit_own(problem, trial.x, run, floor_of([record]), anew=False), run)[0])
+        left.append(left_over(problem, refit_own(problem, trial.x, run, floor_of([record]), anew=False), run))
     return errors_of(problem.records, left)
 
 
@@ -208,7 +208,12 @@ def price(judged: Judged, validation: Sequence[Record]) -> float:
 
 
 def errors_of(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
-    """Return the pooled rms of residuals (2, n) over the measured samples of all runs."""
+    """Return the pooled rms of residuals (2, n) over the measured samples of all runs, and that of each run."""
+    each = tuple(_pooled([r], [e]) for r, e in zip(records, residuals, strict=True))
+    return replace(_pooled(records, residuals), each=each)
+
+
+def _pooled(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
     values = []
     for channel in range(2):
         ok = [r.ok[channel] for r in records]
@@ -231,4 +236,5 @@ def bare_model(problem: Problem, x: FloatArray, noise: Noise) -> Model:
         covariance=np.zeros((0, 0)),
         law=layout.law(values),
         noise=noise,
+        own=definitions_of(layout.effects),
     )

@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
-import numpy as np
-
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of
 from fieldsid.diagnosis.trial import Trial, judge, refine
@@ -17,7 +15,7 @@ from fieldsid.fitting.layout import Groups, layout_of, speed_groups
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.start import start_vector
 from fieldsid.fitting.starts import by_other_law, ground_of, promise_of, shortened, under_groups
-from fieldsid.fitting.trim_law import UNUSUAL, possible_trims
+from fieldsid.fitting.trim_law import UNUSUAL, miss_their_speed, possible_trims
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -78,7 +76,7 @@ def under_other_law(h: Hypothesis, told: Noise, family: str, *, asks_for_more: b
         own = replace(groups, snapped=False, run_speeds=own.run_speeds)
         return _better(h, *under_groups(trial.problem, trial.x, own), told, family, 0.0)
     one_speed = len(groups.speeds) == 1
-    if (one_speed or groups.by_law) and not (asks_for_more and np.ptp(groups.run_speeds) > 0.0):
+    if (one_speed or groups.by_law) and not (asks_for_more and miss_their_speed(groups)):
         return None
     return _better(h, *by_other_law(trial.problem, trial.x), told, family, WORTH if one_speed else 0.0)
 

@@ -7,17 +7,19 @@ from dataclasses import dataclass, field
 from math import isfinite, prod
 from typing import Any
 
+from fieldsid.display import Brief, Displayed, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """Free-run error over some runs: rms of measured minus simulated angle (rad) and rate (rad/s)."""
+@dataclass(frozen=True, slots=True, repr=False)
+class Errors(Brief):
+    """Free-run error over some runs: rms of measured minus simulated angle (rad) and rate (rad/s), and of each run alone."""
 
     angle_rms_rad: float
     rate_rms_rad_s: float
+    each: tuple[Errors, ...] = ()
 
     def over(self, floor: Noise) -> float:
         """Return the error over the noise floor, both measured channels pooled."""
@@ -35,17 +37,21 @@ class Errors:
         return float(prod(known) ** (1.0 / len(known))) if known else float("inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
+@dataclass(frozen=True, slots=True, repr=False)
+class Pair(Brief):
     """Errors on the runs learned from and on runs not seen."""
 
     train: Errors
     validation: Errors
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """One hypothesis: effects, probability among all that were tried, parameters, errors, and the evidence in words."""
+@dataclass(frozen=True, slots=True, repr=False)
+class Candidate(Displayed):
+    """One hypothesis: effects, probability among all that were tried, parameters, errors, and the evidence in words.
+
+    explained is the share of the excess error it takes away, 0..1; worse tells that it raises the error instead.
+    confusable_with are those that are likely enough to be it in its stead.
+    """
 
     effects: tuple[str, ...]
     probability: float
@@ -55,6 +61,7 @@ class Candidate:
     score: float
     evidence: str
     confusable_with: tuple[str, ...] = ()
+    worse: bool = False
 
     @property
     def effect(self) -> str:
@@ -62,8 +69,8 @@ class Candidate:
         return "+".join(self.effects) if self.effects else "none"
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
+@dataclass(frozen=True, slots=True, repr=False)
+class Diagnosis(Plotted):
     """The verdict, what led to it, and the model with the named effects added."""
 
     axis: Axis

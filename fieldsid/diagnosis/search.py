@@ -16,14 +16,15 @@ from fieldsid.diagnosis.forms import Plain, Shaping
 from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with_free_run
 from fieldsid.diagnosis.laws import Trims, base_trial, error_by_law, law_of, speed_laws, under_other_law
 from fieldsid.diagnosis.remainder import is_odd
-from fieldsid.diagnosis.trial import NOISES, SETTLED, Judged, Trial, judge, refine, smaller_twin
+from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine, smaller_twin
 from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
-from fieldsid.diagnosis.weather import in_its_weather, other_noise, sensors, wanders
+from fieldsid.diagnosis.weather import base_judged, other_noise, sensors
 from fieldsid.diagnosis.worth import ALIKE, FAR, HOPE, MUCH, WORTH, asks_for_more, fits, helps, likelier, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.noise import floor_below, floor_of
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.starts import carried, overlaid
+from fieldsid.fitting.unbounded import refuse_unbounded
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -84,13 +85,11 @@ class Search:
             known = [e for e in self.catalogue if e.name in self.known]
             trials = self.beside.each(lambda groups: base_trial(self.records, self.axis, known, groups, self.floor), laws)
             trial = min(trials, key=lambda t: error_by_law(t, self.axis))
+            refuse_unbounded(trial.problem, trial.x, "diagnose", instead="leave effects out of the model it starts from")
             self.is_noiseless = is_noiseless(self.floor, told_apart(self.floor, trial.weights), self.records)
             self.hear(trial)
-            families = (self.family,) if self.family else NOISES
             self.told = told_apart(self.floor, trial.weights)
-            judgings = self.beside.each(lambda f: judge(trial.problem, trial.x, self.floor, self.told, f), families)
-            judged = max(judgings, key=lambda j: j.likelihood)
-            judged = in_its_weather(judged, self.beside) if wanders(judged) else judged
+            judged = base_judged(trial, self.floor, self.told, self.family, self.beside)
             self.family, self.begun = judged.family, self.begun | {judged.family}
             self._keep(judged)
             self.tried[self.root] = with_free_run(self.tried[self.root], self.floor)
@@ -395,5 +394,5 @@ class Search:
         return h.judging.over(sensors(self.floor, self.tried.get(self.root)))
 
     def ranked(self) -> list[Hypothesis]:
-        """Return all judged hypotheses, best score first."""
-        return sorted(self.tried.values(), key=lambda h: -h.score)
+        """Return all judged hypotheses, best score first, but for those that grow without bound: they were given up."""
+        return sorted((h for h in self.tried.values() if np.isfinite(h.score)), key=lambda h: -h.score)

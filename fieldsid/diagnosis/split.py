@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.record import Record
+from fieldsid.rounding import nine_digits
 
 SHARE = 0.65
 SHORTEST_S = 12.0
@@ -23,8 +24,10 @@ def held_back(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[Reco
     of each run's excitation. Where that leaves too little, nothing is held back, and the note says so.
     """
     if len(records) >= 3:
-        speeds = np.array([r.speed for r in records])
-        middle = int(np.argsort(speeds)[len(records) // 2]) if np.isfinite(speeds).all() else len(records) - 1
+        speeds = [nine_digits(r.speed) for r in records]
+        # of runs at one speed the middle one as they were given
+        by_speed = sorted(range(len(records)), key=speeds.__getitem__)
+        middle = by_speed[len(records) // 2] if np.isfinite(speeds).all() else len(records) - 1
         rest = tuple(r for i, r in enumerate(records) if i != middle)
         text = f"no validation run was given: {records[middle].name} was held back to judge by"
         return rest, (records[middle],), (Note("held_back", text, {"run": records[middle].name}),)

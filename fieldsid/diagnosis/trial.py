@@ -23,6 +23,7 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
+from fieldsid.rounding import nine_digits
 
 NOISES, BOTH = ("disturbance", "coloured"), "both"
 """Kinds of noise that hypotheses are compared under, and the two together."""
@@ -106,14 +107,15 @@ def _noise_at(
 
 def smaller_twin(judged: Judged, effect: Effect) -> Judged:
     """Return the likelier of a trial and its twin, which has the same response at one speed: of two alike the smaller effect."""
-    problem, x = judged.trial.problem, judged.trial.x
-    other = twin_of(problem, x, effect)
+    problem = judged.trial.problem
+    other = twin_of(problem, judged.trial.x, effect)
     if other is None:
         return judged
     twin = judge(problem, other, judged.noise, judged.floor, judged.family)
     place = problem.layout.names.index(effect.coefficients[0].name)
-    is_smaller = twin.likelihood > judged.likelihood - TWINS and twin.trial.x[place] < x[place]
-    return twin if is_smaller or twin.likelihood > judged.likelihood else judged
+    if abs(twin.likelihood - judged.likelihood) < TWINS:
+        return min(judged, twin, key=lambda j: nine_digits(j.trial.x[place]))
+    return twin if twin.likelihood > judged.likelihood else judged
 
 
 def likelihood_at(problem: Problem, x: FloatArray, judged: Judged) -> float:

@@ -26,6 +26,8 @@ LEAVES, BESIDE_SOME = 1.6, ((0.85, 1e-6),)
 """Error over the noise floor that a form of the right effect hardly leaves, and the share to be explained beyond it."""
 BESIDE_MUCH = ((0.97, 1e-6),)
 """The same where what is left is beyond any sea: most of a base that is far off is explained by whatever bends."""
+LIKELY = 0.05
+"""Probability over a hypothesis's own from which on another is its rival: beyond odds of 20 to 1 they are told apart."""
 VISIBLE = 1.15
 """Free-run error over the noise floor below which nothing worth naming is left."""
 FILTER_S = 1.0
@@ -102,6 +104,11 @@ def explained(search: Search, h: Hypothesis, floor: Noise | None = None) -> floa
     base, now = (x.judging.over(floor or search.floor) for x in (search.base(), h))
     excess = base**2 - 1.0
     return float(np.clip((base**2 - now**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
+
+
+def worsens(search: Search, h: Hypothesis, floor: Noise) -> bool:
+    """Whether a hypothesis raises the error over a noise floor, by more than hypotheses that predict alike differ."""
+    return bool(h.judging.over(floor) > ALIKE * search.base().judging.over(floor))
 
 
 def probabilities(hypotheses: Sequence[Hypothesis]) -> list[float]:

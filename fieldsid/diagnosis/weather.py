@@ -11,9 +11,20 @@ from collections.abc import Collection
 from fieldsid.diagnosis.beside import Beside
 from fieldsid.diagnosis.floor import TRACE, shown_floor
 from fieldsid.diagnosis.hypothesis import Hypothesis
-from fieldsid.diagnosis.trial import BOTH, NOISES, Judged, judge
+from fieldsid.diagnosis.trial import BOTH, NOISES, SETTLED, Judged, Trial, judge
 from fieldsid.diagnosis.worth import WORTH
 from fieldsid.models.model import Noise
+
+
+def base_judged(trial: Trial, floor: Noise, told: Noise, family: str, beside: Beside) -> Judged:
+    """Return the base under the kind of noise that is likeliest, or the one given, and under both together where that tells.
+
+    White noise is alike to all kinds: a later one is taken only where it is likelier by more than a search settles to.
+    """
+    best, *others = beside.each(lambda f: judge(trial.problem, trial.x, floor, told, f), (family,) if family else NOISES)
+    for other in others:
+        best = other if other.likelihood > best.likelihood + SETTLED else best
+    return in_its_weather(best, beside) if wanders(best) else best
 
 
 def in_its_weather(own: Judged, beside: Beside) -> Judged:

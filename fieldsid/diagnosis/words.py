@@ -5,10 +5,11 @@ from __future__ import annotations
 from math import isfinite
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.remainder import Remainder
 from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.verdict import Verdict, explained
-from fieldsid.diagnosis.worth import WORSE, worse_unseen
+from fieldsid.diagnosis.verdict import Verdict, explained, worsens
+from fieldsid.diagnosis.worth import ALIKE, WORSE, worse_unseen
 from fieldsid.models.effect import effect_named, form_of
 from fieldsid.models.model import Noise
 
@@ -21,19 +22,21 @@ def over(search: Search, h: Hypothesis, floor: Noise) -> float:
     return h.judging.over(floor)
 
 
-def evidence(search: Search, h: Hypothesis, floor: Noise) -> str:
-    """Return what speaks for or against a hypothesis, in one sentence."""
+def evidence(search: Search, h: Hypothesis, errors: Pair, floor: Noise) -> str:
+    """Return what speaks for or against a hypothesis with these errors, in one sentence."""
     base = search.base()
-    if h is base:
-        return f"base model: error {over(search, h, floor):.2f} x noise floor on unseen runs"
-    gain = h.score - base.score
     kind = "unseen runs" if search.validation else "the runs it was fitted to"
-    runs = sum(1 for a, b in zip((*h.by_run, *h.unseen), (*base.by_run, *base.unseen), strict=True) if a > b)
-    total = len(h.by_run) + len(h.unseen)
-    return (
-        f"error on {kind} {over(search, base, floor):.2f} -> {over(search, h, floor):.2f} x noise floor "
-        f"({100 * explained(search, h):.0f} % of the excess); log evidence {gain:+.1f}; better on {runs} of {total} runs"
-    )
+    fall = f"error on {kind} {over(search, base, floor):.2f} -> {over(search, h, floor):.2f} x noise floor"
+    share = f"{fall} ({100 * explained(search, h, floor):.0f} % of the excess)"
+    said = f"makes it worse: {fall}" if worsens(search, h, floor) else share
+    lower, total = lower_on(errors, base.errors, floor)
+    return f"{said}; log evidence {h.score - base.score:+.1f}; error lower on {lower} of {total} runs"
+
+
+def lower_on(errors: Pair, base: Pair, floor: Noise) -> tuple[int, int]:
+    """Return on how many runs, fitted and unseen, the error is lower by more than what counts as alike, and of how many."""
+    pairs = list(zip((*errors.train.each, *errors.validation.each), (*base.train.each, *base.validation.each), strict=True))
+    return sum(ALIKE * now.over(floor) < was.over(floor) for now, was in pairs), len(pairs)
 
 
 def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainder, floor: Noise, noise: Noise) -> str:

@@ -8,20 +8,24 @@ The moment (rad/s^2) adds to the rate equation along the simulated motion. A pla
 
 from __future__ import annotations
 
+import keyword
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import read_yaml
+from fieldsid.artifacts import read_text, yaml_mapping
 from fieldsid.effects._expression import FUNCTIONS, Expression, parse
 from fieldsid.errors import ArtifactError, EffectError
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.definition import of_text
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
 from fieldsid.models.record import Record
 from fieldsid.registry import near
@@ -41,6 +45,10 @@ ONE_AXIS: Mapping[str, Axis] = MappingProxyType(
 ROLES = ("surge", "roll", "depth", "cross", "thrust")
 KEYS = ("name", "says", "axes", "moment", "coefficients", "telltale", "excited_by", "mistaken_for", "source")
 COEFFICIENT_KEYS = ("unit", "low", "high", "start", "scan", "step", "per_run", "says")
+LONGEST_NAME, LONGEST_COEFFICIENT = 40, 60
+SUFFIXES = (".yaml", ".yml")
+RESERVED = ("none",)
+"""Names no effect can have: `sysid plan --separate none` is the model as it is."""
 LARGEST = 1e4
 """Moment in rad/s^2 beyond which the motion is growing without bound; a vehicle has some 10."""
 
@@ -69,32 +77,66 @@ class Moment:
         return moment
 
 
-def load_user_effects(folder: Path) -> dict[str, Effect]:
-    """Return the effects of a folder's *.yaml and *.yml files by name, none where there is no folder; raises EffectError."""
-    found: dict[str, Effect] = {}
-    for path in sorted(p for p in folder.glob("*") if p.suffix in {".yaml", ".yml"} and p.is_file()):
-        effect = load_user_effect(path)
-        if effect.name in found:
-            both = f"{found[effect.name].origin} and {path}"
-            raise EffectError(f"two effects are named {effect.name!r}", found=both, hint="rename one of them")
-        found[effect.name] = effect
-    return found
+def user_effect_files(folder: Path) -> list[Path]:
+    """Return the YAML files of a folder in order, and the Python ones unless they are a package's; raises EffectError.
+
+    There are none where there is no folder. Python is not read: `load_user_effect` says how it takes part.
+    """
+    if not folder.is_dir():
+        return []
+    kinds = SUFFIXES if (folder / "__init__.py").exists() else (*SUFFIXES, ".py")
+    try:
+        return sorted(p for p in folder.iterdir() if p.suffix in kinds and not p.is_dir())
+    except OSError as error:
+        raise EffectError(
+            f"the folder `{folder}` cannot be read: {error.strerror}", found=str(folder), hint=f"try `chmod u+rx {folder}`"
+        ) from error
 
 
 def load_user_effect(path: Path) -> Effect:
     """Return the effect of one YAML file; raises EffectError naming the file and the place."""
+    if path.suffix not in SUFFIXES:
+        raise EffectError(
+            f"`{path}` is Python: only YAML is read from a folder, and no code is run",
+            found=path.name,
+            hint="make it a package with an entry point of the group `fieldsid.effects`, or write the moment as YAML",
+        )
     try:
-        return effect_of(read_yaml(path), origin=str(path))
+        text = read_text(path)
+        return effect_of_text(text, path, origin=str(path))
+    except ArtifactError as error:
+        raise EffectError(error.what, found=error.found, hint=error.hint) from error
+
+
+def effect_of_text(text: str, path: Path, *, origin: str) -> Effect:
+    """Return the effect that a YAML text defines, which knows its own definition; raises EffectError naming the file."""
+    try:
+        return replace(effect_of(yaml_mapping(text, path), origin=origin), definition=of_text(text, path))
     except ArtifactError as error:
         raise EffectError(error.what, found=error.found, hint=error.hint) from error
     except EffectError as error:
-        raise EffectError(f"`{path.name}`: {error.what}", found=error.found, hint=error.hint) from error
+        raise EffectError(f"`{path}`: {error.what}", found=error.found, hint=error.hint) from error
+
+
+@lru_cache(maxsize=32)
+def travelled(text: str, file: str) -> Effect:
+    """Return the effect of a model's own definition: the text, and the file it was in; raises EffectError."""
+    return effect_of_text(text, Path(file), origin=f"{file}, as the model holds it")
+
+
+def names_asked(path: Path) -> set[str]:
+    """Return the names by which a user may ask for the effect of a file that cannot be used: the file's, and the one in it."""
+    try:
+        said = re.search(r"^name:[ \t]*['\"]?([A-Za-z]\w*)", read_text(path), re.MULTILINE)
+    except ArtifactError:
+        said = None
+    return {path.stem} | ({said[1]} if said else set())
 
 
 def effect_of(spec: Mapping[str, Any], *, origin: str) -> Effect:
     """Return the effect of a mapping as in the module's example; raises EffectError."""
     _known_keys("an effect", spec, KEYS, required=("name", "moment", "coefficients"))
-    name = _name("effect", spec["name"])
+    name = checked_name(spec["name"])
     coefficients = _coefficients(spec["coefficients"])
     if not isinstance(spec["moment"], str):
         raise EffectError("`moment` must be text", found=repr(spec["moment"])[:60], hint='write `moment: "k * r * abs(phi)"`')
@@ -155,7 +197,7 @@ def _coefficients(given: object) -> tuple[Coefficient, ...]:
             found=repr(given)[:60],
             hint="write `coefficients: {k: {unit: 1/s^2, low: -5, high: 5, start: 0.1}}`",
         )
-    return tuple(_coefficient(_name("coefficient", n), body) for n, body in given.items())
+    return tuple(_coefficient(_name("coefficient", n, LONGEST_COEFFICIENT), body) for n, body in given.items())
 
 
 def _coefficient(name: str, body: object) -> Coefficient:
@@ -191,11 +233,34 @@ def _number(name: str, key: str, value: object) -> float:
     raise EffectError(f"`{key}` of coefficient `{name}` must be a number", found=repr(value)[:60], hint=f"write `{key}: 0.1`")
 
 
-def _name(what: str, value: object) -> str:
-    if isinstance(value, str) and re.fullmatch(r"[a-z][A-Za-z0-9_]{0,39}", value):
-        return value
-    what = f"the name of the {what} must be a small letter, then letters, digits and _"
-    raise EffectError(what, found=repr(value)[:60], hint="write `name: tether_drag`")
+def checked_name(value: object, taken: Collection[str] = ()) -> str:
+    """Return an effect's name; raises EffectError for one that no effect can have, with one that is not taken."""
+    name = _name("effect", value, LONGEST_NAME, taken)
+    if name in RESERVED:
+        what = f"`{name}` cannot be the name of an effect: it is what `sysid plan --separate` calls the plain model"
+        raise EffectError(what, found=name, hint=f"call it `{name}_1`")
+    return name
+
+
+def _name(what: str, value: object, longest: int, taken: Collection[str] = ()) -> str:
+    if not isinstance(value, str) or not re.fullmatch(rf"[a-z][A-Za-z0-9_]{{0,{longest - 1}}}", value):
+        raise EffectError(
+            f"the name of the {what} must be a small letter, then letters, digits and _, at most {longest}",
+            found=repr(value)[:80],
+            hint=f"call it `{name_like(value, taken)}`",
+        )
+    if keyword.iskeyword(value):
+        what = f"`{value}` cannot be the name of the {what}: it is a word of Python's own"
+        raise EffectError(what, found=value, hint=f"call it `{value}_1`")
+    return value
+
+
+def name_like(value: object, taken: Collection[str]) -> str:
+    """Return a name that is allowed, free and like the one that was given."""
+    like = re.sub(r"\W+", "_", str(value), flags=re.ASCII).strip("_0123456789").lower()
+    like = like[: LONGEST_NAME - len("_99")].rstrip("_") or "tether_drag"
+    names = (like if i == 0 else f"{like}_{i}" for i in count())
+    return next(n for n in names if not keyword.iskeyword(n) and n not in RESERVED and n not in taken)
 
 
 def _words(spec: Mapping[str, Any], key: str, default: tuple[str, ...]) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ EFFECT = Effect(
     telltale="the gain of the response follows the speed: too strong a simulation where the vehicle has slowed down",
     excited_by=("turning_circle", "zigzag", "square_pulses"),
     mistaken_for=("quadratic_damping", "crossflow_drag", "stall", "step_change", "speed_moment", "prop_moment"),
-    source="Fossen 2011, section 6.4; the paper's law of authority against u^2",
+    source="Fossen 2011, section 6.4: lift against u^2",
     needs=("surge",),
     terms=terms,
 )

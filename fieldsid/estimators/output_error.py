@@ -11,13 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from fieldsid.fitting.colour import chosen_noise
-from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations
+from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations, sandwich
 from fieldsid.fitting.grow import grown_start
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.restricted import lines_of, restricted_likelihood
 from fieldsid.fitting.small_sample import FEWEST_DEGREES_PLAIN, LONG, noise_spread, widened
+from fieldsid.fitting.unbounded import refuse_unbounded
 from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
@@ -63,7 +64,14 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent
 
 
 def found_minimum(problem: Problem) -> tuple[Descent, Noise]:
-    """Return the output-error minimum of a problem; a long one comes to it over the minima of ever longer first parts.
+    """Return the output-error minimum of a problem and its weights; raises DivergenceError where no start leads to any."""
+    found, weights = _found_over_parts(problem)
+    refuse_unbounded(problem, found.x, ESTIMATOR.name, instead="leave effects out")
+    return found, weights
+
+
+def _found_over_parts(problem: Problem) -> tuple[Descent, Noise]:
+    """Return the minimum that a long record comes to over the minima of ever longer first parts, a short one at once.
 
     Each is so near the next one's that a step or two lead there.
     """
@@ -98,8 +106,7 @@ def _sandwich(
         weighted = np.where(record.ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
         index = np.array([place[s] for s in result.slots])
         centre[np.ix_(index, index)] += middle(record, noise, result.base.damping, result.base.stiffness, weighted)
-    inverse = covariance(normal)
-    return np.asarray(inverse @ centre @ inverse)
+    return sandwich(normal, centre)
 
 
 def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, family: str) -> FloatArray:

@@ -46,9 +46,8 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
             break
         noise, _ = restricted_noise(problem, lines_of(part, found.x), family, noise)
     notes = (Note("noise_model", f"noise model: {family}", {"family": family}),)
-    return Solution(
-        found.x, shared_covariance(problem, errors(problem, found, noise, family), found.free), noise, ESTIMATOR.name, notes
-    )
+    known = shared_covariance(problem, errors(problem, found, noise, family), found.free)
+    return Solution(found.x, known, noise, ESTIMATOR.name, notes, weights=noise)
 
 
 def errors(problem: Problem, found: Descent, noise: Noise, family: str) -> FloatArray:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.errors import DataError
+from fieldsid.errors import DataError, DivergenceError
 from fieldsid.estimators.svf_ls import base_slots, finished, inverse_of_normal, median_step, regress, theta_of
 from fieldsid.fitting.equation import Theta, measured_signals
 from fieldsid.fitting.method import Estimator, Options, Solution
@@ -23,11 +23,12 @@ from fieldsid.fitting.series_errors import Series, coloured_covariance
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models import kernels
 from fieldsid.models.record import Record
+from fieldsid.models.signal_path import pieces_for
 
 ROUNDS = 30
 SETTLED = 1e-7
-SLOWEST = 0.05
-"""Least damping (1/s) of the filter: an unstable estimate must not become an unstable filter."""
+SLOWEST, SOFTEST = 0.05, 0.0
+"""Least damping (1/s) and stiffness (1/s^2) of the filter: an unstable estimate must not become an unstable filter."""
 FINE_S = 0.0125
 """Longest step of the simulation between samples."""
 
@@ -41,7 +42,10 @@ class Rows:
 
 
 def solve(problem: Problem, options: Options) -> Solution:
-    """Return the instrumental-variable solution of one run; raises DataError where no angle was measured."""
+    """Return the instrumental-variable solution of one run.
+
+    Raises DataError where no angle was measured, DivergenceError where the instruments grow without bound.
+    """
     record = problem.records[0]
     if not record.angle_ok.any():
         raise DataError(
@@ -59,6 +63,8 @@ def solve(problem: Problem, options: Options) -> Solution:
         theta, rounds = theta_of(problem, x, 0), rounds + 1
         rows, instruments = filtered_rows(record, theta, state)
         phi, z = rows.columns[use][:, keep], instruments.columns[use][:, keep]
+        if not (np.isfinite(z).all() and np.isfinite(phi).all()):
+            raise _astray(record, theta, rounds)
         scale = 1.0 / np.maximum(np.linalg.norm(z, axis=0), 1e-300)
         found = np.linalg.lstsq((z * scale).T @ (phi * scale), (z * scale).T @ rows.target[use], rcond=1e-13)[0] * scale
         moved = float(np.max(np.abs(found[: len(slots)] - x[slots]) / (np.abs(x[slots]) + 1e-3)))
@@ -82,7 +88,7 @@ def filtered_rows(record: Record, theta: Theta, state: FloatArray) -> tuple[Rows
     part = np.tile(np.arange(pieces) / pieces, record.steps.size)
     start, change = np.repeat(path.start, pieces), np.repeat(path.end - path.start, pieces)
     fin = start + change * part, start + change * (part + 1.0 / pieces)
-    a, k = max(theta.damping, SLOWEST), theta.stiffness
+    a, k = max(theta.damping, SLOWEST), max(theta.stiffness, SOFTEST)
     push = [theta.authority * f + theta.trim for f in fin]
     motion = through(fine, a, k, push[0], push[1], state)[:, 0]
     every = slice(None, None, pieces)
@@ -107,8 +113,17 @@ def through(
     drive[:, 0], drive[:, 1], drive[:, 2], drive[:, 3] = a, k, start, end
     first = np.zeros(3) if state is None else np.array([state[0], state[1], 0.0])
     out = np.empty((steps.size + 1, 3))
-    kernels.simulate(steps, drive, np.zeros(len(kernels.CONSTANTS)), first, 1, out)
+    pieces = pieces_for(float(steps.max()), a, k**0.5)
+    kernels.simulate(steps, drive, np.zeros(len(kernels.CONSTANTS)), first, pieces, out)
     return out[:, :2]
+
+
+def _astray(record: Record, theta: Theta, rounds: int) -> DivergenceError:
+    return DivergenceError(
+        f"the instrumental variables of run {record.name!r} grow without bound",
+        found=f"round {rounds}: damping {theta.damping:.3g}, stiffness {theta.stiffness:.3g}, authority {theta.authority:.3g}",
+        hint="use `--method output_error`, which keeps to motions that stay bounded",
+    )
 
 
 def notes_of(rounds: int, moved: float) -> tuple[Note, ...]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.errors import DataError, ModelError
+from fieldsid.errors import DataError
 from fieldsid.estimators.output_error import residual_noise
 from fieldsid.fitting.equation import Equation, Measured, Theta, filtered_equation, measured_signals
 from fieldsid.fitting.layout import group_name
@@ -21,6 +21,7 @@ from fieldsid.fitting.predict import refit_own
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.sample_noise import noise_share, transfer_of
 from fieldsid.fitting.series_errors import Series, coloured_covariance
+from fieldsid.fitting.unbounded import refuse_unbounded
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
@@ -164,7 +165,7 @@ def least_squares(rows: Stacked, wanted: int) -> FloatArray:
         raise DataError(
             "the filtered data cannot carry a least squares",
             found=f"{target.size} usable samples, {dead.size} parameters without any signal",
-            hint="widen `--from` and `--to` so that the fin moves within them",
+            hint="take a run, or a part of one, in which the fin moves",
         )
     solution: FloatArray = np.linalg.lstsq(matrix / np.maximum(scale, 1e-300), target, rcond=1e-12)[0]
     return np.asarray(solution / np.maximum(scale, 1e-300))
@@ -179,19 +180,14 @@ def theta_of(problem: Problem, x: FloatArray, run: int) -> Theta:
 def finished(problem: Problem, x: FloatArray, covariance: FloatArray, method: str, notes: tuple[Note, ...]) -> Solution:
     """Return the solution with every run's initial state at its best and the noise of its free run.
 
-    Raises ModelError when the motion that was found grows without bound.
+    Raises DivergenceError when the motion that was found grows without bound.
     """
     layout = problem.layout
     x = np.clip(x, layout.low, layout.high)
     for run, record in enumerate(problem.records):
         x = refit_own(problem, x, run, floor_of([record]))
+    refuse_unbounded(problem, x, method, instead="use `--method output_error`, which keeps to motions that stay bounded")
     noise = residual_noise(problem, x, len(base_slots(problem)))
-    if not np.isfinite([noise.angle, noise.rate]).all():
-        raise ModelError(
-            f"the equation-error fit of `{method}` grows without bound when simulated",
-            found=", ".join(f"{n} = {x[i]:.3g}" for n, i in base_slots(problem).items()),
-            hint="use `--method output_error --effects quadratic_damping`",
-        )
     return Solution(x, covariance, noise, method, notes)
 
 

@@ -42,7 +42,7 @@ def solve(problem: Problem, options: Options) -> Solution:
         raise DataError(
             f"run {record.name!r} is too short for the recursion",
             found=f"{int(used.sum())} samples after the filter has forgotten its start",
-            hint="widen `--from` and `--to`, or raise lambda",
+            hint="take a longer part, or a larger `--lambda`",
         )
     x = problem.start()
     x[list(slots.values())] = values[-1]

@@ -21,14 +21,16 @@ from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.weather import in_its_weather
 from fieldsid.diagnosis.worth import MATTERS, WORTH
-from fieldsid.effects import pick_effect
+from fieldsid.display import Brief, Plotted
+from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import DataError, UsageError
-from fieldsid.fitting.fit import check
+from fieldsid.fitting.fit_runs import records_of
 from fieldsid.fitting.predict import as_flown
 from fieldsid.logs.run import Note, Run
-from fieldsid.models.effect import Effect
+from fieldsid.logs.sifting import Refused
+from fieldsid.models.effect import Effect, effect_held
 from fieldsid.models.model import Model, Noise
-from fieldsid.models.record import Record, left_out, record_of
+from fieldsid.models.record import Record, left_out
 
 SAME = 1e-3
 """Log likelihoods that differ by less are one optimum."""
@@ -36,8 +38,8 @@ WIDTH = 2
 """Orders in which several effects are added that are followed from one addition to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class Gain:
+@dataclass(frozen=True, slots=True, repr=False)
+class Gain(Brief):
     """What an addition changed: errors before and after over one noise floor, on named runs.
 
     `unseen` tells whether there were data to judge by that were not fitted.
@@ -57,9 +59,17 @@ class Gain:
         before, after = (p.validation if self.unseen else p.train for p in (self.before, self.after))
         return before.over(self.noise_floor), after.over(self.noise_floor)
 
+    def left(self, *, kept: bool) -> tuple[float, float]:
+        """Return the error over the noise floor that the addition leaves, or its lack where not kept: fitted, unseen runs.
 
-@dataclass(frozen=True, slots=True)
-class Extension:
+        NaN for the unseen where there are none.
+        """
+        pair = self.after if kept else self.before
+        return pair.train.over(self.noise_floor), pair.validation.over(self.noise_floor)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Extension(Plotted):
     """The extended model, what the addition changed, and its gain in log evidence."""
 
     model: Model
@@ -81,19 +91,21 @@ def extend(
     validation: Sequence[Run] = (),
     *,
     report: Callable[[str], None] = lambda _text: None,
+    unfit: Refused[Run] | None = None,
 ) -> Extension:
     """Return a model with effects added by name, base and all effects refitted to the training runs together.
 
-    Without validation runs a part of the training runs is held back to judge by. report is told what is being tried.
+    Without validation runs a part of the training runs is held back to judge by. report is told what is being tried. unfit is
+    told of each of several runs that cannot be fitted; without it, and where none of a group is left, its error is raised.
     Raises UsageError for an effect that is unknown, of the other axis or in the model already, DataError for runs that
-    cannot be used or lack a signal the effects need, EffectError for a user's effect that fails.
+    cannot be used or lack a signal the effects need, EffectError for a user's effect that fails, or has a coefficient of a name
+    that another effect of the model has.
     """
-    new = _new_effects(parent, add)
-    records = [record_of(r, parent.axis) for r in training]
-    unseen = tuple(record_of(r, parent.axis) for r in validation)
-    check([*records, *unseen], parent.axis)
+    new = new_effects(parent, add)
+    fitted, checked = records_of([training, validation], parent.axis, unfit)
+    records, unseen = [record for _, record in fitted], tuple(record for _, record in checked)
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
-    parts = _with_signals((*(pick_effect(n) for n in parent.effects), *new), [*learned, *judged])
+    parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
     before = base_from(work, parent)
     after = _with_all(work)
@@ -108,7 +120,7 @@ def extend(
         judged_on=tuple(r.name for r in (judged or learned)),
     )
     model = refitted_model(after)
-    notes = (*notes, *as_flown(model, judged), *left_out([*training, *validation], parent.axis))
+    notes = (*notes, *as_flown(model, judged), *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     return Extension(model, gain, after.score - before.score, notes)
 
 
@@ -142,7 +154,8 @@ def _with_all(work: Search) -> Hypothesis:
     return front[0]
 
 
-def _new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
+def new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
+    """Return the effects that are to be added to a model; raises UsageError or EffectError as `extend` does."""
     names = tuple(dict.fromkeys(add))
     if not names:
         raise UsageError("there is no effect to add", hint="name one: `--add servo_lag`; `sysid diagnose` says which is missing")
@@ -160,6 +173,7 @@ def _new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
                 found=", ".join(a.value for a in effect.axes),
                 hint=f"see `sysid effects list --axis {parent.axis.value}`",
             )
+        refuse_clash(effect, (effect_held(n, parent.own) for n in parent.effects))
     return effects
 
 
@@ -170,6 +184,6 @@ def _with_signals(parts: Sequence[Effect], records: Sequence[Record]) -> tuple[E
         raise DataError(
             f"effect `{name}` {why}",
             found=", ".join(dict.fromkeys(f"{r.name} has {', '.join(sorted(r.signals)) or 'none'}" for r in records)),
-            hint="map the signal on import: `sysid inspect LOG`, or leave the effect out",
+            hint="map the signal on import, where the log has it, or leave the effect out",
         )
     return kept

@@ -9,6 +9,7 @@ from typing import Any
 
 from fieldsid.artifacts import load_record, sha256_of
 from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError
 from fieldsid.extension.extend import Extension, Gain
 from fieldsid.logs.run import Run
@@ -17,8 +18,8 @@ from fieldsid.models.model import KIND, Noise, load_model, save_model
 INTACT, CHANGED, MISSING = "intact", "changed", "missing"
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+@dataclass(frozen=True, slots=True, repr=False)
+class Step(Brief):
     """One addition: what it changed, why it was kept, and the logs that are no longer what it was made from."""
 
     gain: Gain
@@ -35,8 +36,8 @@ class Parent:
     state: str
 
 
-@dataclass(frozen=True, slots=True)
-class Generation:
+@dataclass(frozen=True, slots=True, repr=False)
+class Generation(Brief):
     """One model of a line: its file, its effects, whether the file is as its child knew it, and how it came about."""
 
     path: Path
@@ -119,13 +120,15 @@ def parent_of(path: Path) -> Parent | None:
 def history_of(path: Path) -> tuple[Generation, ...]:
     """Return the line of a model from its oldest known ancestor on; raises ArtifactError where a file cannot be read.
 
-    A parent that is missing ends the line: what its child knows of it is all that is said.
+    A parent that is missing ends the line: what its child knows of it is all that is said. No log is looked at before every
+    model of the line has been read.
     """
     line: list[Generation] = []
+    logs: dict[Path, list[tuple[Path, str]]] = {}
     place, state = path, INTACT
     while True:
         model = load_model(place)
-        step = _step(place, model.info.get("extension"))
+        step, logs[place] = _step(place, model.info.get("extension"))
         line.append(Generation(place, model.effects, state, step))
         parent = parent_of(place)
         if parent is None:
@@ -137,15 +140,22 @@ def history_of(path: Path) -> tuple[Generation, ...]:
         if parent.path.resolve() in {g.path.resolve() for g in line}:
             raise ArtifactError(f"`{place}` descends from itself", found=str(parent.path), hint="extend the oldest model again")
         place, state = parent.path, parent.state
-    return tuple(reversed(line))
+    return tuple(_with_logs(g, logs.get(g.path, ())) for g in reversed(line))
 
 
-def _step(path: Path, body: Any) -> Step | None:
+def _with_logs(generation: Generation, logs: Sequence[tuple[Path, str]]) -> Generation:
+    """Return a generation that knows which of its logs are no longer what they were."""
+    changed = tuple(str(path) for path, digest in logs if _differs(path, digest))
+    return generation if generation.step is None else replace(generation, step=replace(generation.step, changed_data=changed))
+
+
+def _step(path: Path, body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
+    """Return how a model was extended, and the logs it was made from with their hashes."""
     if body is None:
-        return None
+        return None, []
     try:
-        changed = (str(d["path"]) for d in body["data"] if _differs(Path(str(d["path"])), str(d["sha256"])))
-        return Step(_gain(body), str(body["kept_by"]), tuple(changed))
+        logs = [(Path(str(d["path"])), str(d["sha256"])) for d in body["data"]]
+        return Step(_gain(body), str(body["kept_by"])), logs
     except (KeyError, TypeError, ValueError) as error:
         raise ArtifactError(
             f"`{path}` does not say completely how it was extended",
@@ -168,7 +178,7 @@ def _gain(body: Mapping[str, Any]) -> Gain:
 
 
 def _differs(path: Path, digest: str) -> bool:
-    return path.exists() and sha256_of(path) != digest
+    return (path.is_file() or path.is_dir()) and sha256_of(path) != digest
 
 
 def _pair(body: Mapping[str, Any]) -> Pair:

@@ -1,4 +1,4 @@
-"""The sheet every figure is drawn on: size, colours that a colour-blind reader tells apart, and saving as PNG.
+"""The sheet every figure is drawn on: size, colours that a colour-blind reader tells apart, and saving.
 
 Colours are those of Okabe and Ito 2008. No global state: figures are made without pyplot, so that drawing in a library
 call leaves a notebook's own settings as they are.
@@ -6,16 +6,21 @@ call leaves a notebook's own settings as they are.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from fieldsid.artifacts import replacing
 from fieldsid.copies import later
+from fieldsid.figures.kinds import KINDS, TOOL, kind_of
 from fieldsid.logs.run import FloatArray
 
 MEASURED = "0.45"
@@ -30,9 +35,18 @@ DPI = 120
 MOST_DOTS = 4000
 
 
+class Sheet(Figure):
+    """A figure that a notebook shows by itself, without pyplot or a magic command before it."""
+
+    def _repr_png_(self) -> bytes:
+        out = BytesIO()
+        self.savefig(out, format="png")
+        return out.getvalue()
+
+
 def sheet(width: float = 9.0, height: float = 7.0) -> Figure:
     """Return an empty figure of a size in inches, with a canvas of its own."""
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    figure = Sheet(figsize=(width, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -67,18 +81,32 @@ def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> Non
 
 
 def save(figure: Figure, path: Path, *, force: bool = False) -> Path:
-    """Write a figure as PNG, whole or not at all, inside `copies.finishing` later; raises ArtifactError."""
+    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all, inside `copies.finishing` later.
+
+    Raises UsageError for another suffix, ArtifactError where it cannot be written.
+    """
+    kind_of(path)
     later(lambda: _write(figure, path, force=force))
     return path
 
 
 def _write(figure: Figure, path: Path, *, force: bool) -> None:
+    for text in figure.findobj(Text):  # the dollars and braces of a log's name are no formula
+        text.set_parse_math(parse_math=False)
+    with warnings.catch_warnings():
+        # A letter that the font lacks is drawn as a box; the figure's file has the name.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        _draw(figure, path, force=force)
+
+
+def _draw(figure: Figure, path: Path, *, force: bool) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:  # laid out here, once: left to the writer it costs a whole drawing that is thrown away
         engine.execute(figure)
         figure.set_layout_engine("none")
-    with replacing(path, force=force) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": "fieldsid"})
+    kind = kind_of(path)
+    with replacing(path, force=force) as temporary, rc_context({"svg.hashsalt": TOOL}):  # else an SVG's ids are drawn at random
+        figure.savefig(temporary, format=kind, metadata=dict(KINDS[kind]))
 
 
 def one(draw: Callable[[Axes], None], path: Path, *, width: float = 8.0, height: float = 5.0, force: bool = False) -> Path:

@@ -1,12 +1,13 @@
-"""The figure of a comparison: a free run against its measurement, the worst stretches shaded, and where the error falls."""
+"""The figure of a comparison: a free run against its measurement, the worst stretches shaded, and where each channel fails."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import degrees, isfinite
 
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
-from fieldsid.comparison.compare import Comparison
+from fieldsid.comparison.compare import Channel, Comparison
 from fieldsid.figures import canvas, motion, where
 from fieldsid.models.model import Model
 from fieldsid.rounding import number
@@ -15,28 +16,36 @@ MOST_BARS = 12
 
 
 def figure(found: Comparison, model: Model, name: str) -> Figure:
-    """Return a sheet with the four panels of the motion at the left and the share of the error by condition at the right."""
+    """Return a sheet with the four panels of the motion, and at the right where the error of each failing channel falls."""
     sheet = canvas.sheet(13.0, 8.2)
-    halves = sheet.subfigures(1, 2, squeeze=False, width_ratios=(1.75, 1.0))
-    left, right = halves[0, 0], halves[0, 1]
+    failing = found.failing
+    halves = sheet.subfigures(1, 2 if failing else 1, squeeze=False, width_ratios=(1.75, 1.0) if failing else None)
     effects = f" with {', '.join(model.effects)}" if model.effects else ""
     title = f"{name}{effects} on {found.run}, {model.axis.value}"
-    sheet.suptitle(f"{title}\n{facts(found)}; shaded: the worst stretches", x=0.01, ha="left", fontsize=11)
+    shaded = f"shaded: the worst stretches of the {failing[0].name}" if failing else "down to the noise"
+    sheet.suptitle(f"{title}\n{facts(found)}; {shaded}", x=0.01, ha="left", fontsize=11)
+    left = halves[0, 0]
     axes = left.subplots(4, 1, sharex=True, height_ratios=(1.25, 1.25, 0.9, 1.0))
     motion.draw(view_of(found), list(axes))
     left.align_ylabels(list(axes))
-    ax = right.subplots()
-    where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in found.where[:MOST_BARS]], ax)
-    ax.set_title(
-        f"where the error of the {found.channel} falls\n(label: rms there over the whole run's)", loc="left", fontsize=10
-    )
+    if failing:
+        _draw_places(failing, halves[0, 1])
     return sheet
 
 
+def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
+    """Draw where each failing channel fails, the worse one at the top."""
+    for channel, ax in zip(failing, right.subplots(len(failing), 1, squeeze=False)[:, 0], strict=True):
+        shown = channel.where[: MOST_BARS // len(failing)]
+        where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in shown], ax)
+        says = f"where the error of the {channel.name} falls"
+        ax.set_title(f"{says}\n({channel.over_floor:.1f} x its noise; label: rms there over this)", loc="left", fontsize=10)
+
+
 def view_of(found: Comparison) -> motion.MotionView:
-    """Return the panels' view of a comparison."""
+    """Return the panels' view of a comparison; what is down to the noise has no worst stretches."""
     shown, floor = found.shown, found.floor
-    spans = tuple((s.start_s, s.end_s) for s in found.worst)
+    spans = tuple((s.start_s, s.end_s) for c in found.failing[:1] for s in c.worst)
     return motion.MotionView(shown.record, shown.angle, shown.rate, shown.fin, floor.angle, floor.rate, spans)
 
 

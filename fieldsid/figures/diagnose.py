@@ -23,7 +23,7 @@ MOST_TIMES = 3.0
 class Bar:
     """One candidate: its error over the noise floor on fitted and on unseen runs, share explained, probability, if it is named.
 
-    The model as it is has no probability.
+    The model as it is has no probability. worse: it raises the error, and explains nothing.
     """
 
     effect: str
@@ -32,6 +32,7 @@ class Bar:
     explained: float
     probability: float | None
     named: bool
+    worse: bool = False
 
 
 def figure(found: Diagnosis) -> Figure:
@@ -60,6 +61,7 @@ def bars_of(found: Diagnosis) -> list[Bar]:
                 c.explained,
                 c.probability,
                 named=bool(named) and c.effect == named,
+                worse=c.worse,
             )
             for c in found.candidates
         ),
@@ -89,10 +91,11 @@ def draw(bars: list[Bar], ax: Axes) -> None:
 
 
 def words_of(b: Bar, error: float) -> str:
-    """Return what stands beside a bar: the error over the floor, the share of the excess explained, the probability."""
+    """Return what stands beside a bar: the error over the floor, the share of the excess explained if any, the probability."""
     if b.probability is None:
         return f"{error:.2f} x"
-    return f"{error:.2f} x, {100 * b.explained:.0f} % explained, p {_chance(b.probability)}"
+    does = "worse" if b.worse else f"{100 * b.explained:.0f} % explained"
+    return f"{error:.2f} x, {does}, p {_chance(b.probability)}"
 
 
 def _chance(p: float) -> str:

@@ -26,12 +26,16 @@ class Fall:
 
 
 def figure(line: Sequence[Generation], name: str) -> Figure:
-    """Return a sheet with a panel for the rate and one for the angle of a line with at least one addition.
+    """Return the figure of a line with at least one addition, as `fall_figure` draws it."""
+    return fall_figure([g.step.gain for g in line if g.step], line[0].effects, name)
+
+
+def fall_figure(gains: Sequence[Gain], before: Sequence[str], name: str) -> Figure:
+    """Return a sheet with a panel for the rate and one for the angle of additions to a model with some effects before.
 
     A channel that was not measured is left out.
     """
-    gains = [g.step.gain for g in line if g.step]
-    labels = [folded(", ".join(line[0].effects) or "plain model")]
+    labels = [folded(", ".join(before) or "plain model")]
     labels += [folded(" ".join(f"+{n}" for n in gain.added)) for gain in gains]
     channels = [(c, falls) for c in ("rate", "angle") if (falls := falls_of(gains, c))]
     sheet = canvas.sheet(max(8.0, 1.6 + 2.6 * len(labels)), 5.2)

@@ -47,7 +47,7 @@ def draw_angle(view: LegView, ax: Axes) -> None:
     ax.fill_between(view.time, inner_low, inner_high, color=canvas.SIMULATED, alpha=0.3, linewidth=0, label="68 %")
     ax.plot(view.time, np.degrees(view.angle), color=canvas.SIMULATED, linewidth=1.4, label="expected")
     limit = view.envelope.heading if yaw else view.envelope.pitch
-    if limit is not None and view.bounded:
+    if limit is not None:
         for side in (-limit, limit):
             ax.axhline(np.degrees(side), **LIMIT)
         reach = 1.15 * float(np.degrees(limit))
@@ -63,8 +63,9 @@ def draw_track(view: LegView, ax: Axes) -> None:
         ax.plot(along, across, color=canvas.QUIET, linewidth=0.6)
     ax.plot(view.along, view.across, color=canvas.SIMULATED, linewidth=1.5)
     ax.plot(view.along[:1], view.across[:1], marker="o", color=canvas.SECOND, markersize=5)
-    room = view.envelope.track if yaw else view.envelope.depth_room()
-    if room is not None and view.bounded:
+    rooms = view.envelope.rooms()
+    room = min((rooms[k] for k in (("track", "across") if yaw else ("depth",)) if k in rooms), default=None)
+    if room is not None:
         for side in (-room, room):
             ax.axhline(side, **LIMIT)
     if yaw:
@@ -88,5 +89,5 @@ def save_plan_figure(views: Sequence[LegView], path: Path, *, force: bool = Fals
 
 
 def _errors(view: LegView) -> str:
-    """Return the expected relative errors in words."""
-    return "   ".join(f"{n} {100 * relative:.1f}%" for n, (relative, _) in view.errors.items() if np.isfinite(relative))
+    """Return the expected errors in words."""
+    return "   ".join(f"{name} {error}" for name, error in view.errors.items())

@@ -34,6 +34,19 @@ def figure(schedule: Schedule, verification: Verification) -> Figure:
     return sheet
 
 
+def gains_figure(schedule: Schedule) -> Figure:
+    """Return gains, feed-forward and the phase margin at the estimate over speed, one above the other."""
+    sheet = canvas.sheet(8.0, 8.0)
+    gains, forward, margin = np.ravel(sheet.subplots(3, 1, sharex=True))
+    draw_gains(schedule, gains)
+    draw_forward(schedule, forward)
+    phase = schedule.column("phase_margin_deg")
+    margin.plot(schedule.speeds, phase, "o-", color=canvas.SECOND, markersize=4)
+    canvas.dress(margin, x="speed, m/s", y="phase margin, deg")
+    margin.set_ylim(0.0, 1.1 * max(phase))
+    return sheet
+
+
 def draw_gains(schedule: Schedule, ax: Axes) -> None:
     """Draw the gains against speed; rows that data do not support are hollow."""
     for name, colour in (("kp", canvas.SIMULATED), ("ki", canvas.SECOND), ("kd", canvas.THIRD)):

@@ -68,13 +68,37 @@ def follows_fin(problem: Problem, x: FloatArray) -> float:
 
 def _columns(record: Record, rate: FloatArray) -> FloatArray:
     """Return what a missing effect could follow, block means (m, p) scaled to one: fin, its history, rate, a constant."""
-    fin = block_means(record.fin - record.fin.mean(), record, BLOCK_S)
-    lags = [np.concatenate([np.zeros(k), fin[: fin.size - k]]) for k in range(4)]
-    length = float(record.time[-1] - record.time[0])
-    slow = [_faded(fin, tau) for tau in MEMORY_S if 8.0 * tau < length]
+    lags, slow = fin_history(record)
     speed = block_means(rate, record, BLOCK_S)
-    parts = [*lags, *slow, *(v * np.abs(v) for v in (fin, *slow, speed)), speed, np.ones(fin.size)]
+    parts = [*lags, *slow, *(v * np.abs(v) for v in (lags[0], *slow, speed)), speed, np.ones(speed.size)]
     return np.column_stack([v / max(float(np.max(np.abs(v))), 1e-12) for v in parts])
+
+
+def fin_history(record: Record) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return block means (m,) of the fin about its mean, now and up to three blocks before, and through ever slower lags."""
+    fin = block_means(record.fin - record.fin.mean(), record, BLOCK_S)
+    length = float(record.time[-1] - record.time[0])
+    lags = [np.concatenate([np.zeros(k), fin[: fin.size - k]]) for k in range(4)]
+    return lags, [_faded(fin, tau) for tau in MEMORY_S if 8.0 * tau < length]
+
+
+def share_of_fin(record: Record) -> float:
+    """Return the share (0..1) of the turning's power that follows the fin's history, as large as the data allow.
+
+    The turning is the rate, or the slope of the angle where no rate was measured; slower than a block, about its mean.
+    """
+    by_rate = bool(record.rate_ok.any())
+    values, ok = (record.rate, record.rate_ok) if by_rate else (record.angle, record.angle_ok)
+    motion = block_means(np.interp(record.time, record.time[ok], values[ok]), record, BLOCK_S)
+    motion = motion if by_rate else np.diff(motion, prepend=motion[0])
+    lags, slow = fin_history(record)
+    columns = np.column_stack([*lags, *slow, np.ones(motion.size)])
+    centred = motion - motion.mean()
+    power = float(centred @ centred)
+    if motion.size <= columns.shape[1] or not power > 0.0:
+        return 1.0
+    left = motion - columns @ np.linalg.lstsq(columns, motion, rcond=1e-9)[0]
+    return 1.0 - float(left @ left) / power
 
 
 def _faded(values: FloatArray, tau: float) -> FloatArray:

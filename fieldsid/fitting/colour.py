@@ -37,9 +37,12 @@ def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, 
 
 def _words(family: str, p: float) -> str:
     kinds = {
-        "white": "no coloured noise model improves on white noise",
-        "disturbance": "a disturbance moment explains them best",
-        "coloured": "coloured sensor noise explains them best",
-        "both": "a disturbance moment with coloured sensor noise explains them best",
+        "white": "no coloured noise fits them better than white noise",
+        "disturbance": "of the noises compared a disturbance moment fits them best",
+        "coloured": "of the noises compared coloured sensor noise fits them best",
+        "both": "of the noises compared a disturbance moment with coloured sensor noise fits them best",
     }
-    return f"residuals are not white (p = {p:.2g}): {kinds[family]}; the standard errors allow for it"
+    return (
+        f"residuals are not white (p = {p:.2g}): {kinds[family]}, and the standard errors are those of that noise; "
+        "an effect that the model lacks leaves such residuals too: `sysid diagnose`"
+    )

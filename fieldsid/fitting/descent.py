@@ -21,6 +21,9 @@ TOLERANCE = 1e-8
 ROUNDS = 40
 DAMPING_START = 1e-4
 DAMPING_LIMIT = 1e9
+NEAR = 0.1
+"""Share of its own size that a number moves by at most in a step whose end nobody looks at: what next to nothing in the data
+holds is promised a long way for next to no gain, where the equations no longer hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,10 @@ class Prior:
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """Where a descent ended: vector (N,), weighted sum of squares, its normal matrix (F, F) over `free`."""
+    """Where a descent ended: vector (N,), weighted sum of squares, its normal matrix (F, F) over `free`.
+
+    The sum is infinite where the motion at its start grows without bound: there it has stayed.
+    """
 
     x: FloatArray
     cost: float
@@ -137,7 +143,7 @@ def descend(
         trial[index] = np.clip(x[index] + step, low, high)
         moved = trial[index] - x[index]
         expected = float(2 * gradient @ moved - moved @ normal @ moved)
-        if 0.0 <= expected <= tolerance * cost and damping <= DAMPING_START:
+        if 0.0 <= expected <= tolerance * cost and damping <= DAMPING_START and (np.abs(moved) <= NEAR * np.abs(x[index])).all():
             # no step was refused: where so little is left to gain it is there, and nobody need look
             x, cost, done = trial, cost - expected, True
             break
@@ -206,9 +212,31 @@ class _Hill:
 
 def covariance(normal: FloatArray) -> FloatArray:
     """Return the inverse of a normal matrix, computed in its own scale; a direction without information is infinite."""
+    scale, values, vectors, floor = _directions(normal)
+    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
+    return np.asarray(inverse / np.outer(scale, scale))
+
+
+def sandwich(normal: FloatArray, centre: FloatArray) -> FloatArray:
+    """Return N^-1 C N^-1 of a normal matrix and a centre C, as the square of a root: a covariance of any conditioning.
+
+    The centre is taken into the directions of N first, where it is the noise's power over that of the weights: multiplied out
+    as it stands, the rounding of C would be raised by the square of what a direction lacks in information, above its own
+    variance or below zero. In a direction without any, the noise is taken to be the strongest of the others'.
+    """
+    scale, values, vectors, floor = _directions(normal)
+    root, known = vectors / np.sqrt(np.maximum(values, floor)), values > floor
+    power = root.T @ (centre / np.outer(scale, scale)) @ root
+    power[~known], power[:, ~known] = 0.0, 0.0
+    power[~known, ~known] = power.diagonal().max() if known.any() else 1.0
+    sizes, turned = np.linalg.eigh(0.5 * (power + power.T))
+    half = (root @ turned) * np.sqrt(np.maximum(sizes, 0.0)) / scale[:, None]
+    return np.asarray(half @ half.T)
+
+
+def _directions(normal: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return a normal matrix's scale (F,), its eigenvalues and eigenvectors in that, and the least information there can be."""
     # not smaller: the inverse of a direction without information must stay a number
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-60))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    floor = 1e-13 * max(float(values[-1]), 1e-300)
-    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
-    return np.asarray(inverse / np.outer(scale, scale))
+    return scale, values, vectors, 1e-13 * max(float(values[-1]), 1e-300)

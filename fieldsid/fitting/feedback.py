@@ -1,8 +1,9 @@
 """Is the fin flown by a controller? Its changes explained by changes of angle and rate a delay before.
 
     fin(t) - fin(t - W) = k_angle [angle(t - d) - angle(t - d - W)] + k_rate [rate(t - d) - rate(t - d - W)]
-Changes, so that a commanded heading that stays does not matter; the few largest, where it moves, are left out. Under
-feedback the fin follows noise and disturbance, and an estimate without it can mistake the controller for the vehicle.
+Changes, so that a commanded heading that stays does not matter; the few largest, where it moves, are left out, and so is
+what starts or ends where the fin is at its stop, where no controller moves it. Under feedback the fin follows noise and
+disturbance, and an estimate without it can mistake the controller for the vehicle.
 """
 
 from __future__ import annotations
@@ -61,7 +62,11 @@ def _explained(record: Record, moved: FloatArray, width: int, lag: int, longest:
     """Return the share of the fin's changes explained at one lag, robustly, and both gains."""
     target = moved[longest:]
     columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, record.rate)])
-    keep = np.abs(target) <= np.quantile(np.abs(target), 1.0 - LEFT_OUT)
+    free = (record.fin > record.fin.min()) & (record.fin < record.fin.max())
+    free = (free[width:] & free[:-width])[longest:]
+    if free.sum() < MOVING * free.size:
+        return 0.0, 0.0, 0.0
+    keep = free & (np.abs(target) <= np.quantile(np.abs(target[free]), 1.0 - LEFT_OUT))
     gains = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-9)[0]
     left = target[keep] - columns[keep] @ gains
     power = float(target[keep] @ target[keep])

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldsid.display import Plotted
+from fieldsid.effects import refuse_clash
 from fieldsid.errors import DataError, UsageError
 from fieldsid.fitting.choice import is_disturbed, keeps_free_run
 from fieldsid.fitting.colour import whiteness
+from fieldsid.fitting.estimates import estimates
 from fieldsid.fitting.judge import findings
 from fieldsid.fitting.layout import layout_of
 from fieldsid.fitting.method import Estimator, History, Options, Solution
@@ -21,16 +24,15 @@ from fieldsid.fitting.suspects import suspects
 from fieldsid.fitting.trim_law import groups_by_trim
 from fieldsid.fitting.weights import white_weights
 from fieldsid.logs.run import FloatArray, Note
+from fieldsid.logs.segments import excursions
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import effect_named
+from fieldsid.models.effect import Effect, definitions_of, effect_named
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import fin_path
-from fieldsid.registry import members, pick
+from fieldsid.registry import members, near, pick
 
 SHORTEST = 40
-STILL = 1e-4
-"""Range in rad below which a fin does not move: a servo's own step is larger."""
 DRAG_EXPONENT = 2.0
 THRUST_EXPONENTS = (0.0, 3.0)
 """What a straight run's thrust can go with: the same command at every speed, up to a drag that steepens."""
@@ -39,8 +41,8 @@ TELLING_SPEEDS = 0.1
 AUTO = "auto"
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
+@dataclass(frozen=True, slots=True, repr=False)
+class Fit(Plotted):
     """A fitted model with what it was fitted to: predictions of every run, noise floor, remarks, RLS history."""
 
     model: Model
@@ -51,9 +53,11 @@ class Fit:
     history: History | None = None
 
     def interval95(self, name: str) -> tuple[float, float]:
-        """Return the 95 % interval of a parameter; for a derived fin offset by propagation."""
-        value, error = self.model.values[name], self.model.std_error(name)
-        return value - 1.96 * error, value + 1.96 * error
+        """Return the 95 % interval of a parameter; for a derived fin offset by propagation. Raises UsageError."""
+        known = {e.name: e for e in estimates(self.model)}
+        if name not in known:
+            raise UsageError(f"the fit has no parameter {name!r}", found=", ".join(known), hint=near(name, list(known)))
+        return known[name].interval95
 
 
 def estimators() -> Mapping[str, Estimator]:
@@ -73,17 +77,11 @@ def fit(
 
     method "auto" is output error, and the prediction-error method where the residuals are coloured by a
     disturbance that does not follow the fin (a missing effect does). Raises DataError for records too short or
-    without fin movement, UsageError for a method that cannot take the effects or several runs.
+    without fin movement, UsageError for a method that cannot take the effects or several runs, EffectError for two effects
+    that cannot be in one model.
     """
     check(records, axis)
-    parts = tuple(effect_named(name) for name in effects)
-    missing = [f"{e.name} needs {role} ({r.name})" for e in parts for r in records for role in e.needs if role not in r.signals]
-    if missing:
-        raise DataError(
-            "an effect needs a signal the log lacks",
-            found="; ".join(missing),
-            hint="map the signal on import, or leave the effect out",
-        )
+    parts = check_signals(records, effects)
     problem = Problem(tuple(records), layout_of(records, axis, parts, groups_by_trim(records)))
     solution = _solve(problem, method, options or Options())
     return fitted(problem, solution)
@@ -111,9 +109,7 @@ def _solve(problem: Problem, method: str, options: Options) -> Solution:
         x = solution.x
         for run, record in enumerate(problem.records):
             x = refit_own(problem, x, run, floor_of([record]))
-        solution = Solution(
-            x, solution.covariance, solution.noise, solution.method, solution.notes, own_done=True, history=solution.history
-        )
+        solution = replace(solution, x=x, own_done=True)
     return solution
 
 
@@ -127,21 +123,32 @@ def check(records: Sequence[Record], axis: Axis) -> None:
             raise DataError(
                 f"run {r.name!r} is too short to identify {axis.value}",
                 found=f"{measured} measured samples, at least {SHORTEST} are needed",
-                hint="fly at least two pulses of 2 s each, and widen `--from` and `--to`",
+                hint="take a longer run, or part of one: two pulses of 2 s each at least",
             )
-        if float(np.ptp(r.fin)) < STILL:
-            raise DataError(
-                f"run {r.name!r} does not excite {axis.value}: the fin never moves",
-                found=f"`{NAMES[axis].fin}` = {r.fin[0]:.4g} rad throughout, within {float(np.ptp(r.fin)):.2g} rad",
-                hint="fly an excitation: `sysid plan --axis " + axis.value + "`",
-            )
+        names = NAMES[axis]
+        excursions(r.name, axis.value, names.fin_measured if r.fin_is_measured else names.fin, r.time, r.fin)
         measurement = r.rate[r.rate_ok] if r.rate_ok.any() else r.angle[r.angle_ok]
         if float(np.ptp(measurement)) == 0.0:
             raise DataError(
                 f"run {r.name!r}: the {axis.value} sensor is constant",
                 found=f"{measurement.size} samples of {measurement[0]:.4g}",
-                hint="check the mapping: `sysid inspect LOG`",
+                hint="check the sensor, and which column or topic was mapped",
             )
+
+
+def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Effect, ...]:
+    """Return the effects of some names; raises DataError for a signal that a record lacks, EffectError for two that clash."""
+    parts = tuple(effect_named(name) for name in dict.fromkeys(effects))
+    for i, part in enumerate(parts):
+        refuse_clash(part, parts[:i])
+    missing = [f"{e.name} needs {role} ({r.name})" for e in parts for r in records for role in e.needs if role not in r.signals]
+    if missing:
+        raise DataError(
+            "an effect needs a signal the log lacks",
+            found="; ".join(missing),
+            hint="map the signal on import, where the log has it, or leave the effect out",
+        )
+    return parts
 
 
 def fitted(problem: Problem, solution: Solution) -> Fit:
@@ -191,6 +198,7 @@ def model_of(problem: Problem, solution: Solution) -> Model:
         method=solution.method,
         runs=tuple(r.name for r in problem.records),
         info={"whiteness_p": p, "law_parameters": {n: {"value": values[n], "std_error": sigma[n]} for n in sorted(aside)}},
+        own=definitions_of(layout.effects),
     )
 
 
@@ -223,8 +231,8 @@ def _thrust_law(records: Sequence[Record]) -> dict[str, float]:
     thrust, speed = np.array([r.signals["thrust"].mean() for r in runs]), np.array([r.speed for r in runs])
     mean, exponent = float(np.mean(thrust)), DRAG_EXPONENT
     if np.ptp(np.log(speed)) > TELLING_SPEEDS and np.all(thrust * mean > 0):
-        slope = np.polynomial.Polynomial.fit(np.log(speed), np.log(np.abs(thrust)), 1).convert().coef[1]
-        exponent = float(np.clip(slope, *THRUST_EXPONENTS))
+        faster = np.log(speed) - np.mean(np.log(speed))
+        exponent = float(np.clip(faster @ np.log(np.abs(thrust)) / (faster @ faster), *THRUST_EXPONENTS))
     return {"thrust_at_1_m_s": mean / float(np.mean(speed**exponent)), "thrust_exponent": exponent}
 
 

@@ -7,12 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from fieldsid.fitting.noise import white_floor
+from fieldsid.fitting.offset import offset_of
+from fieldsid.logs.doctor import BEYOND_SHARE, share_beyond
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
+from fieldsid.models.record import UNDER_WAY_M_S, fin_holes, knows_speed
 from fieldsid.vehicle import Vehicle
 
-AT_LIMIT = 0.05
 OTHER_AXIS = 0.3
 FIN_APART = 0.2
 SIGNS = {"port": -1.0, "starboard": 1.0, "nose_down": -1.0, "nose_up": 1.0}
@@ -21,7 +23,7 @@ SIGNS = {"port": -1.0, "starboard": 1.0, "nose_down": -1.0, "nose_up": 1.0}
 
 def run_findings(run: Run, axis: Axis, vehicle: Vehicle | None = None) -> tuple[Note, ...]:
     """Return what speaks against fitting an axis to a run; the fin's limit is that of the vehicle, where one is given."""
-    return (*_fins(run, axis), *_limit(run, axis, vehicle), *_other_axis(run, axis))
+    return (*fin_holes(run, axis), *_fins(run, axis), *_limit(run, axis, vehicle), *_speed(run), *_other_axis(run, axis))
 
 
 def _fins(run: Run, axis: Axis) -> Iterator[Note]:
@@ -48,15 +50,26 @@ def _limit(run: Run, axis: Axis, vehicle: Vehicle | None) -> Iterator[Note]:
     name = NAMES[axis].fin
     if limit is None or not run.has(name):
         return
-    values = np.abs(run[name][np.isfinite(run[name])])
-    share = float(np.mean(values >= 0.99 * limit))
-    if share > AT_LIMIT:
+    share = share_beyond(run, name, limit)
+    if share > BEYOND_SHARE:
         yield Note(
             "fin_at_limit",
-            f"run {run.name!r}: {name} is at its limit of {limit:.3g} rad for {100 * share:.0f} % of the time (limit "
-            f"{100 * AT_LIMIT:.0f} %): what it did beyond is not in the log; fly smaller pulses",
-            {"value": share, "limit": AT_LIMIT, "signal": name, "run": run.name},
+            f"run {run.name!r}: {name} is beyond its limit of {limit:.3g} rad for {100 * share:.0f} % of the time (limit "
+            f"{100 * BEYOND_SHARE:.0f} %): the fin stopped there, and the log does not show it; log the measured fin",
+            {"value": share, "limit": BEYOND_SHARE, "signal": name, "run": run.name},
         )
+
+
+def _speed(run: Run) -> Iterator[Note]:
+    if not run.has("surge_m_s") or knows_speed(run):
+        return
+    middle, (low, high) = float(np.nanmedian(run["surge_m_s"])), UNDER_WAY_M_S
+    yield Note(
+        "no_speed",
+        f"run {run.name!r}: surge_m_s is {middle:.3g} m/s in the middle (limits {low:g} and {high:g} m/s): no vehicle under way, "
+        "so the speed is taken as not measured; correct its sign or unit, or map another one",
+        {"value": middle, "limit": low if middle <= low else high, "signal": "surge_m_s", "run": run.name},
+    )
 
 
 def _other_axis(run: Run, axis: Axis) -> Iterator[Note]:
@@ -81,6 +94,27 @@ def _motion(run: Run, name: str) -> float:
     return float(np.sqrt(max(float(np.var(values)) - (floor**2 if np.isfinite(floor) else 0.0), 0.0)))
 
 
+def offset_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
+    """Return the finding that the fin which the trim moment stands for is beyond any that was flown, or that the vehicle has."""
+    stated = None if vehicle is None else vehicle.fin_max_rad(model.axis.value)
+    largest = stated if stated is not None else model.trained["fin_max"]
+    offset = offset_of(model)
+    if not abs(offset.value) > largest:
+        return ()
+    of = "the vehicle's limit" if stated is not None else "the largest fin of the runs"
+    told = abs(offset.value) - 2.0 * offset.std_error > largest
+    straight = "straight" if model.axis is Axis.YAW else "level"
+    says = f"by this model no such fin holds the vehicle {straight}" if told else "these data do not tell it from one within"
+    return (
+        Note(
+            "offset_beyond_fin",
+            f"{offset.name} = {offset.value:.3g} +/- {offset.std_error:.2g} rad is beyond {of}, {largest:.3g} rad: {says}; check "
+            "unit and sign of the fin, or see with `sysid diagnose` what else turns the vehicle",
+            {"value": offset.value, "std_error": offset.std_error, "limit": largest, "parameter": offset.name},
+        ),
+    )
+
+
 def sign_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
     """Return the finding that the fin's gain has the sign its vehicle says it cannot have."""
     side = None if vehicle is None else vehicle.positive_rudder if model.axis is Axis.YAW else vehicle.positive_elevator
@@ -92,8 +126,8 @@ def sign_findings(model: Model, vehicle: Vehicle | None) -> tuple[Note, ...]:
     return (
         Note(
             "impossible_sign",
-            f"{name} = {value:.3g} +/- {error:.2g} 1/s^2 has the wrong sign: the vehicle says that a positive fin goes {side}; "
-            f"correct `sign` of the fin in the mapping, or `{key}` in vehicle.yaml",
+            f"{model.shown(name)} = {value:.3g} +/- {error:.2g} 1/s^2 has the wrong sign: the vehicle says that a positive fin "
+            f"goes {side}; correct `sign` of the fin in the mapping, or `{key}` in vehicle.yaml",
             {"value": value, "std_error": error, "limit": 0.0, "expected": SIGNS[side]},
         ),
     )

@@ -13,7 +13,7 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
-from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw
+from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw, with_speed
 
 START_NAMES = ("angle0", "rate0", "rate_before")
 """What a run starts from: its angle, its rate, and the steady rate before it that left its cross state where it starts."""
@@ -124,6 +124,11 @@ class Layout:
     def of_run(self, run: int) -> tuple[int, ...]:
         """Return the positions of a run's own slots."""
         return self.own.get(run, ())
+
+    def shown(self, name: str) -> str:
+        """Return a shared slot's name as it is printed: that of several runs with the speed it belongs to."""
+        g = self.groups
+        return with_speed(name, self.axis, g.speeds[g.reference], trim_of_fin=g.trim_of_fin) if len(g.of_run) > 1 else name
 
     def law(self, values: dict[str, float]) -> SpeedLaw:
         """Return the speed law of a vector of shared values."""

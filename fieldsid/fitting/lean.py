@@ -11,13 +11,10 @@ from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.whitening import is_white
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
-from fieldsid.models.linear_core import PARAMETERS, accumulate
+from fieldsid.models.linear_core import DIVERGED, PARAMETERS, accumulate
 from fieldsid.models.model import Noise
 from fieldsid.models.signal_path import pieces_for
 from fieldsid.models.speed_law import over_reference
-
-LARGEST = 1e12
-"""A residual beyond this counts as a motion without bound."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +43,7 @@ class Lean:
         total, normal, gradient = 0.0, np.zeros((count, count)), np.zeros(count)
         for run in self.runs:
             square, numbers = self._square(x, run)
-            if not square[0, 0] < LARGEST * run.steps.size:
+            if not float(square[7, :2].sum()) < DIVERGED**2 * run.steps.size:
                 return float("inf"), normal, gradient
             chain = self._chain(x, run, numbers)
             normal += chain.T @ square[1:7, 1:7] @ chain

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fieldsid.display import Brief
 from fieldsid.fitting.problem import Problem
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.model import Noise
 
 
-@dataclass(frozen=True, slots=True)
-class History:
+@dataclass(frozen=True, slots=True, repr=False)
+class History(Brief):
     """Parameters over time of a recursive estimator: time (m,) s, values and std_errors (m, p), settle time of each."""
 
     time: FloatArray
@@ -28,7 +29,8 @@ class Solution:
     """What an estimator found: vector (N,) of the layout, covariance (S, S) of its shared slots, noise, remarks.
 
     A shared slot that was not estimated has zero variance. `own_done` is false where the runs' initial states
-    are still at their start values.
+    are still at their start values. `weights` is the noise whose weighted squares x is the minimum of, None where that is the
+    white noise of its own residuals, or where x is no such minimum.
     """
 
     x: FloatArray
@@ -38,6 +40,7 @@ class Solution:
     notes: tuple[Note, ...] = ()
     own_done: bool = True
     history: History | None = None
+    weights: Noise | None = None
 
 
 @dataclass(frozen=True, slots=True)

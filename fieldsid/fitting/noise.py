@@ -110,7 +110,12 @@ HIGH = {
 def log_likelihood(
     records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: FloatArray
 ) -> float:
-    """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise vector (7,)."""
+    """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise vector (7,).
+
+    Minus infinity where one of them is that of a motion without bound.
+    """
+    if not all(np.isfinite(e).all() for e in residuals):
+        return -np.inf
     total = 0.0
     for record, (a, k), e in zip(records, dynamics, residuals, strict=True):
         out = np.empty((1, *e.shape))
@@ -136,8 +141,10 @@ def estimate_noise(
     noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
     default what the signals show of it; wake: whether what the start has next to none of is tried anew. Fisher scoring
     on the logarithms of the noise's numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the
-    residuals' the information.
+    residuals' the information. Residuals of a motion without bound have none: the start is returned, and minus infinity.
     """
+    if not all(np.isfinite(e).all() for e in residuals):
+        return start, -np.inf
     names = FAMILIES[family]
     floor = floor or floor_of(records)
     rough = _rough_start(records, dynamics, residuals, floor, start) if wake else {n: getattr(start, n) for n in names}

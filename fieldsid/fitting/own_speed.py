@@ -1,4 +1,4 @@
-"""A run's own speed: its log has it to a third of a percent, and twice that goes into the authority.
+"""A run's own speed: its log has it to about a third of a percent, and twice that goes into the authority.
 
 A heading adds that up: a turn of two radians that is half a percent short is off by five times a compass's noise. So the
 speed of a run that a model is flown on is its own unknown, as its initial state is, with the measurement as what is known
@@ -25,12 +25,14 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 
 MEASURED, GUESSED = 0.003, 0.01
-"""Share by which the speed of a run is off, where it was measured and where it was not."""
+"""Standard error, as a share, that the speed of a run is taken to have, where it was measured and where it was not."""
 MOST = 3.0
 """Errors of the measurement that a speed is moved by at most."""
 ROUNDS, SETTLED = 4, 0.02
 """Rounds, each with the weights of what the last one has left, and the change in errors of the measurement that ends them."""
 WORTH_SAYING = 0.001
+SURPRISING = 2.0
+"""Standard errors from which on a speed that is off is a finding of its own."""
 
 
 def speed_doubt(problem: Problem, x: FloatArray, speed: float) -> FloatArray:
@@ -63,16 +65,21 @@ def says_much(faster: float) -> bool:
 
 
 def said(record: Record, faster: float) -> Note | None:
-    """Return the note on a run that was flown at another speed than its log has, None where that is next to nothing."""
+    """Return the note on a run that was flown at another speed than its log has, None where that is next to nothing.
+
+    One that is off by more than its measurement should be is a finding: of the log's scale, or of the model.
+    """
     if not says_much(faster):
         return None
-    way = "faster" if faster > 0.0 else "slower"
-    return Note(
-        "own_speed",
-        f"{record.name}: as the motion says, flown {100 * abs(faster):.2f} % {way} than the {record.speed:.3f} m/s of its log "
-        f"(known to {100 * MEASURED:g} %)",
-        {"run": record.name, "faster": faster, "speed_m_s": record.speed},
+    way, errors = "faster" if faster > 0.0 else "slower", abs(faster) / MEASURED
+    said = (
+        f"{record.name}: as the motion says, flown {100 * abs(faster):.2f} % {way} than the {record.speed:.3f} m/s of its log, "
+        f"{errors:.1f} x the standard error of {100 * MEASURED:g} % that a measured speed is taken to have"
     )
+    if errors >= SURPRISING:
+        most = f" ({100 * MOST * MEASURED:g} % is the most it is moved by)" if errors > MOST - SETTLED else ""
+        said += f"{most}: the scale of its speed is probably off, or the model is at this speed"
+    return Note("own_speed", said, {"run": record.name, "faster": faster, "speed_m_s": record.speed, "std_error": MEASURED})
 
 
 def _faster(problem: Problem, share: float) -> Problem:

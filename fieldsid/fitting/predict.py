@@ -8,7 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from fieldsid.errors import ModelError
+from fieldsid.display import Brief
+from fieldsid.errors import DivergenceError
 from fieldsid.fitting import between, own_speed
 from fieldsid.fitting.descent import cost_of, descend
 from fieldsid.fitting.first_second import first_second
@@ -22,15 +23,16 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import fin_path
-from fieldsid.models.simulate import effects_of
+from fieldsid.models.simulate import effects_of, growing_hint
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.rounding import nine_digits
 
 OWN_ROUNDS, OWN = 15, 1e-6
 """Rounds for a run's own slots, and the share of the sum of squares a round must gain."""
 
 
-@dataclass(frozen=True, slots=True)
-class Prediction:
+@dataclass(frozen=True, slots=True, repr=False)
+class Prediction(Brief):
     """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances.
 
     faster is the share by which the run was faster than its log has it, see own_speed.py. `as_logged` is the rms residual
@@ -58,7 +60,7 @@ class Prediction:
 
 
 def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
-    """Return a model's free run on a record; raises ModelError when it grows without bound."""
+    """Return a model's free run on a record; raises DivergenceError when it grows without bound."""
     floor = floor_of([record])
     logged, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
     problem, x = with_times(logged, x, floor)
@@ -69,10 +71,10 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     motion, _ = problem.simulate(x, 0)
     if not np.isfinite(motion.rate).all():
         at = float(record.time[np.argmin(np.isfinite(motion.rate))])
-        raise ModelError(
+        raise DivergenceError(
             f"the model grows without bound on run {record.name!r}",
             found=f"diverged at t = {at:.2f} s",
-            hint="the model is unstable there: identify again, or add quadratic damping: `--effects quadratic_damping`",
+            hint=growing_hint(model),
         )
     values = problem.values_of(x, 0)
     fin = fin_path(problem.records[0], problem.layout.effects, values)
@@ -87,7 +89,7 @@ def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
     for record in records:
         try:
             notes += predict(model, record).notes
-        except ModelError:
+        except DivergenceError:
             continue
     return tuple(notes)
 
@@ -187,7 +189,7 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
     for point in product(*grids.values()):
         trial = x.copy()
         trial[list(grids)] = point
-        scored.append((cost_of(problem, trial, noise), tuple(point), trial))
+        scored.append((nine_digits(cost_of(problem, trial, noise)), tuple(point), trial))
     scored.sort(key=lambda item: item[:2])
     return [x, *(trial for _, _, trial in scored[:2] if not np.array_equal(trial, x))]
 

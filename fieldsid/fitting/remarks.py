@@ -6,22 +6,26 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fieldsid.fitting.authority import unclear
 from fieldsid.fitting.method import Solution
 from fieldsid.fitting.problem import Problem
 from fieldsid.logs.run import Note
-from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Noise
+from fieldsid.rounding import in_unit
 
 HIGHEST_CORRELATION = 0.95
-WEAKEST_AUTHORITY = 3.0
+CLEAR = 2.0
+"""Standard errors from which a value is told from zero."""
 
 
-def remarks(problem: Problem, solution: Solution, _floor: Noise) -> tuple[Note, ...]:
+def remarks(problem: Problem, solution: Solution, floor: Noise) -> tuple[Note, ...]:
     """Return the remarks of a solution, the gravest first."""
     return (
         *_stability(problem, solution),
         *_bounds(problem, solution),
-        *_identifiability(problem, solution),
+        *_stiffness(problem, solution),
+        *_authorities(problem, solution, floor),
         *_correlations(problem, solution),
     )
 
@@ -35,17 +39,19 @@ def _errors(problem: Problem, solution: Solution) -> dict[str, float]:
 
 
 def _stability(problem: Problem, solution: Solution) -> Iterator[Note]:
-    names, v = NAMES[problem.layout.axis], _values(problem, solution)
+    names, v, s = NAMES[problem.layout.axis], _values(problem, solution), _errors(problem, solution)
     damping = v[names.damping]
     if damping < 0.0:
         held = "quadratic" in v and v["quadratic"] > 0.0
         tail = "held by quadratic damping" if held else "nothing in the model holds it"
+        unsure = f"the model turns by itself, and its error of {s[names.damping]:.2g} leaves open whether the vehicle does"
+        turns = "the vehicle turns by itself" if damping < -CLEAR * s[names.damping] else unsure
         yield Note(
             "unstable",
-            f"UNSTABLE: {names.damping} = {damping:.3g} 1/s is negative, the vehicle turns by itself; {tail}",
-            {"value": damping, "limit": 0.0, "hint": "--effects quadratic_damping"},
+            f"UNSTABLE: {problem.layout.shown(names.damping)} = {damping:.3g} 1/s is negative, {turns}; {tail}",
+            {"value": damping, "limit": 0.0} | ({} if "quadratic" in v else {"hint": "--effects quadratic_damping"}),
         )
-    if names.stiffness is not None and v[names.stiffness] < 0.0 and problem.layout.axis is Axis.PITCH:
+    if names.stiffness is not None and v[names.stiffness] < -CLEAR * s[names.stiffness]:
         yield Note(
             "negative_righting",
             f"{names.stiffness} = {v[names.stiffness]:.3g} 1/s^2 is negative: no righting moment at this speed",
@@ -54,44 +60,40 @@ def _stability(problem: Problem, solution: Solution) -> Iterator[Note]:
 
 
 def _bounds(problem: Problem, solution: Solution) -> Iterator[Note]:
+    means = {c.name: f" ({c.says})" for e in problem.layout.effects for c in e.shared if c.says}
     for i in range(problem.layout.shared):
         slot = problem.layout.slots[i]
         span = slot.high - slot.low
         if min(solution.x[i] - slot.low, slot.high - solution.x[i]) <= 1e-6 * span:
+            said = f"{problem.layout.shown(slot.name)} = {solution.x[i]:.4g} {in_unit(slot.unit)}".rstrip()
             yield Note(
                 "on_bound",
-                f"{slot.name} = {solution.x[i]:.4g} {slot.unit} is on its bound [{slot.low:g}, {slot.high:g}]: "
-                "no error bar is right there",
+                f"{said}{means.get(slot.name, '')} is on its bound [{slot.low:g}, {slot.high:g}]: no error bar is right there",
                 {"value": float(solution.x[i]), "low": slot.low, "high": slot.high},
             )
 
 
-def _identifiability(problem: Problem, solution: Solution) -> Iterator[Note]:
+def _stiffness(problem: Problem, solution: Solution) -> Iterator[Note]:
     names, v, s = NAMES[problem.layout.axis], _values(problem, solution), _errors(problem, solution)
-    if names.stiffness is not None and abs(v[names.stiffness]) < 2.0 * s[names.stiffness]:
+    if names.stiffness is not None and abs(v[names.stiffness]) < CLEAR * s[names.stiffness]:
         yield Note(
             "stiffness_not_identifiable",
             f"{names.stiffness} = {v[names.stiffness]:.2g} +/- {s[names.stiffness]:.2g} 1/s^2 "
             "cannot be told from zero in this maneuver",
             {"value": v[names.stiffness], "std_error": s[names.stiffness], "hint": "hold the fin longer, or fly slower"},
         )
-    b = v[names.authority]
-    if s[names.authority] > 0.0 and abs(b) < WEAKEST_AUTHORITY * s[names.authority]:
-        yield Note(
-            "not_excited",
-            f"{names.authority} = {b:.2g} +/- {s[names.authority]:.2g} 1/s^2 cannot be told from zero: "
-            "the fin hardly moved the vehicle",
-            {
-                "value": b,
-                "std_error": s[names.authority],
-                "limit": WEAKEST_AUTHORITY,
-                "hint": "fly longer pulses, or `sysid diagnose`",
-            },
-        )
+
+
+def _authorities(problem: Problem, solution: Solution, floor: Noise) -> Iterator[Note]:
+    """Yield the remark on every speed group's authority that cannot be told from zero."""
+    for name in dict.fromkeys(problem.authority_of(run) for run in range(len(problem.records))):
+        note = unclear(problem, solution, floor, problem.layout.names.index(name))
+        if note is not None:
+            yield note
 
 
 def _correlations(problem: Problem, solution: Solution) -> Iterator[Note]:
-    names = problem.layout.names
+    names, shown = problem.layout.names, [problem.layout.shown(n) for n in problem.layout.names]
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
     for i in range(len(names)):
         for j in range(i):
@@ -101,6 +103,6 @@ def _correlations(problem: Problem, solution: Solution) -> Iterator[Note]:
             if abs(rho) > HIGHEST_CORRELATION:
                 yield Note(
                     "correlated",
-                    f"{names[j]} and {names[i]} cannot be told apart (correlation {rho:+.3f}, limit {HIGHEST_CORRELATION})",
+                    f"{shown[j]} and {shown[i]} cannot be told apart (correlation {rho:+.3f}, limit {HIGHEST_CORRELATION})",
                     {"parameters": [names[j], names[i]], "correlation": rho, "limit": HIGHEST_CORRELATION},
                 )

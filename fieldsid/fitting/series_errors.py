@@ -77,10 +77,11 @@ def coloured_covariance(series: Sequence[Series], inverse: FloatArray) -> FloatA
     back = [inverse_of(s.transfer, s.step) for s in series]
     noise = [lfilter(b.numerator, b.denominator, s.residual) for b, s in zip(back, series, strict=True)]
     colour = colour_of(noise)
-    middle = np.zeros_like(inverse)
+    total = np.zeros_like(inverse)
     for s in series:
         seen = lfilter(s.transfer.numerator, s.transfer.denominator, s.columns[::-1], axis=0)
-        shaped = lfilter([1.0], colour.denominator, seen, axis=0)
-        middle += colour.input_variance * shaped.T @ shaped
+        # as squares of rows: multiplied out as N^-1 (F' S F) N^-1, rounding may leave a variance below zero
+        half = lfilter([1.0], colour.denominator, seen, axis=0) @ inverse
+        total += colour.input_variance * half.T @ half
     independent = max(count / max(colour.long_run, 1e-3), 2.0 * size)
-    return np.asarray(inverse @ middle @ inverse * (independent / (independent - size)))
+    return np.asarray(total * (independent / (independent - size)))

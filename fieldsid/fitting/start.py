@@ -16,8 +16,11 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
 
 WINDOW_S = 0.6
-SLOW = 0.3
-"""Damping in 1/s to start from where the equation asks for an unstable vehicle."""
+SLOW, NEUTRAL = 0.3, 0.0
+"""Damping in 1/s and stiffness in 1/s^2 to start from where the equation asks for an unstable vehicle."""
+MOST_GROWTH = 1e6
+"""What a start may grow by within a record: no sensor shows where a run begins to a millionth, so that beyond it the free run
+follows nothing that was measured."""
 
 
 def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
@@ -43,15 +46,36 @@ def start_vector(records: Sequence[Record], layout: Layout) -> FloatArray:
     matrix, target = np.concatenate(rows), np.concatenate(targets)
     if len(target) < len(base):
         return x
-    solution = _solved(matrix, target)
-    if solution[0] <= 0.0:
-        # a free run that grows leads nowhere: measured late or early, a stable vehicle looks like an unstable one
-        held = SLOW * matrix[:, 0]
-        solution = np.concatenate([[SLOW], _solved(matrix[:, 1:], target - held)])
+    longest = max(float(r.time[-1] - r.time[0]) for r in records)
+    solution = _stable(matrix, target, longest, stiff=names.stiffness is not None)
     for name, value in zip(base, solution, strict=True):
         slot = layout.slots[columns.index(name)]
         x[columns.index(name)] = float(np.clip(value, slot.low, slot.high))
     return x
+
+
+def _stable(matrix: FloatArray, target: FloatArray, length: float, *, stiff: bool) -> FloatArray:
+    """Return the least-squares solution (k,), damping and, where stiff, stiffness held where it grows over a record of length s.
+
+    A free run that grows leads nowhere: measured late or early, a stable vehicle looks like an unstable one.
+    """
+    held: dict[int, float] = {}
+    while True:
+        rest = [i for i in range(matrix.shape[1]) if i not in held]
+        solution = np.zeros(matrix.shape[1])
+        solution[list(held)] = list(held.values())
+        solution[rest] = _solved(matrix[:, rest], target - matrix @ solution)
+        if 0 not in held and solution[0] <= 0.0:
+            held[0] = SLOW
+        elif stiff and 1 not in held and _pace_of_growth(solution[0], solution[1]) * length > np.log(MOST_GROWTH):
+            held[1] = NEUTRAL
+        else:
+            return solution
+
+
+def _pace_of_growth(damping: float, stiffness: float) -> float:
+    """Return the real part of the fastest growing motion of y'' = -damping y' - stiffness y, 1/s."""
+    return 0.5 * (float(np.sqrt(max(damping**2 - 4.0 * stiffness, 0.0))) - damping)
 
 
 def _solved(matrix: FloatArray, target: FloatArray) -> FloatArray:

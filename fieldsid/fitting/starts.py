@@ -23,6 +23,7 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Coefficient, Effect
 from fieldsid.models.model import Noise
+from fieldsid.rounding import nine_digits
 
 MOST_POINTS = 12
 SHORTENINGS = 4
@@ -30,6 +31,8 @@ ROUNDS_ALIKE = 8
 GENTLE = 0.03
 """A coefficient of either sign is tried this much weaker too: a slow ship's are far below a small vehicle's."""
 WORTHLESS, DEPENDENT = 1e-9, 1e-8
+ROUNDED = 1e-9
+"""Share of a cost within which two are alike: that much hangs on the order in which a processor adds up."""
 SLOWEST_PACE = 1e-3
 """1/s; a base fitted without what is missing may show next to no damping."""
 
@@ -171,7 +174,7 @@ def promises_of(ground: Ground, effect: Effect) -> list[Promise]:
         for c in effect.nuisance:
             x = _best_per_run(ground, problem, x, new, c)
         promises.append(Promise(effect, *_first_order(ground, problem, x, new), problem))
-    return sorted(promises, key=lambda p: p.cost)
+    return sorted(promises, key=lambda p: nine_digits(p.cost))
 
 
 def shared_points(ground: Ground, effect: Effect) -> list[dict[str, float]]:
@@ -349,7 +352,12 @@ def _within(one: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 def _cheapest_alone(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
     """Return the grid points (R,) for the best of the steps that a run alone would take at a grid point."""
     alone = (_costs(square, _within(one, low, high)) for one in square.reshape(-1, *square.shape[2:]))
-    return np.asarray(min(alone, key=lambda costs: float(costs.min(axis=1).sum())).argmin(axis=1))
+    return _first_least(min(alone, key=lambda costs: nine_digits(float(costs.min(axis=1).sum()))))
+
+
+def _first_least(costs: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the first of each row's grid points that cost the least (R,): while a fin rests, an event's time changes nothing."""
+    return np.asarray((costs <= (1.0 + ROUNDED) * costs.min(axis=1, keepdims=True)).argmax(axis=1))
 
 
 def _settled_alike(
@@ -358,7 +366,7 @@ def _settled_alike(
     """Return the grid points (R,) at which the step that all runs take together and what each then chooses agree."""
     runs = np.arange(square.shape[0])
     for _ in range(ROUNDS_ALIKE):
-        again = _costs(square, _within(square[runs, chosen].sum(axis=0), low, high)).argmin(axis=1)
+        again = _first_least(_costs(square, _within(square[runs, chosen].sum(axis=0), low, high)))
         if (again == chosen).all():
             break
         chosen = again

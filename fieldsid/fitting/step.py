@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.errors import DivergenceError
 from fieldsid.logs.run import FloatArray
 
 
@@ -14,6 +15,7 @@ def bounded_step(
 
     damping is relative to the normal matrix's diagonal. What is at its bound and would leave it, or carries no
     information, stays; what would cross its bound goes just there, and the rest makes the best of that.
+    Raises DivergenceError where the equations hold what is no number: there is nowhere to go.
     Source: Marquardt 1963, SIAM J. 11(2).
     """
     diagonal = normal.diagonal()
@@ -29,6 +31,12 @@ def bounded_step(
             wish = (gradient[free] - normal[free][:, ~free] @ step[~free]) / scale[free]
             step[free] = _solved(scaled[free][:, free], wish) / scale[free]
         end = x + step
+        if not np.isfinite(end).all():
+            raise DivergenceError(
+                "a fit came to a step that is no number",
+                found=f"{int((~np.isfinite(end)).sum())} of {end.size} numbers that are fitted have none to go to",
+                hint="look at the logs with `sysid inspect LOG`: a sign or a unit that is wrong makes a vehicle that runs away",
+            )
         beyond = np.maximum(end - high, low - end) * scale * free
         worst = int(np.argmax(beyond))
         if beyond[worst] <= 0.0:

@@ -32,7 +32,7 @@ def streamed(problem: Problem, x: FloatArray, noise: Noise, free: Sequence[int])
             ok, measured = record.ok[:, part], record.both[:, part]
             flat = (np.where(ok, sens, 0.0) / sigma).reshape(len(slots), -1)
             left = (np.where(ok, measured - out[:, :2].T, 0.0) / sigma).ravel()
-            if not np.isfinite(left).all():
+            if not (np.isfinite(left).all() and np.isfinite(sens).all()):
                 return float("inf"), normal, gradient
             normal[np.ix_(index, index)] += flat @ flat.T
             gradient[index] += flat @ left

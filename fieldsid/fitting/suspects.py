@@ -1,12 +1,13 @@
 """What a fit's residual says of the path from the log to the fin: an ignored delay, a clock that is off, a hidden instability.
 
-Each is one Gauss-Newton step from the fit with one effect more, under the noise of the fit: a score test. A hidden
-instability is confirmed by a refit.
+Each is suspected by one Gauss-Newton step from the fit with one effect more, under the noise of the fit: a score test.
+What is said is that of a refit with the effect: a step tells whether, not how far.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,13 +19,14 @@ from fieldsid.fitting.restricted import ENOUGH, generalised, lines_of
 from fieldsid.fitting.starts import grown
 from fieldsid.fitting.weights import misfit, white_weights
 from fieldsid.fitting.whitening import noise_vector
-from fieldsid.logs.run import FloatArray, Note
+from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import effect_named
 
 CLEAR = 4.0
 """Standard errors from which an estimate counts."""
-LEAST_DELAY_S = 0.02
+LEAST_DELAY_S, FIRST_DELAY_S = 0.02, 0.2
+"""Lateness that counts, and the largest a refit begins at: a step promises more the less it is to be believed."""
 WORTH = 10.0
 """Log likelihood the refit with quadratic damping must gain."""
 FIN_TIMING = ("delay", "servo_lag", "rate_limit", "backlash", "clock_offset")
@@ -42,44 +44,77 @@ def suspects(problem: Problem, solution: Solution) -> tuple[Note, ...]:
     return tuple(notes)
 
 
-def score(problem: Problem, solution: Solution, effect: str, name: str, at: float) -> tuple[float, float, FloatArray]:
-    """Return what one step gives for a coefficient of an effect that is not in the fit, its error, and all values (N,)."""
+def score(problem: Problem, solution: Solution, effect: str, name: str, at: float) -> tuple[float, float]:
+    """Return what one step gives for a coefficient of an effect that is not in the fit, and its error."""
     longer, x = grown(problem, solution.x, effect_named(effect), {name: at})
     step, inverse = generalised(lines_of(longer, x), len(x), noise_vector(solution.noise))
     slot = longer.layout.names.index(name)
-    return at + float(step[slot]), float(np.sqrt(inverse[slot, slot])), x + step
+    return at + float(step[slot]), float(np.sqrt(inverse[slot, slot]))
+
+
+@dataclass(frozen=True, slots=True)
+class Lateness:
+    """A refit with the fin late (s > 0) or early: how late, the damping with it, its error, and without it in the same fit."""
+
+    late: float
+    damping: float
+    damping_error: float
+    without: float
+
+
+def lateness(problem: Problem, solution: Solution, begin: float) -> Lateness | None:
+    """Return how late the vehicle answers the logged fin, from a refit that begins at a lateness in s of either sign.
+
+    Early can only be a clock. None where the refit does not settle within the coefficient's bounds, clear of zero, at a lower
+    error: then nothing is known of how late it is.
+    """
+    effect, name = ("delay", "delay") if begin > 0.0 else ("clock_offset", "offset")
+    weights = solution.weights or white_weights(problem, solution.x)
+    longer, x = grown(problem, solution.x, effect_named(effect), {name: float(np.clip(begin, -FIRST_DELAY_S, FIRST_DELAY_S))})
+    without, found = descend(problem, solution.x, weights), descend(longer, x, weights)
+    slot, at = longer.layout.names.index(name), longer.layout.names.index(NAMES[problem.layout.axis].damping)
+    error = np.sqrt(np.diag(covariance(found.normal)))
+    late, bounds = float(found.x[slot]), longer.layout.slots[slot]
+    settled = found.converged and found.cost < without.cost and bounds.low < late < bounds.high
+    if not settled or late * begin < 0.0 or abs(late) < max(CLEAR * float(error[slot]), LEAST_DELAY_S):
+        return None
+    before = float(without.x[problem.layout.names.index(NAMES[problem.layout.axis].damping)])
+    return Lateness(late, float(found.x[at]), float(error[at]), before)
 
 
 def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
-    value, error, with_it = score(problem, solution, "delay", "delay", 0.5 * LEAST_DELAY_S)
+    value, error = score(problem, solution, "delay", "delay", 0.5 * LEAST_DELAY_S)
     if not np.isfinite(value) or abs(value) < max(CLEAR * error, LEAST_DELAY_S):
         return
+    found = lateness(problem, solution, value)
+    if found is None:
+        return
     name = NAMES[problem.layout.axis].damping
-    at = problem.layout.names.index(name)
-    step, _ = generalised(lines_of(problem, solution.x), len(solution.x), noise_vector(solution.noise))
-    without = float(solution.x[at] + step[at])
-    bias = 100.0 * (without - float(with_it[at])) / max(abs(float(with_it[at])), 1e-9)
-    data = {"value": value, "std_error": error, "limit": max(CLEAR * error, LEAST_DELAY_S), "bias_percent": bias}
-    if value > 0.0:
+    known = abs(found.damping) > CLEAR * found.damping_error
+    bias = 100.0 * (found.without / found.damping - 1.0) if known else None
+    moves = f"left out, it moves {problem.layout.shown(name)} from {found.damping:.3g} to {found.without:.3g} 1/s" + (
+        f" ({bias:+.0f} %)" if known else ""
+    )
+    data = {"value": found.late, "limit": LEAST_DELAY_S, "with": found.damping, "without": found.without, "bias_percent": bias}
+    if found.late > 0.0:
         yield Note(
             "ignored_delay",
-            f"the vehicle answers about {1e3 * value:.0f} +/- {1e3 * error:.0f} ms after the logged fin (limit "
-            f"{1e3 * LEAST_DELAY_S:.0f} ms): left out, it moves {name} by about {bias:+.0f} %; log the measured fin, or "
-            "use `--effects delay` or `--effects servo_lag`",
+            f"the vehicle answers about {1e3 * found.late:.0f} ms after the logged fin (limit {1e3 * LEAST_DELAY_S:.0f} ms): "
+            f"{moves}; log the measured fin, or use `--effects delay` or `--effects servo_lag`",
             data,
         )
     else:
         yield Note(
             "negative_delay",
-            f"the vehicle answers about {-1e3 * value:.0f} +/- {1e3 * error:.0f} ms BEFORE the logged fin: no lag can be "
-            "negative, it is a clock that is off, or a controller; use `--effects clock_offset`, or stamp both by one clock",
+            f"the vehicle answers about {-1e3 * found.late:.0f} ms BEFORE the logged fin: no lag can be negative, it is a clock "
+            f"that is off, or a controller; {moves}; use `--effects clock_offset`, or stamp both by one clock",
             data,
         )
 
 
 def _instability(problem: Problem, solution: Solution) -> Iterator[Note]:
     """Yield the finding that quadratic damping holds a vehicle whose linear yaw is unstable."""
-    value, error, _ = score(problem, solution, "quadratic_damping", "quadratic", 0.05)
+    value, error = score(problem, solution, "quadratic_damping", "quadratic", 0.05)
     if not value > CLEAR * error:
         return
     longer, x = grown(problem, solution.x, effect_named("quadratic_damping"), {"quadratic": 0.05})
@@ -95,7 +130,8 @@ def _instability(problem: Problem, solution: Solution) -> Iterator[Note]:
     if damping < -2.0 * spread and gained > WORTH:
         yield Note(
             "hidden_instability",
-            f"UNSTABLE: with quadratic damping the fit is far better (log likelihood {gained:+.0f}) and {name} = {damping:.3g} "
+            f"UNSTABLE: with quadratic damping the fit is far better (log likelihood {gained:+.0f}) and "
+            f"{problem.layout.shown(name)} = {damping:.3g} "
             f"+/- {spread:.2g} 1/s is negative: the vehicle turns by itself, the linear fit hides it; "
             "use `--effects quadratic_damping`",
             {"value": damping, "std_error": spread, "limit": 0.0, "gained": gained},

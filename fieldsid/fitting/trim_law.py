@@ -26,8 +26,12 @@ def possible_trims(groups: Groups, *, varying: bool = False) -> tuple[bool, ...]
     In pitch a moment that goes with the speed is an effect of its own. At one speed nothing tells, unless the runs miss it by
     more than a speed sensor does, or an effect lets the authority vary within a run.
     """
-    missed = float(np.ptp(groups.run_speeds)) > SCATTER * groups.speeds[groups.reference]
-    return (True, False) if groups.trim_of_fin and (varying or missed) else (groups.trim_of_fin,)
+    return (True, False) if groups.trim_of_fin and (varying or miss_their_speed(groups)) else (groups.trim_of_fin,)
+
+
+def miss_their_speed(groups: Groups) -> bool:
+    """Whether the runs were flown at speeds that differ by more than they do as measured."""
+    return float(np.ptp(groups.run_speeds)) > SCATTER * groups.speeds[groups.reference]
 
 
 def groups_by_trim(records: Sequence[Record]) -> Groups:

@@ -3,46 +3,73 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, Source
 from fieldsid.logs.clock import Track, one_clock
-from fieldsid.logs.conditioning import MAX_GAP_S, in_order, refuse_long_gaps
+from fieldsid.logs.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
-from fieldsid.logs.reader import RawLog, Series
+from fieldsid.logs.reader import RawLog, ReadOptions, Series
 from fieldsid.logs.run import SIGNALS, FloatArray, Note, Run
 from fieldsid.logs.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.wrapping import unwrapped_over
 
+WHOLE = (-np.inf, np.inf)
 
-def assemble(raw: RawLog, mapping: ChannelMap, path: Path | None, *, salvage: bool = False, max_gap_s: float = MAX_GAP_S) -> Run:
-    """Return the Run of a raw log; raises LogError or MappingError for what cannot be meant, DataError never."""
+
+def assemble(
+    raw: RawLog,
+    mapping: ChannelMap,
+    path: Path | None,
+    options: ReadOptions | None = None,
+    *,
+    part: tuple[float, float] = WHOLE,
+    max_gap_s: float = MAX_GAP_S,
+) -> Run:
+    """Return the Run of a raw log between two times in s.
+
+    Raises LogError or MappingError for what cannot be meant, DataError where the part is empty. What lies outside of it is
+    not judged.
+    """
+    options = options or ReadOptions()
     if raw.finished:
         time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
-        return Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
+        run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
+        return run if part == WHOLE else run.between(*part)
     notes = list(raw.notes)
     tracks: dict[str, Track] = {}
     for signal, series in raw.series.items():
-        for name, track in _tracks(signal, series, mapping, notes, salvage=salvage, log=str(path)).items():
+        for name, track in _tracks(signal, series, mapping, notes, options).items():
             if name in tracks:
                 raise MappingError(
                     f"two sources give `{name}`", found=f"{tracks[name].label} and {track.label}", hint=f"map `{name}` once"
                 )
             tracks[name] = track
     if not tracks:
-        raise MappingError(f"{mapping.place} maps no signal", found="an empty `signals`", hint="see `sysid inspect LOG`")
+        raise MappingError(
+            f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
+        )
     if "yaw_rad" in tracks:
         tracks["yaw_rad"], found = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
         notes += found
     time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
     if time.size < 2:
-        raise LogError(f"`{path}` has too few samples", found=f"{time.size} samples", hint="copy the log from the vehicle again")
+        counted = f"{time.size} sample{'s' * (time.size != 1)} with a time, at least 2 are needed"
+        raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
     signals = {s: signals[s] for s in SIGNALS if s in signals}
-    refuse_long_gaps(time, signals, limit_s=max_gap_s, log=str(path))
-    return Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
+    run = Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
+    run = run if part == WHOLE else run.between(*part)
+    refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
+    return run
+
+
+def _inspect(path: Path | None) -> str:
+    return f"`sysid inspect {'LOG' if path is None else quote(str(path))}`"
 
 
 def _on_one_clock(
@@ -54,15 +81,21 @@ def _on_one_clock(
     return time, {s: t.values for s, t in tracks.items()}, []
 
 
-def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note], *, salvage: bool, log: str) -> dict[str, Track]:
+def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note], options: ReadOptions) -> dict[str, Track]:
     """Return one source's signals in SI and our frames, their time in order."""
     source = mapping.sources[signal]
     label = series.label.partition(".")[0] if source.topic else "the time column"
-    rows, found = in_order(series.time, label, salvage=salvage, log=log)
+    rows, found = in_order(series.time, label, options)
     notes += found
-    picked = Series(series.time[rows], series.values[rows], series.label, series.unit, series.is_height)
-    values = _quaternion(signal, picked, source, mapping) if picked.values.ndim == 2 else _scalar(signal, picked, source, mapping)
-    return {name: Track(picked.time, v, series.label) for name, v in values.items()}
+    # An index that takes all rows would still copy them, once for each signal of a long log.
+    is_whole = rows.size == series.time.size
+    picked = series if is_whole else replace(series, time=series.time[rows], values=series.values[rows])
+    refuse_impossible_steps(picked.time, label)
+    with np.errstate(over="ignore", invalid="ignore"):
+        given = _quaternion if picked.values.ndim == 2 else _scalar
+        values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}
+    notes += [note for _, found in values.values() for note in found]
+    return {name: Track(picked.time, v, series.label) for name, (v, _) in values.items()}
 
 
 def _scalar(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:

@@ -11,9 +11,9 @@ from fieldsid.logs.run import FloatArray
 
 
 def as_numbers(cells: npt.NDArray[Any]) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-    """Return cells as float64 (n,) and the places of those that are neither numbers nor empty."""
+    """Return cells as float64 (n,), themselves where they are, and the places of those that are neither numbers nor empty."""
     if cells.dtype.kind in "fiub":
-        return cells.astype(np.float64), np.zeros(0, dtype=np.intp)
+        return cells.astype(np.float64, copy=False), np.zeros(0, dtype=np.intp)
     values = np.full(cells.size, np.nan)
     wrong = []
     for i, cell in enumerate(cells):

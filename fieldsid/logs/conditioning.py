@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
+from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import FloatArray, Note
 
 MAX_GAP_S = 2.0
@@ -22,6 +23,40 @@ MAIN = (
     "rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad",
 )  # fmt: skip
 """Signals that identification stands on."""
+
+
+LARGEST = 1e9
+"""What is larger in SI was never measured: a damaged cell, or no number of this signal."""
+STEPS_S = (1e-7, 1e5)
+"""Between these a log's steps of time lie, whatever vehicle and logger."""
+SLOW_S = 5.0
+"""A step longer than this shows nothing of a vehicle's motion: time is in another unit."""
+
+
+def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
+    """Return a signal (n,) without what no sensor gives, infinite numbers among them, and a note where there were some."""
+    beyond = ~np.isnan(values) & ~(np.abs(values) <= LARGEST)
+    if not beyond.any():
+        return values, []
+    message = f"{signal}: numbers beyond {LARGEST:g}, or infinite, that count as missing: {int(beyond.sum())}"
+    return np.where(beyond, np.nan, values), [Note("infinite", message, {"signal": signal, "count": int(beyond.sum())})]
+
+
+def likely_unit(step_s: float) -> str:
+    """Return the unit of time in which a median step is that of a log, with the words to set it; nothing where there is none."""
+    units = [name for name, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if 1e-4 <= step_s * factor <= 2.0]
+    return f"set its unit, probably `unit: {units[0]}`" if units and step_s > SLOW_S else ""
+
+
+def refuse_impossible_steps(time: FloatArray, label: str) -> None:
+    """Raise LogError where the median step of a time (n,) is none of a log."""
+    step = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    if not STEPS_S[0] <= step <= STEPS_S[1]:
+        raise LogError(
+            f"{label} goes on by {step:.3g} s a sample",
+            found=f"{time.size} samples from {time[0]:.6g} to {time[-1]:.6g} s",
+            hint=likely_unit(step) or "check which one it is, and its unit",
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,38 +73,36 @@ class Gap:
         return (self.end_s - self.start_s) * self.count / (self.count + 1)
 
 
-def in_order(time: FloatArray, label: str, *, salvage: bool = False, log: str = "LOG") -> tuple[npt.NDArray[np.intp], list[Note]]:
+def in_order(time: FloatArray, label: str, options: ReadOptions | None = None) -> tuple[npt.NDArray[np.intp], list[Note]]:
     """Return the rows (m,) with which time increases strictly, and a note where others were left out.
 
-    Rows without a time are left out. Without `salvage`, raises LogError where time goes back or repeats.
+    Rows without a time are left out. Unless it is asked to salvage, raises LogError where time goes back or repeats.
     """
+    options = options or ReadOptions()
     rows = np.flatnonzero(np.isfinite(time))
     stamps = time[rows]
     if stamps.size == 0 or bool((np.diff(stamps) > 0).all()):
         return rows, []
-    if not salvage:
-        raise _disorder(stamps, label, log)
     ahead = np.concatenate([[True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]])
+    if not options.salvage:
+        raise _disorder(stamps, label, options, left=float(ahead.mean()))
     dropped = int((~ahead).sum())
     message = f"{label}: {dropped} of {stamps.size} samples were left out, time repeats or goes back there"
     return rows[ahead], [Note("time_order", message, {"dropped": dropped, "of": int(stamps.size)})]
 
 
-def _disorder(stamps: FloatArray, label: str, log: str) -> LogError:
+def _disorder(stamps: FloatArray, label: str, options: ReadOptions, *, left: float) -> LogError:
     steps = np.diff(stamps)
     back, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
-    hint = f"leave such samples out: `sysid import {log} --salvage -o runs/`"
+    hint = options.salvaging("leave such samples out", left) or "check that this is the time, and sort the samples by it"
     if back.size:
         i = int(back[0])
-        return LogError(
-            f"time goes backwards in {label}",
-            found=f"{back.size} of {steps.size} steps, the first from {stamps[i]:.6f} to {stamps[i + 1]:.6f} s at sample {i + 2}",
-            hint=hint,
-        )
+        places = f"the first from {stamps[i]:.10g} to {stamps[i + 1]:.10g} s at sample {i + 2}"
+        return LogError(f"time goes backwards in {label}", found=f"{back.size} of {steps.size} steps, {places}", hint=hint)
     i = int(repeated[0])
     return LogError(
         f"time repeats in {label}",
-        found=f"{repeated.size} of {steps.size} steps, the first at {stamps[i]:.6f} s, samples {i + 1} and {i + 2}",
+        found=f"{repeated.size} of {steps.size} steps, the first at {stamps[i]:.10g} s, samples {i + 1} and {i + 2}",
         hint=hint,
     )
 
@@ -82,17 +115,29 @@ def gaps_in(time: FloatArray, values: FloatArray) -> list[Gap]:
 
 
 def refuse_long_gaps(
-    time: FloatArray, signals: Mapping[str, FloatArray], *, limit_s: float = MAX_GAP_S, log: str = "LOG"
+    time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions | None = None, *, limit_s: float = MAX_GAP_S
 ) -> None:
     """Raise LogError naming the longest gap of a main signal above the limit."""
-    worst = max(
-        ((g.length_s, s, g) for s in MAIN if s in signals for g in gaps_in(time, signals[s])), default=None, key=lambda w: w[0]
-    )
-    if worst is None or worst[0] <= ROUNDING * limit_s:
+    options = options or ReadOptions()
+    long = [(g, s) for s in MAIN if s in signals for g in gaps_in(time, signals[s]) if g.length_s > ROUNDING * limit_s]
+    if not long:
         return
-    length, signal, gap = worst
+    gap, signal = max(long, key=lambda found: found[0].length_s)
+    length = gap.length_s
+    start, end = _longest_without(time, [g for g, _ in long])
     raise LogError(
         f"`{signal}` is missing for {length:.2f} s (limit {limit_s:g} s)",
         found=f"{gap.count} samples without a number between {gap.start_s:.2f} and {gap.end_s:.2f} s",
-        hint=f"accept it with `sysid import {log} --max-gap {length + 0.1:.1f} -o runs/`, or `--to {gap.start_s:.2f}`",
+        hint=f"accept it: {options.with_option(f'--max-gap {length + 0.1:.1f}')}; "
+        f"or take the longest part without one: {options.with_option(f'--from {start:.2f} --to {end:.2f}')}",
     )
+
+
+def _longest_without(time: FloatArray, gaps: Sequence[Gap]) -> tuple[float, float]:
+    """Return start and end in s of the longest part of a log that no gap touches."""
+    begin = float(time[0])
+    parts = []
+    for gap in sorted(gaps, key=lambda g: g.start_s):
+        parts.append((begin, gap.start_s))
+        begin = max(begin, gap.end_s)
+    return max([*parts, (begin, float(time[-1]))], key=lambda part: part[1] - part[0])

@@ -6,37 +6,47 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldsid.logs.conditioning import MAIN
+from fieldsid.logs.conditioning import MAIN, SLOW_S, likely_unit
 from fieldsid.logs.doctor_pairs import pair_findings
 from fieldsid.logs.doctor_signals import signal_findings
 from fieldsid.logs.run import Note, Run
+from fieldsid.logs.stated import Stated
 
 JITTER_LIMIT = 0.2
 """Standard deviation of the sampling step over its median."""
+BEYOND_SHARE = 0.05
+"""Share of a run in which a command may be beyond the fin's limit."""
+FIN_ZERO = 0.0175
+"""How far off the zero of a fin may be, in rad: commands about a trim reach so far beyond the limit."""
 GAP_FACTOR = 2.5
 """A step longer than this many medians is a gap."""
 _FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 
 
-def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None) -> tuple[Note, ...]:
-    """Return the findings on a run; `fin_max_rad` gives fin limits by signal, for saturation.
+def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: Stated | None = None) -> tuple[Note, ...]:
+    """Return the findings on a run; `fin_max_rad` gives fin limits by signal, for saturation, `stated` what its mapping says.
 
     Every note has in its data the `value` measured and its `limit`, where there is one.
     """
     # Garbage in a damaged log may be near the largest float; what overflows then is compared as infinity.
+    stated = stated or Stated()
     with np.errstate(over="ignore", invalid="ignore"):
-        findings = [*_sampling(run), *_fins(run, fin_max_rad or {})]
+        findings = [*_sampling(run, stated), *_fins(run, fin_max_rad or {})]
         for name in run.signals:
-            findings += signal_findings(run, name)
-        return (*findings, *pair_findings(run))
+            findings += signal_findings(run, name, stated)
+        return (*findings, *pair_findings(run, stated))
 
 
-def _sampling(run: Run) -> list[Note]:
+def _sampling(run: Run, stated: Stated) -> list[Note]:
     if len(run) < 3:
         return []
     steps = np.diff(run.time)
     median = float(np.median(steps))
     found = []
+    if median > SLOW_S:
+        advice = likely_unit(median) or "log faster"
+        message = f"time goes on by {median:.3g} s a sample (limit {SLOW_S:g} s): {advice}"
+        found.append(Note("time_unit", message, {"value": median, "limit": SLOW_S}))
     wide = steps > GAP_FACTOR * median
     if wide.any():
         at = int(np.argmax(steps))
@@ -50,8 +60,7 @@ def _sampling(run: Run) -> list[Note]:
     jitter = float(np.std(steps[~wide])) / median
     if jitter > JITTER_LIMIT:
         message = (
-            f"the sampling step varies by {100 * jitter:.0f} % (limit {100 * JITTER_LIMIT:.0f} %); "
-            "use header stamps in the mapping where the log has them: `stamp: header`"
+            f"the sampling step varies by {100 * jitter:.0f} % (limit {100 * JITTER_LIMIT:.0f} %){stated.stamps(*run.signals)}"
         )
         found.append(Note("jitter", message, {"value": jitter, "limit": JITTER_LIMIT}))
     return found
@@ -67,11 +76,21 @@ def _fins(run: Run, limits: Mapping[str, float]) -> list[Note]:
     for fin, limit in limits.items():
         if not run.has(fin):
             continue
-        values = np.abs(run[fin][np.isfinite(run[fin])])
-        share = float(np.mean(values >= 0.99 * limit))
-        if share > 0.05:
+        share = share_beyond(run, fin, limit)
+        if share > BEYOND_SHARE:
             message = (
-                f"{fin} is at its limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit 5 %); use smaller pulses"
+                f"{fin} is beyond its limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
+                f"{100 * BEYOND_SHARE:.0f} %): the fin stopped there, and the log does not show it; log the measured fin"
             )
-            found.append(Note("saturated", message, {"signal": fin, "value": share, "limit": 0.05}))
+            found.append(Note("saturated", message, {"signal": fin, "value": share, "limit": BEYOND_SHARE}))
     return found
+
+
+def share_beyond(run: Run, fin: str, limit: float) -> float:
+    """Return the share of a run in which a fin's command is beyond its limit (rad); one that is at it shows where the fin is.
+
+    Nothing is hidden where the fin itself was measured.
+    """
+    if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
+        return 0.0
+    return float(np.mean(np.abs(run[fin][np.isfinite(run[fin])]) > limit + FIN_ZERO))

@@ -11,7 +11,9 @@ import math
 import numpy as np
 
 from fieldsid.logs.integral import integrated
+from fieldsid.logs.lagged import correlations
 from fieldsid.logs.run import FloatArray, Note, Run
+from fieldsid.logs.stated import Stated
 
 WINDOW_S = 1.0
 TRUSTED = 0.8
@@ -29,22 +31,22 @@ _PAIRS = (("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s"), ("ro
 _FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measured_rad"))
 
 
-def pair_findings(run: Run) -> list[Note]:
+def pair_findings(run: Run, stated: Stated) -> list[Note]:
     """Return the findings on pairs of signals of a run."""
     found: list[Note] = []
     for angle, rate in _PAIRS:
         if run.has(angle) and run.has(rate):
-            found += _angle_and_rate(run, angle, rate)
+            found += _angle_and_rate(run, angle, rate, stated)
     found += _swapped(run)
     if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
         found += _speed_and_way(run)
     for command, fin in _FINS:
         if run.has(command) and run.has(fin):
-            found += _command_and_fin(run, command, fin)
+            found += _command_and_fin(run, command, fin, stated)
     return found
 
 
-def _angle_and_rate(run: Run, angle: str, rate: str) -> list[Note]:
+def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
     changes = _changes(run, angle, rate)
     if changes is None:
         return []
@@ -52,7 +54,7 @@ def _angle_and_rate(run: Run, angle: str, rate: str) -> list[Note]:
     slope, trust = _slope(a, b)
     if trust < TRUSTED:
         return []
-    return [*_of_slope(angle, rate, slope), *_of_lag(angle, rate, a, b, step)]
+    return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
 
 
 def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
@@ -95,7 +97,7 @@ def _swapped(run: Run) -> list[Note]:
 
 def _slope(a: FloatArray, b: FloatArray) -> tuple[float, float]:
     """Return the slope of a on b and the size of their correlation; zeros when one of them does not move."""
-    a, b = a - a.mean(), b - b.mean()
+    a, b = _centred(a), _centred(b)
     power = math.sqrt(float(a @ a) * float(b @ b))
     if power == 0.0:
         return 0.0, 0.0
@@ -104,37 +106,44 @@ def _slope(a: FloatArray, b: FloatArray) -> tuple[float, float]:
     return math.copysign(math.sqrt(float(a @ a) / float(b @ b)), correlation), abs(correlation)
 
 
-def _of_slope(angle: str, rate: str, slope: float) -> list[Note]:
+def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]:
     data = {"signal": rate, "value": slope, "limit": 1.0}
     found = []
     if slope < 0.0:
-        message = f"{rate} runs against {angle} (slope {slope:.3g}, should be 1): set `sign: -1` at one of them, or the frame"
+        message = f"{rate} runs against {angle} (slope {slope:.3g}, should be 1): {stated.flip(angle, rate)}, or set the frame"
         found.append(Note("rate_sign", message, data))
     size = abs(slope)
     if 0.7 < size / DEGREES < 1.4:
+        advice, unit = _in_degrees(angle, "deg", rate, stated)
         found.append(
-            Note(
-                "unit",
-                f"{angle} changes {size:.3g} times as fast as {rate} says: it is probably in deg, set its `unit`",
-                {**data, "signal": angle},
-            )
+            Note("unit", f"{angle} changes {size:.3g} times as fast as {rate} says: {advice}", {**data, "signal": angle, **unit})
         )
     elif 0.7 < size * DEGREES < 1.4:
-        found.append(
-            Note("unit", f"{rate} is {1 / size:.3g} times the change of {angle}: it is probably in deg/s, set its `unit`", data)
-        )
+        advice, unit = _in_degrees(rate, "deg/s", angle, stated)
+        found.append(Note("unit", f"{rate} is {1 / size:.3g} times the change of {angle}: {advice}", {**data, **unit}))
     elif abs(size - 1.0) > SLOPE_LIMIT:
         message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {SLOPE_LIMIT:g}): check both scales"
         found.append(Note("rate_scale", message, {**data, "limit": SLOPE_LIMIT}))
     return found
 
 
-def _of_lag(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float) -> list[Note]:
+def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str, dict[str, str]]:
+    """Return what to do about a signal that is larger than another by the degrees of a radian, and the unit to set if any."""
+    wrong = [] if stated.is_si(small) else [f"{small} is not in `{stated.units[small]}`"]
+    if not stated.is_si(large):
+        return " or ".join(wrong) or f"taken as `{stated.units[large]}` already: check which ones they are", {}
+    said = " or ".join([f"{large} is probably in {unit}: set `unit: {unit}`", *wrong])
+    return said, {} if wrong else {"unit": unit}
+
+
+def _of_lag(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float, stated: Stated) -> list[Note]:
     lag, gain = _lag(a, b, step)
     limit = max(1.5 * step, 0.05)
     if abs(lag) <= limit or gain < 0.002:
         return []
-    message = f"{angle} is {lag:+.3f} s late against {rate} (limit {limit:.3g} s): their clocks differ; use `stamp: header`"
+    message = (
+        f"{angle} is {lag:+.3f} s late against {rate} (limit {limit:.3g} s): their clocks differ{stated.stamps(angle, rate)}"
+    )
     return [Note("clock_offset", message, {"signal": angle, "value": lag, "limit": limit})]
 
 
@@ -143,23 +152,20 @@ def _lag(a: FloatArray, b: FloatArray, step: float) -> tuple[float, float]:
     reach = min(round(LAG_S / step), a.size // 4)
     if reach < 1:
         return 0.0, 0.0
-    size = [
-        abs(_correlation(a[max(k, 0) : a.size + min(k, 0)], b[max(-k, 0) : b.size - max(k, 0)])) for k in range(-reach, reach + 1)
-    ]
+    size = np.abs(correlations(a, b, reach))
     best = int(np.argmax(size))
-    gain = size[best] - size[reach]
+    gain = float(size[best] - size[reach])
     shift = 0.0
     if 0 < best < len(size) - 1:
         left, middle, right = size[best - 1 : best + 2]
         bend = left - 2 * middle + right
-        shift = 0.5 * (left - right) / bend if bend != 0.0 else 0.0
+        shift = float(0.5 * (left - right) / bend) if bend != 0.0 else 0.0
     return (best - reach + shift) * step, gain
 
 
-def _correlation(a: FloatArray, b: FloatArray) -> float:
-    a, b = a - a.mean(), b - b.mean()
-    power = math.sqrt(float(a @ a) * float(b @ b))
-    return float(a @ b) / power if power > 0.0 else 0.0
+def _centred(values: FloatArray) -> FloatArray:
+    """Return values less their mean, zero where all are alike: what the mean of those is off by is rounding."""
+    return np.zeros_like(values) if float(np.ptp(values)) == 0.0 else values - values.mean()
 
 
 def _speed_and_way(run: Run) -> list[Note]:
@@ -184,7 +190,7 @@ def _speed_and_way(run: Run) -> list[Note]:
     return [Note("speed_unit", message, {"signal": "surge_m_s", "value": ratio, "limit": 1.5})]
 
 
-def _command_and_fin(run: Run, command: str, fin: str) -> list[Note]:
+def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:
     both = np.isfinite(run[command]) & np.isfinite(run[fin])
     if both.sum() < 50 or np.ptp(run[command][both]) == 0.0 or np.ptp(run[fin][both]) == 0.0:
         return []
@@ -193,12 +199,13 @@ def _command_and_fin(run: Run, command: str, fin: str) -> list[Note]:
     slope, trust = _slope(a, b)
     found = []
     if trust > TRUSTED and slope < 0.0:
-        message = f"{fin} moves against {command} (slope {slope:.3g}): set `sign: -1` at one of them"
+        message = f"{fin} moves against {command} (slope {slope:.3g}): {stated.flip(command, fin)}"
         found.append(Note("fin_sign", message, {"signal": fin, "value": slope, "limit": 0.0}))
     lag, gain = _lag(a, b, step)
     if lag < -1.5 * step and gain > 0.002:
         message = (
-            f"{fin} moves {-lag:.3f} s before its command (limit {1.5 * step:.3g} s): their clocks differ; use header stamps"
+            f"{fin} moves {-lag:.3f} s before its command (limit {1.5 * step:.3g} s): their clocks differ"
+            f"{stated.stamps(command, fin)}"
         )
         found.append(Note("clock_offset", message, {"signal": fin, "value": lag, "limit": -1.5 * step}))
     return found

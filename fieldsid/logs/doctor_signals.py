@@ -6,6 +6,7 @@ import numpy as np
 
 from fieldsid.logs.run import SIGNALS, FloatArray, Note, Run
 from fieldsid.logs.spikes import spikes_of
+from fieldsid.logs.stated import Stated
 
 PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
 MEASURED = frozenset(SIGNALS) - PROPULSION - {"rudder_rad", "elevator_rad"}
@@ -25,7 +26,7 @@ LARGEST = {
 """Largest size of a signal that can be meant, and the unit it is probably in when it is larger."""
 
 
-def signal_findings(run: Run, name: str) -> list[Note]:
+def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
     """Return the findings on one signal of a run."""
     values = run[name]
     seen = np.isfinite(values)
@@ -34,9 +35,9 @@ def signal_findings(run: Run, name: str) -> list[Note]:
     found = _missing(name, seen)
     present = values[seen]
     if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION:
-        message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another column"
-        return [*found, Note("constant", message, {"signal": name, "value": float(present[0])})]
-    found += _size(name, present)
+        message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
+        return [*found, *_size(name, present, stated), Note("constant", message, {"signal": name, "value": float(present[0])})]
+    found += _size(name, present, stated)
     if name in MEASURED and present.size > 20:
         found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
     return found
@@ -50,18 +51,20 @@ def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> lis
     return [Note("missing", message, {"signal": name, "value": share, "limit": MISSING_LIMIT})]
 
 
-def _size(name: str, values: FloatArray) -> list[Note]:
+def _size(name: str, values: FloatArray, stated: Stated) -> list[Note]:
     if name not in LARGEST:
         return []
     limit, unit = LARGEST[name]
     largest = float(np.percentile(np.abs(values), 99))
     found = []
     if largest > limit:
-        message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): set its unit, probably `unit: {unit}`"
-        found.append(Note("unit", message, {"signal": name, "value": largest, "limit": limit}))
+        advice = stated.probable(name, unit, largest, limit)
+        message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
+        data = {"signal": name, "value": largest, "limit": limit}
+        found.append(Note("unit", message, data | ({"unit": unit} if f"`unit: {unit}`" in advice else {})))
     middle = float(np.median(values))
     if name == "surge_m_s" and middle < -0.1:
-        message = f"surge_m_s is negative, {middle:.3g} m/s in the middle: set `sign: -1` or the frame in the mapping"
+        message = f"surge_m_s is negative, {middle:.3g} m/s in the middle: {stated.flip(name)}, or set the frame"
         found.append(Note("speed_sign", message, {"signal": name, "value": middle, "limit": -0.1}))
     return found
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import plain
-from fieldsid.errors import ArtifactError, UsageError
-from fieldsid.logs.channels import Source
+from fieldsid.artifacts import check_output, plain
+from fieldsid.errors import UsageError
+from fieldsid.logs.assemble import WHOLE
+from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.load import load_run
+from fieldsid.logs.naming import names_apart, stem_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
 from fieldsid.registry import near
@@ -55,16 +58,19 @@ class Imported:
 class Importer:
     """The choices of one import, the same for all its logs."""
 
-    mapping: Path | None = None
+    mapping: ChannelMap | None = None
     channels: tuple[str, ...] = ()
     msg_path: Path | None = None
-    from_s: float | None = None
-    to_s: float | None = None
+    part: tuple[float, float] = WHOLE
     max_gap_s: float = 2.0
     salvage: bool = False
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
-        """Return the file each log becomes; raises before anything is read when one cannot be written or two are the same."""
+        """Return the file each log becomes; raises before anything is read what would be the same for all logs.
+
+        Raises UsageError and ArtifactError for a file that cannot be written, MappingError for a channel that is none.
+        """
+        self._sources()
         if form not in FORMATS:
             raise UsageError(f"`--format {form}` is not a format", found=form, hint=near(form, list(FORMATS)))
         if output.name.endswith(SUFFIXES) and not output.is_dir():
@@ -76,33 +82,30 @@ class Importer:
                 )
             found = [output]
         else:
-            found = [output / f"{_stem(log)}{FORMATS[form]}" for log in logs]
-        _check_free(logs, found, output, force=force)
+            found = [output / f"{name}{FORMATS[form]}" for name in names_apart([stem_of(log) for log in logs], logs)]
+        _check_free(logs, found, force=force)
         return found
 
-    def read(self, log: Path, fin_max_rad: Mapping[str, float] | None = None) -> Run:
-        """Read one log and cut it to the times asked for."""
-        run = load_run(
+    def read(
+        self, log: Path, fin_max_rad: Mapping[str, float] | None = None, progress: Callable[[float], None] | None = None
+    ) -> Run:
+        """Read one log and cut it to the times asked for; `progress` is told the share of it that has been read."""
+        return load_run(
             log,
             self.mapping,
             channels=self._sources(),
             msg_path=self.msg_path,
             salvage=self.salvage,
-            max_gap_s=self._gap_limit(),
+            max_gap_s=self.max_gap_s,
+            part=self.part,
             fin_max_rad=fin_max_rad,
+            progress=progress,
         )
-        if self.from_s is None and self.to_s is None:
-            return run
-        low = float(run.time[0]) if self.from_s is None else self.from_s
-        high = float(run.time[-1]) if self.to_s is None else self.to_s
-        return run.between(low, high)
 
     def write(self, run: Run, path: Path, *, force: bool = False) -> Imported:
-        """Write a run and return what was written."""
-        return Imported(run, save_run(run, path, force=force))
-
-    def _gap_limit(self) -> float:
-        return self.max_gap_s
+        """Write a run under the name of its file and return what was written."""
+        named = replace(run, name=stem_of(path))
+        return Imported(named, save_run(named, path, force=force))
 
     def _sources(self) -> dict[str, Source]:
         if not self.channels:
@@ -112,28 +115,12 @@ class Importer:
         return dict(channel_of(text) for text in self.channels)
 
 
-def _stem(log: Path) -> str:
-    """Return a log's name without its suffixes: `run7.csv.gz` and the folder `run7` become run7."""
-    name = log.name or log.resolve().name
-    for suffix in (".gz", ".zstd"):
-        name = name.removesuffix(suffix)
-    stem, dot, suffix = name.rpartition(".")
-    known = {"csv", "txt", "tsv", "dat", "parquet", "bag", "mcap", "db3"}
-    return "stdin" if name == "-" else stem if dot and suffix.lower() in known else name
-
-
-def _check_free(logs: Sequence[Path], targets: Sequence[Path], output: Path, *, force: bool) -> None:
-    twice = sorted({str(t) for t in targets if targets.count(t) > 1})
-    if twice:
-        raise UsageError("two logs would become the same run", found=twice[0], hint="import them into different folders")
-    if output.exists() and not output.is_dir() and not output.name.endswith(SUFFIXES):
-        raise UsageError(
-            f"`{output}` is a file, not a folder", found=f"{output.stat().st_size} bytes", hint="name a folder, or `run.parquet`"
-        )
+def _check_free(logs: Sequence[Path], targets: Sequence[Path], *, force: bool) -> None:
+    places = [os.path.realpath(log) for log in logs]
+    twice = next((log for log, place in zip(logs, places, strict=True) if places.count(place) > 1), None)
+    if twice is not None:
+        raise UsageError(f"`{twice}` is given twice", found=f"{len(logs)} logs", hint="give each log once")
     for log, target in zip(logs, targets, strict=True):
-        if target.exists() and log.exists() and target.samefile(log):
+        if os.path.exists(target) and os.path.exists(log) and target.samefile(log):  # noqa: PTH110 - closed folders do not raise
             raise UsageError(f"`{log}` would be written over itself", found=str(target), hint="name another folder with `-o`")
-        if target.exists() and not force:
-            raise ArtifactError(
-                f"`{target}` exists", found=f"{target.stat().st_size} bytes", hint="add `--force`, or name another output"
-            )
+        check_output(target, force=force)

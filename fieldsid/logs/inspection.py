@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fieldsid.artifacts import plain, to_yaml, write_text
+from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.propose import Proposal, propose
@@ -29,8 +31,8 @@ _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
 _RESERVED = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false", "null"})
 
 
-@dataclass(frozen=True, slots=True)
-class Inspection:
+@dataclass(frozen=True, slots=True, repr=False)
+class Inspection(Brief):
     """What a log holds, the mapping proposed for it, the Run that gives (None when it gives none), and the findings."""
 
     inventory: Inventory
@@ -73,11 +75,19 @@ class Inspection:
         }
 
 
-def inspect_log(path: Path, *, mapping: Path | None = None, msg_path: Path | None = None) -> Inspection:
-    """Return what is in a log; raises LogError when it cannot be read at all, MappingError for a mapping that does not fit."""
-    from fieldsid.logs.load import load_run
+def inspect_log(
+    path: Path, *, mapping: Path | None = None, msg_path: Path | None = None, progress: Callable[[float], None] | None = None
+) -> Inspection:
+    """Return what is in a log; `progress` is told the share of it that has been looked through.
 
-    reader, options = reader_of(path), ReadOptions(msg_path, salvage=True)
+    Raises LogError when it cannot be read at all, MappingError for a mapping that does not fit.
+    """
+    from fieldsid.logs.load import load_run
+    from fieldsid.logs.mapping import load_mapping
+
+    clock = None if mapping is None else load_mapping(mapping).time
+    reader, options = reader_of(path), ReadOptions(msg_path, salvage=True, clock=clock)
+    options = replace(options, progress=progress or options.progress)
     inventory = reader.inventory(path, options, TableForm())
     proposal = propose(inventory, reader, options)
     needs_none = reader.own_map(path, options) is not None

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import difflib
+import shlex
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from fieldsid.errors import MappingError
-from fieldsid.logs.assemble import assemble
+from fieldsid.errors import FieldsidError, MappingError
+from fieldsid.logs.assemble import WHOLE, assemble
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.conditioning import MAX_GAP_S
 from fieldsid.logs.names import TIME, canonical, canonical_names
@@ -28,27 +30,43 @@ def load_run(
     msg_path: Path | None = None,
     salvage: bool = False,
     max_gap_s: float = MAX_GAP_S,
+    part: tuple[float, float] = WHOLE,
     fin_max_rad: Mapping[str, float] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Read a log file or bag folder as a Run, with the doctor's findings as notes; `-` reads standard input.
 
     mapping: a ChannelMap or a mapping.yaml. Without one: the canonical column names, else `mapping.yaml` in the
     working folder, else in the log's. channels: sources that count more than the mapping's. salvage: take what is
-    left of a damaged log. max_gap_s: longest gap allowed in a main signal. fin_max_rad: fin limits by signal, for the
-    finding of saturation. Raises LogError or MappingError.
+    left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the times in s between which the log is taken
+    and judged. fin_max_rad: fin limits by signal, for the finding of saturation. progress: told the share of the log that has
+    been read, now and then. Raises LogError or MappingError, and DataError where the part is empty.
     """
     if str(path) == "-":
-        return _from_stdin(mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s)
+        return _from_stdin(mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s, part=part, fin_max_rad=fin_max_rad)
     path = Path(path)
     reader, options = reader_of(path), ReadOptions(msg_path, salvage)
     chosen, notes = map_for(path, reader, options, mapping, channels or {})
+    options = replace(options, command=_command(path, chosen, channels or {}, msg_path), progress=progress or options.progress)
     raw = reader.read(path, chosen, options)
-    run = assemble(raw, chosen, path, salvage=salvage, max_gap_s=max_gap_s)
+    run = assemble(raw, chosen, path, options, part=part, max_gap_s=max_gap_s)
     if raw.finished:
         return run
     from fieldsid.logs.doctor import examine
+    from fieldsid.logs.stated import stated_by
 
-    return Run(run.name, run.time, run.signals, path, (*notes, *run.notes, *examine(run, fin_max_rad or {})))
+    return Run(
+        run.name, run.time, run.signals, path, (*notes, *run.notes, *examine(run, fin_max_rad or {}, stated_by(chosen, raw)))
+    )
+
+
+def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], msg_path: Path | None) -> str:
+    """Return the command that imports a log as it is read here."""
+    words = ["sysid", "import", str(path)]
+    words += ["--mapping", str(mapping.origin)] if mapping.origin else []
+    for signal, source in channels.items():
+        words += ["--channel", f"{signal}={source.column}" + (f":{source.unit}" if source.unit else "")]
+    return shlex.join([*words, *(["--msg-path", str(msg_path)] if msg_path else [])])
 
 
 def map_for(
@@ -62,11 +80,20 @@ def map_for(
         if file is not None:
             chosen = _loaded(file)
             notes.append(Note("mapping", f"read with `{file}`", {"path": str(file)}))
-    if chosen is None and not channels:
+    complete = chosen_map(None, chosen, channels)
+    if complete is None:
         raise _unmapped(path, reader, options)
-    base = chosen or ChannelMap({})
+    return complete, notes
+
+
+def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channels: Mapping[str, Source]) -> ChannelMap | None:
+    """Return a mapping, a log's own without one, with single channels that count more; None where nothing maps anything."""
+    base = own if mapping is None else _loaded(mapping)
+    if base is None and not channels:
+        return None
+    base = base or ChannelMap({})
     sources = {s: c for s, c in channels.items() if s != TIME}
-    return replace(base, sources={**base.sources, **sources}, time=channels.get(TIME, base.time)), notes
+    return replace(base, sources={**base.sources, **sources}, time=channels.get(TIME, base.time))
 
 
 def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
@@ -80,7 +107,7 @@ def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
 def _unmapped(path: Path, reader: Reader, options: ReadOptions) -> MappingError:
     names = [c.name for c in reader.inventory(path, options, TableForm()).channels]
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    hint = f"write a mapping: `sysid inspect {path} --write-mapping {MAPPING_FILE}`"
+    hint = f"write a mapping: `sysid inspect {shlex.quote(str(path))} --write-mapping {MAPPING_FILE}`"
     if reader.name == "rosbag":
         return MappingError(f"`{path}` is a bag and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
     close = _near_names(names)
@@ -100,11 +127,13 @@ def _near_names(names: Sequence[str]) -> str:
     return ", ".join(pairs[:4])
 
 
-def _from_stdin(
-    mapping: ChannelMap | Path | None, *, channels: Mapping[str, Source] | None, salvage: bool, max_gap_s: float
-) -> Run:
+def _from_stdin(mapping: ChannelMap | Path | None, **more: Any) -> Run:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "stdin"
         copy.write_bytes(sys.stdin.buffer.read())
-        run = load_run(copy, mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s)
+        try:
+            run = load_run(copy, mapping, **more)
+        except FieldsidError as error:
+            what, found, hint = (text.replace(str(copy), "-") for text in (error.what, error.found, error.hint))
+            raise type(error)(what, found=found, hint=hint) from error
     return Run("stdin", run.time, run.signals, None, run.notes)

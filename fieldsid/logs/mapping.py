@@ -181,7 +181,7 @@ def _check_place(signal: str, item: _Source, place: str) -> None:
         raise MappingError(
             f"{place}: `{signal}` needs one of `column`, `columns`, `topic`",
             found=" and ".join(named) or "none of them",
-            hint="write `column: NAME`",
+            hint="write `column: NAME`, or `topic: NAME` where the log is a bag",
         )
     if item.field and item.topic is None:
         raise MappingError(

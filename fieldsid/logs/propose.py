@@ -6,8 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import ATTITUDE, ChannelMap
+from fieldsid.logs.clocktime import likely_time_unit
 from fieldsid.logs.names import TIME, canonical, unit_in_name
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, Reader, ReadOptions
 from fieldsid.logs.run import SIGNALS, Run
@@ -88,19 +91,10 @@ def _of_column(channel: ChannelInfo) -> Iterator[_Guess]:
     said = canonical(channel.name)
     unit = said.unit if said is not None else unit_in_name(channel.name, signal)
     if signal == TIME:
-        unit = unit or _time_unit(channel)
+        unit = unit or likely_time_unit(np.asarray(channel.fields[0].first[:1]))
     if unit not in (None, "1"):
         item["unit"] = unit
     yield _Guess(signal, sure, item, channel.count)
-
-
-def _time_unit(channel: ChannelInfo) -> str | None:
-    """The unit of an epoch time, by its size."""
-    first = channel.fields[0].first[:1]
-    if channel.kind != "number" or not first:
-        return None
-    size = float(first[0])
-    return "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else "s"
 
 
 def _of_topic(channel: ChannelInfo) -> Iterator[_Guess]:
@@ -163,6 +157,7 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
     from fieldsid.logs.assemble import assemble
     from fieldsid.logs.doctor import examine
     from fieldsid.logs.mapping import mapping_of
+    from fieldsid.logs.stated import stated_by
 
     lenient = ReadOptions(options.msg_path, salvage=True)
     raw = reader.read(inventory.path, mapping_of(body), lenient)
@@ -179,15 +174,12 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
             item["unit"] = "deg/s" if signal.endswith("_s") else "deg"
     for _ in range(2):
         mapping: ChannelMap = mapping_of(body)
-        run = assemble(raw, mapping, inventory.path, salvage=True, max_gap_s=float("inf"))
-        notes = examine(run)
-        wrong = [
-            n.data["signal"]
-            for n in notes
-            if n.code == "unit" and "unit" not in body["signals"].get(n.data["signal"], {"unit": 0})
-        ]
+        run = assemble(raw, mapping, inventory.path, lenient, max_gap_s=float("inf"))
+        notes = examine(run, stated=stated_by(mapping, raw))
+        likely = {n.data["signal"]: n.data["unit"] for n in notes if n.code == "unit" and "unit" in n.data}
+        wrong = [signal for signal in likely if "unit" not in body["signals"].get(signal, {"unit": 0})]
         if not wrong:
             break
         for signal in wrong:
-            body["signals"][signal]["unit"] = "deg/s" if signal.endswith("rad_s") else "deg" if signal.endswith("rad") else "kn"
+            body["signals"][signal]["unit"] = likely[signal]
     return Proposal(body, Run(run.name, run.time, run.signals, inventory.path, (*run.notes, *notes)))

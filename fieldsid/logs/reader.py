@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
+from fieldsid.artifacts import near_files
+from fieldsid.display import Brief
 from fieldsid.errors import LogError
-from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.run import FloatArray, Note
+from fieldsid.logs.strangers import COPY_AGAIN, not_a_log
 from fieldsid.registry import members
 
 PACKAGE = "fieldsid.logs.readers"
+WORTH_SALVAGING = 0.5
+"""Share of a log from which what is left of it is worth taking."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +72,8 @@ class ChannelInfo:
     fields: tuple[FieldInfo, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Inventory:
+@dataclass(frozen=True, slots=True, repr=False)
+class Inventory(Brief):
     """What is in a log file; `table` says how a text table was understood."""
 
     path: Path
@@ -76,12 +84,31 @@ class Inventory:
     notes: tuple[Note, ...] = ()
 
 
+def _unseen(share: float) -> None:
+    """Show the progress to nobody."""
+
+
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """What a caller may ask of any reader: a folder of .msg files, and to take what is left of a damaged log."""
+    """What a caller may ask of any reader: a folder of .msg files, and to take what is left of a damaged log.
+
+    `command` is the one that imports the log as it is read here, for hints; `clock` the time column of a table that is listed,
+    where a mapping names it. `progress` is told which share of the log has been read, now and then.
+    """
 
     msg_path: Path | None = None
     salvage: bool = False
+    command: str = "sysid import LOG"
+    clock: Source | None = None
+    progress: Callable[[float], None] = _unseen
+
+    def with_option(self, option: str) -> str:
+        """Return the command that imports the log with one option more, into a folder of its own."""
+        return f"`{self.command} {option} -o imported/`"
+
+    def salvaging(self, words: str, left: float) -> str:
+        """Return the hint to take what is left of a log, where that share of it is worth it; nothing elsewhere."""
+        return f"{words}: {self.with_option('--salvage')}" if left >= WORTH_SALVAGING else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,34 +132,62 @@ def reader_of(path: Path) -> Reader:
     for name in sorted(known, key=lambda n: (n == "csv_table", n)):
         if known[name].sniff(path):
             return known[name]
-    raise LogError(
-        f"`{path}` is no log this program reads",
-        found=f"{'a folder' if path.is_dir() else f'{path.stat().st_size} bytes'} with no known signature",
-        hint=f"give one of: {', '.join(s for r in known.values() for s in r.suffixes)}",
-    )
+    raise not_a_log(path, [s for r in known.values() for s in r.suffixes])
 
 
 def check_readable(path: Path) -> None:
-    """Raise LogError when a log is not there, cannot be opened, or is empty."""
-    if not path.exists():
-        raise LogError(f"there is no log `{path}`", found=_neighbours(path), hint="check the path")
-    if path.is_dir():
-        return
+    """Raise LogError when a log is not there, cannot be opened, is no file or folder, or is empty."""
     try:
-        with path.open("rb") as stream:
-            is_empty = not stream.read(1)
+        is_empty = _is_empty(path)
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise _missing(path) from error
     except OSError as error:
         raise LogError(
-            f"`{path}` cannot be read: {error.strerror or error}", found=str(path), hint=f"try `chmod u+r {path}`"
+            f"`{path}` cannot be read: {error.strerror or error}", found=f"in `{path.parent}`", hint=_way_in(path, error)
         ) from error
     if is_empty:
-        raise LogError(f"`{path}` is empty", found="0 bytes", hint="copy it from the vehicle again")
+        raise LogError(f"`{path}` is empty", found="0 bytes", hint=COPY_AGAIN)
 
 
-def _neighbours(path: Path) -> str:
+def _is_empty(path: Path) -> bool:
+    """Whether a file holds nothing; raises OSError where it, or the folder it is, cannot be read."""
+    if path.is_dir():
+        next(path.iterdir(), None)
+        return False
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode):
+        what = "a pipe" if stat.S_ISFIFO(mode) else "a device"
+        raise LogError(f"`{path}` is {what}, which can be read once only", found=what, hint="pipe the log in, and name it `-`")
+    with path.open("rb") as stream:
+        return not stream.read(1)
+
+
+def _missing(path: Path) -> LogError:
+    if path.is_symlink():
+        return LogError(f"`{path}` is a link to nothing", found=f"it points to `{path.readlink()}`", hint="mend the link")
+    found = neighbours(path)
+    hint = near_files(path) if found.startswith("`") else "check the path"
+    return LogError(f"there is no log `{path}`", found=found, hint=hint)
+
+
+def neighbours(path: Path) -> str:
+    """Return what lies where a file was looked for."""
     folder = path.parent
-    if not folder.is_dir():
+    if not folder.is_dir() or not os.access(folder, os.R_OK):
         return f"no folder `{folder}` either"
     names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
     shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
     return f"`{folder}` holds {shown or 'nothing'}"
+
+
+def _way_in(path: Path, error: OSError) -> str:
+    """Return how one comes to read a file; nothing where its permissions are not what is in the way."""
+    if not isinstance(error, PermissionError):
+        return "check the path"
+    try:
+        found = path.stat()
+    except OSError:  # what is closed is a folder above it
+        return "ask the owner of its folder for it, or for the permission"
+    if found.st_uid == getattr(os, "geteuid", lambda: None)():
+        return f"`chmod u+{'rx' if stat.S_ISDIR(found.st_mode) else 'r'} {quote(str(path))}`"
+    return "ask its owner for it, or for the permission"

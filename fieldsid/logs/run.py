@@ -10,12 +10,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.display import Brief, Plotted, view_of
 from fieldsid.errors import DataError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -46,8 +50,8 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
 """Canonical signal names and their units; `thrust` may be in any unit."""
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+@dataclass(frozen=True, slots=True, repr=False)
+class Note(Brief):
     """One remark on the quality of a log or a fit: a code, a sentence, and the number behind it."""
 
     code: str
@@ -55,8 +59,8 @@ class Note:
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+@dataclass(frozen=True, slots=True, repr=False)
+class Run(Plotted):
     """One log: time (n,) in s strictly increasing, and signals (n,) by canonical name, NaN where missing."""
 
     name: str
@@ -78,6 +82,15 @@ class Run:
     def __len__(self) -> int:
         return int(self.time.size)
 
+    @classmethod
+    def from_frame(cls, frame: DataFrame, name: str = "") -> Run:
+        """Return the run of a pandas table of canonical columns; raises MappingError and LogError as reading a file does.
+
+        The time is a column or the index. `fieldsid.load` takes a mapping as well.
+        """
+        run: Run = view_of(cls).read(frame, name)
+        return run
+
     def has(self, name: str) -> bool:
         """Whether a signal is in the log with at least one finite sample."""
         values = self.signals.get(name)
@@ -89,7 +102,7 @@ class Run:
             raise DataError(
                 f"run {self.name!r} has no signal `{name}`",
                 found=", ".join(sorted(self.signals)) or "no signals",
-                hint="map it on import: `sysid inspect LOG`",
+                hint="map it on import, where the log has it",
             )
         return self.signals[name]
 

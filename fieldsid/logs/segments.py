@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.logs.run import FloatArray, Run
+from fieldsid.logs.run import BoolArray, FloatArray, Run
 
 BEFORE_S = 2.0
 AFTER_S = 10.0
@@ -52,22 +52,31 @@ def segment(run: Run, axis: str) -> Segment:
     fin = run[signal]
     seen = np.isfinite(fin)
     time, fin = run.time[seen], fin[seen]
-    away, limit = _excursions(time, fin)
-    if not away.any():
-        raise DataError(
-            f"`{signal}` of run {run.name!r} never leaves its trim: constant within {np.degrees(np.ptp(fin)):.2f} deg",
-            found=f"{np.degrees(fin.min()):.2f} to {np.degrees(fin.max()):.2f} deg (limit {np.degrees(limit):.2f} deg from trim)",
-            hint="choose a run with excitation, or the part to use with `--from` and `--to`",
-        )
+    away, limit = excursions(run.name, axis, signal, time, fin)
     return _around(run, time, away, signal, limit)
 
 
+def excursions(name: str, axis: str, signal: str, time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
+    """Return where the fin (n,) rad of a run is clearly away from its trim, and the limit in rad.
+
+    Raises DataError where it never is: such a run says nothing of what a fin does.
+    """
+    away, limit = _away(time, fin)
+    if not away.any():
+        raise DataError(
+            f"`{signal}` of run {name!r} never leaves its trim: constant within {np.degrees(np.ptp(fin)):.2f} deg",
+            found=f"{np.degrees(fin.min()):.2f} to {np.degrees(fin.max()):.2f} deg (limit {np.degrees(limit):.2f} deg from trim)",
+            hint=f"leave that run out, or fly an excitation: `sysid plan --axis {axis}`",
+        )
+    return away, limit
+
+
 def no_fin(run: Run, axis: str, missing: str) -> DataError:
-    """Return the error of a run without a fin for an axis; its hint names the other axis where that one has a fin."""
+    """Return the error of a run without a fin for an axis; its hint names the other axis where that one has one."""
     other = next(a for a in _FINS if a != axis)
-    hint = f"map `{missing}` on import: `sysid inspect LOG`"
+    hint = f"map `{missing}` on import"
     if any(run.has(fin) for fin in _FINS[other]):
-        hint = f"map it on import, or identify the other axis: `--axis {other}`"
+        hint += f", or take the other axis, for which it has a fin: `--axis {other}`, or a model of {other}"
     return DataError(
         f"run {run.name!r} has no fin signal for {axis}: `{missing}` is missing or empty",
         found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
@@ -75,8 +84,7 @@ def no_fin(run: Run, axis: str, missing: str) -> DataError:
     )
 
 
-def _excursions(time: FloatArray, fin: FloatArray) -> tuple[np.ndarray[tuple[int], np.dtype[np.bool_]], float]:
-    """Return where the fin is clearly away from its trim, and the limit in rad."""
+def _away(time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
     trim = float(np.median(fin[time <= time[0] + STEADY_S]))
     off = np.abs(fin - trim)
     quiet = off[off < SHARE_OF_LARGEST * off.max()] if off.max() > 0 else off
@@ -86,7 +94,7 @@ def _excursions(time: FloatArray, fin: FloatArray) -> tuple[np.ndarray[tuple[int
     return off > limit, limit
 
 
-def _around(run: Run, time: FloatArray, away: np.ndarray[tuple[int], np.dtype[np.bool_]], signal: str, limit: float) -> Segment:
+def _around(run: Run, time: FloatArray, away: BoolArray, signal: str, limit: float) -> Segment:
     moved = np.flatnonzero(away)
     first, last = float(time[moved[0]]), float(time[moved[-1]])
     begin, end = float(run.time[0]), float(run.time[-1])

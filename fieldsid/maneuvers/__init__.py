@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import cast
 
+from fieldsid.angles import parse_angle
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters
 from fieldsid.maneuvers._flight import Autopilot, Flight, Limits, Plant, Schedule, fly
@@ -39,7 +40,7 @@ def pick_maneuver(name: str) -> Maneuver:
 
 
 def parse_spec(text: str) -> tuple[Maneuver, dict[str, float]]:
-    """Read `name` or `name:parameter=value,...`; an angle may be given as `15deg`.
+    """Read `name` or `name:parameter=value,...`; an angle as `15deg`, `0.26rad` or `0.26`.
 
     Returns the maneuver and all its parameters, checked. Raises UsageError naming what is wrong and near matches.
     """
@@ -54,7 +55,7 @@ def parse_spec(text: str) -> tuple[Maneuver, dict[str, float]]:
                 found=item,
                 hint=f"write it like `{maneuver.name}:amplitude={maneuver.defaults['amplitude']:g}`",
             )
-        given[key.strip()] = _number(value.strip(), text)
+        given[key.strip()] = _number(value.strip(), text, maneuver, key.strip())
     return maneuver, maneuver.checked(given)
 
 
@@ -64,14 +65,15 @@ def spec_of(maneuver: Maneuver, parameters: Parameters) -> str:
     return maneuver.name + (":" if changed else "") + ",".join(f"{k}={v:.6g}" for k, v in changed.items())
 
 
-def _number(text: str, spec: str) -> float:
-    degrees = text.endswith("deg")
+def _number(text: str, spec: str, maneuver: Maneuver, name: str) -> float:
+    parameter = next((p for p in maneuver.parameters if p.name == name), None)
+    if parameter is not None and parameter.unit == "rad":
+        return parse_angle(text, f"{maneuver.name}:{name}", parameter.high)
     try:
-        value = float(text.removesuffix("deg"))
+        return float(text)
     except ValueError as error:
         raise UsageError(
             f"{text!r} in the maneuver `{spec}` is not a number",
             found=text,
-            hint="give a number in SI, or an angle like `15deg`",
+            hint=f"give a number in SI: `{maneuver.name}:{name}=2`",
         ) from error
-    return math.radians(value) if degrees else value

@@ -13,16 +13,21 @@ it further from zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fieldsid.artifacts import sha256_of
+from fieldsid.display import Brief
+from fieldsid.errors import EffectError, UsageError
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.registry import pick
+from fieldsid.models.definition import NONE, Definition
+from fieldsid.registry import Outside, define, pick
 
 if TYPE_CHECKING:
     from fieldsid.models.record import Record
@@ -32,6 +37,7 @@ Suggest = Callable[[Sequence["Record"], Sequence[FloatArray]], list[dict[str, fl
 MomentHook = Callable[["Motion", Values, "Record"], FloatArray]
 
 
+REGISTRY = "fieldsid.effects"
 ORDINARY, STILL = 0.2, 1e-9
 """rad/s: the rate at which drag of another power equals the quadratic one, and the one below which it is nil."""
 
@@ -82,8 +88,8 @@ class Form:
     needs: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class FinPath:
+@dataclass(frozen=True, slots=True, repr=False)
+class FinPath(Brief):
     """Fin angle over each sampling interval, straight from `start` to `end`, both (n-1,) in rad.
 
     A path that bends or jumps inside an interval is the line of its mean and its first moment. Where the line may pass what
@@ -195,6 +201,7 @@ class Effect:
     `forms` are other shapes, tried where the textbook's leaves something.
     `handicap` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
+    `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
     """
 
     name: str
@@ -222,6 +229,7 @@ class Effect:
     forms: tuple[Form, ...] = ()
     handicap: float = 0.0
     origin: str = field(default="built in")
+    definition: Definition | None = None
 
     @property
     def shared(self) -> tuple[Coefficient, ...]:
@@ -242,6 +250,16 @@ class Effect:
     def names(self) -> set[str]:
         """Names of the coefficients, those of the forms among them."""
         return {c.name for c in self.every}
+
+    def placed(self, outside: Outside) -> Effect:
+        """Return the effect of another package with its origin; the registry asks for it when it loads an entry point."""
+        where = Path(outside.file)
+        definition = Definition(
+            outside.file,
+            sha256_of(where) if where.is_file() else "",
+            package=f"entry point `{outside.value}` of {outside.distribution}",
+        )
+        return replace(self, origin=definition.place, definition=definition)
 
     def starts(self) -> dict[str, float]:
         """Return the start value of every coefficient."""
@@ -272,7 +290,56 @@ def held(values: FloatArray) -> FloatArray:
 
 def effect_named(name: str) -> Effect:
     """Return an effect of the registry; raises UsageError naming the near matches."""
-    effect = pick("fieldsid.effects", "EFFECT", name)
-    if not isinstance(effect, Effect):
-        raise TypeError(f"registry member {name!r} is {type(effect).__name__}, not Effect")
+    return _checked(name, pick(REGISTRY, "EFFECT", name))
+
+
+def effect_held(name: str, own: Mapping[str, Definition] = NONE) -> Effect:
+    """Return an effect that a model holds: as the model's own definition has it where there is one, else the registry's.
+
+    Raises EffectError for one that is not known here, saying where it lived if the model does.
+    """
+    definition = own.get(name)
+    if definition is not None and not definition.is_code:
+        return _checked(name, define(REGISTRY, definition.text, definition.file))
+    try:
+        effect = effect_named(name)
+    except UsageError as error:
+        raise _not_here(name, definition) from error
+    if definition is not None and (effect.definition is None or not effect.definition.is_code):
+        raise _not_here(name, definition)
     return effect
+
+
+def definitions_of(effects: Iterable[Effect]) -> dict[str, Definition]:
+    """Return what a model has to keep of its effects, by name: the definitions of those that are not built in."""
+    return {e.name: e.definition for e in effects if e.definition is not None}
+
+
+def shared_name(one: Effect, other: Effect) -> str | None:
+    """Return a coefficient's name that keeps two effects out of one model, None where there is none.
+
+    A model keeps the coefficients of all its effects in one table.
+    """
+    same_axis = bool(set(one.axes) & set(other.axes))
+    return min(one.names & other.names, default=None) if same_axis and one.name != other.name else None
+
+
+def _checked(name: str, effect: object) -> Effect:
+    if not isinstance(effect, Effect) or effect.name != name:
+        raise TypeError(f"asked for effect {name!r}, got {effect!r:.60}")
+    return effect
+
+
+def _not_here(name: str, definition: Definition | None) -> EffectError:
+    """Return the error of a model whose effect is neither in it nor known here."""
+    if definition is None:
+        return EffectError(
+            f"the model holds effect `{name}`, which is not known here",
+            found="the model does not say where it lived",
+            hint=f"work in the folder whose `effects/` has `{name}`, or copy its file to `effects/` here",
+        )
+    return EffectError(
+        f"the model holds effect `{name}`, which is Python code and is not installed here: code is not kept in a model",
+        found=f"it lived in {definition.place}, SHA-256 {definition.sha256 or 'not known'}",
+        hint=f"install the package it came with; `sysid effects show {name}` then shows it",
+    )

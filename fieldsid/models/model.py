@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import load_record, save_record
+from fieldsid.display import Brief, Displayed
 from fieldsid.errors import ArtifactError
+from fieldsid.logs.mistaken import unless_log
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.definition import Definition, definitions_body, read_definitions
+from fieldsid.models.effect import definitions_of, effect_held
+from fieldsid.models.speed_law import SpeedLaw, with_speed
 
 KIND = "fieldsid/model"
 
 
-@dataclass(frozen=True, slots=True)
-class Noise:
+@dataclass(frozen=True, slots=True, repr=False)
+class Noise(Brief):
     """Noise of the measurement and of the motion.
 
     Standard deviations: angle (rad), rate (rad/s), disturbance (rad/s^2, an AR(1) moment of correlation time
@@ -35,13 +39,14 @@ class Noise:
     coloured_time: float = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class Model:
+@dataclass(frozen=True, slots=True, repr=False)
+class Model(Displayed):
     """An identified model.
 
     `values` holds the base parameters at the law's reference speed and the effects' shared coefficients (SI,
     rad); `units` theirs; `covariance` (p, p) in the order of `free`, the names that were estimated. `trained`
-    says what the data reached: speed_low, speed_high, fin_max, rate_max (all in SI).
+    says what the data reached: speed_low, speed_high, fin_max, rate_max (all in SI). `own` defines the effects that are not
+    built in, as `models.definition` has it: a model that is read back uses these, whatever the folder it is used in holds.
     """
 
     axis: Axis
@@ -56,6 +61,7 @@ class Model:
     method: str = ""
     runs: tuple[str, ...] = ()
     info: Mapping[str, Any] = field(default_factory=dict)
+    own: Mapping[str, Definition] = field(default_factory=dict)
 
     @property
     def base(self) -> dict[str, float]:
@@ -69,6 +75,11 @@ class Model:
         i = self.free.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
+    def shown(self, name: str) -> str:
+        """Return a parameter's name as it is printed: that of several runs with the speed it belongs to."""
+        at = self.law
+        return with_speed(name, self.axis, at.reference, trim_of_fin=at.trim_of_fin) if len(self.runs) > 1 else name
+
     def at_speed(self, speed: float) -> dict[str, float]:
         """Return the base parameters at a speed by the model's own law."""
         names = NAMES[self.axis]
@@ -80,10 +91,15 @@ class Model:
 
 
 def save_model(model: Model, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False) -> Path:
-    """Write a model as YAML; raises ArtifactError."""
+    """Write a model as YAML, with the definitions of its effects that are not built in; raises ArtifactError.
+
+    Raises EffectError for an effect that is not known.
+    """
+    own = definitions_of(effect_held(name, model.own) for name in model.effects)
     body = {
         "axis": model.axis.value,
         "effects": list(model.effects),
+        **({"own_effects": definitions_body(own)} if own else {}),
         "method": model.method,
         "runs": list(model.runs),
         "parameters": {
@@ -108,14 +124,20 @@ def save_model(model: Model, path: Path, *, inputs: Sequence[Path] = (), parent:
 
 def load_model(path: Path) -> Model:
     """Read a model back; raises ArtifactError naming the key that is missing or wrong."""
-    body = load_record(path, KIND)
+    with unless_log(path, "a model"):
+        body = load_record(path, KIND)
+    return model_of(body, path)
+
+
+def model_of(body: Mapping[str, Any], path: Path) -> Model:
+    """Return the model of a record that `save_model` has written, found in a file; raises ArtifactError as `load_model` does."""
     try:
         law = body["speed_law"]
         reference = law["reference_m_s"]
         return Model(
             axis=Axis(body["axis"]),
             effects=tuple(str(e) for e in body["effects"]),
-            values={k: float(p["value"]) for k, p in body["parameters"].items()},
+            values={k: _finite(k, p["value"]) for k, p in body["parameters"].items()},
             units={k: str(p["unit"]) for k, p in body["parameters"].items()},
             free=tuple(body["free"]),
             covariance=np.array(body["covariance"], dtype=np.float64).reshape(len(body["free"]), len(body["free"])),
@@ -132,6 +154,7 @@ def load_model(path: Path) -> Model:
             method=str(body["method"]),
             runs=tuple(body["runs"]),
             info=body["info"],
+            own=read_definitions(body.get("own_effects", ()), path),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise ArtifactError(
@@ -139,3 +162,11 @@ def load_model(path: Path) -> Model:
             found=f"{type(error).__name__}: {error}",
             hint="identify again, with `--force`",
         ) from error
+
+
+def _finite(name: str, value: float | str) -> float:
+    """Return a parameter as the number it must be; raises ValueError for infinity and for what is no number."""
+    number = float(value)
+    if not np.isfinite(number):
+        raise ValueError(f"{name} = {number} is not a finite number")
+    return number

@@ -10,7 +10,9 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
+from fieldsid.logs.holes import JITTER, hole_notes, unbroken, usual_step
 from fieldsid.logs.run import FloatArray, Note, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.logs.spikes import spikes_of
@@ -21,17 +23,15 @@ from fieldsid.models.effect import FinPath
 from fieldsid.models.smoothing import smoothed
 from fieldsid.models.surge import causes_of, surge_behind
 
+UNDER_WAY_M_S = (0.05, 50.0)
+"""Speeds between which a vehicle goes through water: below no fin steers, above is another unit."""
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
-JITTER = 0.35
-"""Share of the usual step within which steps differ by the clock's jitter, not by a sample that is missing."""
-REGULAR = 0.9
-"""Share of the steps that are the usual one, but for jitter, from which on a longer one has lost samples."""
 FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 """What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+@dataclass(frozen=True, slots=True, repr=False)
+class Record(Brief):
     """Samples (n,) of one run on one axis.
 
     `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which).
@@ -80,7 +80,7 @@ class Record:
         object.__setattr__(self, "both", np.stack([self.angle, self.rate]))
         object.__setattr__(self, "ok", np.stack([self.angle_ok, self.rate_ok]))
         object.__setattr__(self, "is_whole", bool(self.ok.all()))
-        object.__setattr__(self, "lost", _lost(steps, usual) if self.fin_is_held else None)
+        object.__setattr__(self, "lost", _lost(steps) if self.fin_is_held else None)
         object.__setattr__(self, "commanded", self.given(self.early))
 
     def __len__(self) -> int:
@@ -108,13 +108,14 @@ class Record:
         return self.signals[role]
 
 
-def _lost(steps: FloatArray, usual: float) -> FloatArray | None:
+def _lost(steps: FloatArray) -> FloatArray | None:
     """Return the share of the samples of each interval that a log of a usual step has lost, (n-1,), None where it has lost none.
 
     What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
     A log without a usual step has lost nothing that could be told.
     """
-    if not np.count_nonzero(np.abs(steps - usual) < JITTER * usual) > REGULAR * steps.size:
+    usual = usual_step(steps)
+    if usual is None:
         return None
     count = np.rint(steps / usual)
     return None if (count <= 1.0).all() else 1.0 - 1.0 / np.maximum(count, 1.0)
@@ -146,19 +147,20 @@ def first_part(record: Record, samples: int) -> Record:
 def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     """Return the record of a run on an axis.
 
-    fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. Raises DataError
-    when the angle and the rate are both missing, or the fin is.
+    fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. A run whose log hides a move of
+    the fin is cut there, see `logs/holes.py`. Raises DataError when the angle and the rate are both missing, or the fin is.
     """
     names = NAMES[axis]
-    measured = fin == "measured" or (fin == "auto" and run.has(names.fin_measured))
-    column = names.fin_measured if measured else names.fin
+    column = _fin_column(run, axis, fin)
+    measured = column == names.fin_measured
     if not run.has(column):
         raise no_fin(run, axis.value, column)
+    run = unbroken(run, column)
     if not run.has(names.angle) and not run.has(names.rate):
         raise DataError(
             f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`",
             found=", ".join(k for k in run.signals if run.has(k)),
-            hint="map one of them on import: `sysid inspect LOG`",
+            hint="map one of them on import, where the log has it",
         )
     angle, angle_ok = _measured(run, names.angle)
     rate, rate_ok = _measured(run, names.rate)
@@ -173,7 +175,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         for role, c in ROLES.items()
         if run.has(c) and role != "surge" and not (along and role == "depth")
     }
-    if run.has(ROLES["surge"]):
+    if knows_speed(run):
         turning = np.interp(run.time, run.time[rate_ok], rate[rate_ok]) if rate_ok.any() else None
         causes, fastest_s = causes_of(signals.get("thrust"), turning, held), FASTEST_S["surge"]
         signals["surge"] = surge_behind(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
@@ -200,6 +202,23 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     )
 
 
+def _fin_column(run: Run, axis: Axis, fin: str = "auto") -> str:
+    names = NAMES[axis]
+    return names.fin_measured if fin == "measured" or (fin == "auto" and run.has(names.fin_measured)) else names.fin
+
+
+def fin_holes(run: Run, axis: Axis) -> tuple[Note, ...]:
+    """Return what the holes in the log of the fin that `record_of` takes mean for a fit."""
+    column = _fin_column(run, axis)
+    return hole_notes(run, column) if run.has(column) else ()
+
+
+def knows_speed(run: Run) -> bool:
+    """Whether a run's surge is that of a vehicle under way: sensors that are not fitted are logged as zero."""
+    low, high = UNDER_WAY_M_S
+    return run.has(ROLES["surge"]) and low < float(np.nanmedian(run[ROLES["surge"]])) < high
+
+
 def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     values = run.signals.get(name)
     if values is None:
@@ -216,10 +235,11 @@ def _without_spikes(values: FloatArray, ok: npt.NDArray[np.bool_]) -> npt.NDArra
 
 
 def left_out(runs: Sequence[Run], axis: Axis) -> tuple[Note, ...]:
-    """Return what reading some runs has said of spikes that no fit on an axis uses."""
+    """Return what a fit on an axis leaves out of some runs: spikes, and what is beside a hole that hides a move of the fin."""
     fitted = (NAMES[axis].angle, NAMES[axis].rate)
     said = [(r.name, n) for r in runs for n in r.notes if n.code == "spikes" and n.data["signal"] in fitted]
-    return tuple(Note(n.code, f"{name}: {n.message}", {**n.data, "run": name}) for name, n in said)
+    spikes = (Note(n.code, f"{name}: {n.message}", {**n.data, "run": name}) for name, n in said)
+    return (*spikes, *(n for r in runs for n in fin_holes(r, axis)))
 
 
 def _held_fin(values: FloatArray) -> FloatArray:

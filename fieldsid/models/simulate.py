@@ -9,13 +9,16 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.errors import ModelError
+from fieldsid.errors import DivergenceError
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Effect, Motion, as_fitted, effect_named
+from fieldsid.models.effect import Effect, Motion, as_fitted, effect_held
 from fieldsid.models.model import Model
 from fieldsid.models.record import Record
 from fieldsid.models.signal_path import Base, assemble, measured, run_core, with_moments
+
+HOLDS = "quadratic_damping"
+"""The effect that holds a rate which the damping alone lets grow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +33,8 @@ class Trajectory:
 
 
 def effects_of(model: Model) -> tuple[Effect, ...]:
-    """Return the model's effects from the registry, in the forms it was fitted in; raises UsageError for an unknown one."""
-    return tuple(as_fitted(effect_named(name), model.values) for name in model.effects)
+    """Return the effects that a model holds, in the forms it was fitted in; raises EffectError for one not known here."""
+    return tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
 
 
 def base_at(model: Model, speed: float) -> Base:
@@ -40,6 +43,14 @@ def base_at(model: Model, speed: float) -> Base:
     v = model.at_speed(speed)
     stiffness = 0.0 if names.stiffness is None else v[names.stiffness]
     return Base(v[names.damping], stiffness, v[names.authority], v[names.trim], model.law.trim_of_fin)
+
+
+def growing_hint(model: Model) -> str:
+    """Return what helps where a model grows without bound: the damping that holds it, where it has none."""
+    if HOLDS in model.effects:
+        return "the model is unstable there: identify again, from runs that reach as far"
+    effects = ",".join((*model.effects, HOLDS))
+    return f"the model is unstable there: `sysid identify RUN... --axis {model.axis.value} --effects {effects}`"
 
 
 def simulate(
@@ -54,7 +65,7 @@ def simulate(
 
     state is the initial (angle rad, rate rad/s, cross state); by default the first measured angle and rate.
     nuisance holds per-run coefficients (wave phase, event time); the coefficients' start values fill the rest.
-    Raises ModelError when the motion grows without bound.
+    Raises DivergenceError when the motion grows without bound.
     """
     parts = effects_of(model) if effects is None else effects
     values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
@@ -71,10 +82,10 @@ def simulate(
     out = run_core(record, arrays, start)
     if not np.isfinite(out).all():
         at = float(record.time[np.argmin(np.isfinite(out[:, 1]))])
-        raise ModelError(
+        raise DivergenceError(
             f"the {model.axis.value} model grows without bound on run {record.name!r}",
             found=f"diverged at t = {at:.2f} s",
-            hint="the model is unstable there: identify again, or add `--effects quadratic_damping`",
+            hint=growing_hint(model),
         )
     shown = measured(Motion(out[:, 0], out[:, 1]), record, parts, values)
     fin = np.append(arrays.fin.start, arrays.fin.end[-1])

@@ -30,6 +30,8 @@ NEIGHBOURS, WILD, LARGE = 9, 8.0, 0.1
 """Values a running median is taken over; spreads, and share of the signal's own range, beyond which one is wild."""
 CHANCE = 12.0
 """Samples' worth of noise that two smoothers' errors differ by by chance: what is known to move a signal is left out beyond."""
+RESOLVED = 1e-9
+"""Share of its size that no sensor resolves: a signal that is straight but for that has no noise, only rounding."""
 ENOUGH = 20_000
 """Samples from whose first part a longer signal's T is found, and which columns it goes with."""
 
@@ -51,7 +53,7 @@ def smoothed(
         return full
     straight = np.column_stack([np.ones(time.size), (time - time[0]) / float(np.ptp(time))])
     line = _fitted(straight, full, seen)
-    if not np.any(full[seen] != line[seen]):
+    if float(np.max(np.abs(full - line)[seen])) <= RESOLVED * float(np.max(np.abs(full[seen]))):
         return full
     weight, part = seen.astype(np.float64), slice(0, ENOUGH)
     trends = [(line, 0)]

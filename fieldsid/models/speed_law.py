@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.models.axis import Axis
+from fieldsid.display import Brief
+from fieldsid.models.axis import NAMES, Axis
 
 GROUP_WIDTH = 0.08
 """Runs whose speeds differ by less than this share form one speed group, in which the authority goes with u^2."""
@@ -26,8 +27,18 @@ def over_reference(authority: float, at_reference: float) -> float:
     return authority / at_reference if at_reference != 0.0 else 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedLaw:
+def with_speed(name: str, axis: Axis, speed: float, *, trim_of_fin: bool) -> str:
+    """Return a parameter's name with the speed (m/s) its value belongs to, like `b2@1.4`; as it is where it has none.
+
+    The fin offset that goes with the trim is at every speed the same where the trim goes with the authority.
+    """
+    names = NAMES[axis]
+    moves = (names.damping, names.authority, names.trim if trim_of_fin else names.trim_fin)
+    return f"{name}@{speed:.3g}" if name in moves and np.isfinite(speed) else name
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SpeedLaw(Brief):
     """Speeds in m/s; `points` are (speed, authority) of the groups, empty where the power law holds.
 
     A speed within the share `snap` of a group's speed counts as that group's: set where runs of one group did not

@@ -9,25 +9,27 @@ from typing import Any
 
 import numpy as np
 
+from fieldsid import angles
 from fieldsid.errors import UsageError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.models.simulate import effects_of
 from fieldsid.planning.candidate import Window
 from fieldsid.planning.envelope import Envelope
-from fieldsid.planning.plan import Plan, Request, make_plan
+from fieldsid.planning.plan import WINDOW, Plan, Request, make_plan
 from fieldsid.planning.plan_file import plan_body
-from fieldsid.planning.prior import named_prior
+from fieldsid.planning.prior import checked_prior, named_prior
 from fieldsid.planning.prior_file import load_believed
-from fieldsid.planning.quantities import parse_angle, parse_area, parse_band, parse_speeds
+from fieldsid.planning.quantities import parse_area, parse_band, parse_speeds
 from fieldsid.planning.rivals import rivals_from, rivals_named
-from fieldsid.planning.separate_plan import separating_plan
+from fieldsid.planning.separate_plan import LONGEST_WINDOW_S, separating_plan
 from fieldsid.planning.wish import parse_wish
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
 FIN_MAX = 0.26
 """Fin limit (rad) where no vehicle says another: beyond it the fins of the paper's vehicle stall."""
-HEADING_MAX, PITCH_MAX = np.radians(60.0), np.radians(30.0)
+HEADING_MAX, PITCH_MAX = float(np.radians(60.0)), float(np.radians(30.0))
+PRIOR, NONE = "torpedo", "none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +52,17 @@ UNLIMITED = Limiting()
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Everything that was typed."""
+    """Everything that was typed, None where nothing was."""
 
-    axis: Axis
+    axis: Axis | None = None
     speeds: str | None = None
     vehicle: Path | None = None
     model: Path | None = None
-    prior: str = "torpedo"
+    prior: str | None = None
     want: str | None = None
     minutes: float | None = None
     limiting: Limiting = UNLIMITED
-    window: float = 33.0
+    window: float | None = None
     run_up: float = 10.0
     rate: float = 20.0
     radius: bool = False
@@ -68,6 +70,7 @@ class Asked:
     diagnosis: Path | None = None
     seed: int = 1
     open_loop: bool = False
+    course: str | None = None
 
     @property
     def legs(self) -> int:
@@ -90,79 +93,136 @@ def planned(asked: Asked, step: Callable[[], None] = lambda: None, ready: Callab
     ready is called once what was asked for is read and understood, before the search.
     """
     vehicle = _vehicle(asked.vehicle)
-    if asked.separate or asked.diagnosis:
-        return _separating(asked, vehicle, ready)
+    if asked.model is not None and asked.prior is not None:
+        raise UsageError("`--model` and `--prior` both say what is believed", found=f"--prior {asked.prior}", hint="give one")
+    if asked.separate or asked.diagnosis is not None:
+        return _separating(asked, vehicle, step, ready)
     model = _signed(believed(asked), vehicle)
-    speeds = _speeds(asked, model)
-    known = [*NAMES[asked.axis].base, *(c.name for e in effects_of(model) for c in e.shared)]
-    request = Request(
-        axis=asked.axis,
-        speeds=speeds,
-        envelope=envelope_of(asked.axis, asked.limiting, vehicle),
-        want=parse_wish(asked.want, known) if asked.want else {},
-        minutes=asked.minutes,
-        window=Window(asked.window, rate_hz=asked.rate),
-        run_up_s=_run_up(asked.run_up),
-        radius=asked.radius,
-        open_loop=asked.open_loop,
-        seed=asked.seed,
-        vehicle=vehicle.name if vehicle else "vehicle",
-        slowest=vehicle.speed_min_m_s if vehicle else None,
-        fastest=vehicle.speed_max_m_s if vehicle else None,
-    )
+    request = _request(asked, model, vehicle, asked.axis or model.axis)
+    known = [*NAMES[request.axis].base, *(c.name for e in effects_of(model) for c in e.shared)]
+    request = replace(request, want=parse_wish(asked.want, known) if asked.want else {})
     ready()
     plan = make_plan(model, request, step)
     return Made(plan, model, plan_body(plan))
 
 
+def _request(asked: Asked, model: Model, vehicle: Vehicle | None, axis: Axis, window_s: float = WINDOW.length) -> Request:
+    return Request(
+        axis=axis,
+        speeds=_speeds(asked, model),
+        envelope=envelope_of(axis, asked.limiting, vehicle),
+        want={},
+        minutes=asked.minutes,
+        window=Window(window_s if asked.window is None else asked.window, rate_hz=asked.rate),
+        run_up_s=_run_up(asked.run_up),
+        radius=_with_circles(asked),
+        open_loop=asked.open_loop,
+        seed=asked.seed,
+        vehicle=vehicle.name if vehicle else "vehicle",
+        slowest=vehicle.speed_min_m_s if vehicle else None,
+        fastest=vehicle.speed_max_m_s if vehicle else None,
+        course=_course(asked.course),
+    )
+
+
+def _course(text: str | None) -> float | None:
+    return None if text is None else angles.parse_angle(text, "--course", 2.0 * np.pi) % (2.0 * np.pi)
+
+
+def _with_circles(asked: Asked) -> bool:
+    """Return whether circles are asked for; raises UsageError where a limit is, that every circle leaves, or rules are not."""
+    if asked.radius and asked.limiting.heading not in (None, NONE):
+        raise UsageError(
+            "a circle turns through more than a whole turn, whatever `--max-heading` says",
+            found=f"--radius --max-heading {asked.limiting.heading}",
+            hint="leave `--max-heading` out, or plan the circles apart: `sysid plan --radius`",
+        )
+    if asked.radius and asked.open_loop:
+        raise UsageError(
+            "a circle follows the heading: it is not open loop", found="--radius --open-loop", hint="leave one of the two out"
+        )
+    return asked.radius
+
+
 def believed(asked: Asked) -> Model:
     """Return what is believed before the dive: a model or prior file, else the named prior of the axis."""
-    return named_prior(asked.prior, asked.axis) if asked.model is None else load_believed(asked.model)
+    return named_prior(asked.prior or PRIOR, asked.axis or Axis.YAW) if asked.model is None else load_believed(asked.model)
 
 
-def envelope_of(axis: Axis, limiting: Limiting, vehicle: Vehicle | None, *, free_heading: bool = False) -> Envelope:
-    """Return the envelope: what was typed, then the vehicle's own limits, then the defaults; raises UsageError."""
+def envelope_of(axis: Axis, limiting: Limiting, vehicle: Vehicle | None) -> Envelope:
+    """Return the envelope: what was typed, then the vehicle's own limits, then the defaults; raises UsageError.
+
+    `none` takes the default of heading or pitch away.
+    """
     area = parse_area(limiting.area) or (None, None)
     band = parse_band(limiting.depth_band) or (None, None)
     own = None if vehicle is None else vehicle.fin_max_rad(axis.value)
-    fin = parse_angle(limiting.fin, "--fin-max")
+    fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN)
     if fin is not None and own is not None and fin > own:
         raise UsageError(
             f"a fin of {fin:g} rad is more than the vehicle has",
             found=f"{own:g} rad in vehicle.yaml",
-            hint=f"give `--fin-max {own:g}`",
+            hint=f"give `--fin-max {own:g}rad`",
         )
-    rate = parse_angle(limiting.fin_rate, "--fin-rate") or (vehicle.fin_rate_rad_s if vehicle else None)
-    heading, pitch = parse_angle(limiting.heading, "--max-heading"), parse_angle(limiting.pitch, "--max-pitch")
-    if axis is Axis.YAW and heading is None and not free_heading:
-        heading = HEADING_MAX
+    rate = vehicle.fin_rate_rad_s if vehicle else None
+    if limiting.fin_rate is not None:
+        rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE)
     return Envelope(
         fin=fin if fin is not None else own if own is not None else FIN_MAX,
         fin_rate=np.inf if rate is None else rate,
-        heading=heading,
+        heading=_limit(limiting.heading, "--max-heading", angles.HEADING, HEADING_MAX if axis is Axis.YAW else None),
         track=limiting.track,
         depth_low=band[0],
         depth_high=band[1],
-        pitch=PITCH_MAX if axis is Axis.PITCH and pitch is None else pitch,
-        roll=parse_angle(limiting.roll, "--max-roll"),
+        pitch=_limit(limiting.pitch, "--max-pitch", angles.TILT, PITCH_MAX if axis is Axis.PITCH else None),
+        roll=_limit(limiting.roll, "--max-roll", angles.TILT),
         area_length=area[0],
         area_width=area[1],
         share=limiting.share,
     )
 
 
-def _separating(asked: Asked, vehicle: Vehicle | None, ready: Callable[[], None]) -> Made:
-    if asked.diagnosis is not None:
-        rivals = rivals_from(asked.diagnosis, asked.separate)
-    else:
-        rivals = rivals_named(_signed(believed(asked), vehicle), asked.separate)
-    envelope = envelope_of(rivals[0].axis, asked.limiting, vehicle, free_heading=True)
-    window = Window(asked.window, rate_hz=asked.rate)
-    speeds = _speeds(asked, rivals[0])
-    name, run_up = vehicle.name if vehicle else "vehicle", _run_up(asked.run_up)
+def _limit(text: str | None, option: str, most: float, default: float | None = None) -> float | None:
+    """Return the limit that was typed, None for `none`, the default where nothing was."""
+    if text is None:
+        return default
+    return None if text.strip().lower() == NONE else angles.parse_angle(text, option, most)
+
+
+def _separating(asked: Asked, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:
+    if asked.want:
+        raise UsageError(
+            "`--want` asks for accuracy, not for what tells effects apart",
+            found=f"--want {asked.want}",
+            hint="leave it out, or plan the two apart",
+        )
+    rivals = _rivals(asked, vehicle)
+    request = _request(asked, rivals[0], vehicle, rivals[0].axis, LONGEST_WINDOW_S)
     ready()
-    plan, separation = separating_plan(rivals, envelope, speeds, window, run_up, name, asked.seed)
-    return Made(plan, rivals[0], {**plan_body(plan), "separation": separation.plain(), "says": separation.says()})
+    plan, found = separating_plan(rivals, request, step)
+    best = max(found, key=lambda s: s.expected_log_odds)
+    says = [line for s in found for line in s.says()]
+    body = {"separation": best.plain(), "separations": [s.plain() for s in found], "says": says}
+    return Made(plan, rivals[0], {**plan_body(plan), **body})
+
+
+def _rivals(asked: Asked, vehicle: Vehicle | None) -> tuple[Model, ...]:
+    if asked.diagnosis is None:
+        model = _signed(believed(asked), vehicle)
+        # no speeds: a base that is unstable alone may be held by what is added to it
+        return rivals_named(checked_prior(model, asked.axis or model.axis, ()), asked.separate)
+    if asked.model is not None or asked.prior is not None:
+        raise UsageError(
+            "a diagnosis says itself what is believed", found="`--from` with `--model` or `--prior`", hint="leave the latter out"
+        )
+    rivals = rivals_from(asked.diagnosis, asked.separate)
+    if asked.axis not in (None, rivals[0].axis):
+        raise UsageError(
+            f"`{asked.diagnosis}` is a diagnosis of {rivals[0].axis.value}",
+            found=f"--axis {asked.axis.value}" if asked.axis else "",
+            hint=f"write `--axis {rivals[0].axis.value}`, or leave it out",
+        )
+    return rivals
 
 
 def _vehicle(path: Path | None) -> Vehicle | None:

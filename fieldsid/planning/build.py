@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers import Schedule, pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.planning.candidate import Candidate, Window, fits, flown
-from fieldsid.planning.crowd import Crowd, crowd_of, fly_crowd
+from fieldsid.planning.crowd import Crowd, crowd_of, fly_crowd, fly_list
 from fieldsid.planning.envelope import Envelope
 from fieldsid.planning.information import information_of
 from fieldsid.planning.judge import Judge, judge_of
@@ -47,7 +48,8 @@ class Setting:
 def best_leg(setting: Setting, speed: float, known: Sequence[Candidate] = ()) -> Leg:
     """Return the leg of one speed; `known` are maneuvers that were best at other speeds.
 
-    Raises UsageError when nothing stays inside the envelope.
+    A maneuver that follows the motion is taken only where a list of its expected fins can be sent to a vehicle. Raises
+    UsageError when nothing stays inside the envelope.
     """
     judge = judge_of(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
     scored = _known_again(judge, known) if known else catalogue(judge, setting.effort)
@@ -56,17 +58,27 @@ def best_leg(setting: Setting, speed: float, known: Sequence[Candidate] = ()) ->
     scored.append(switching(judge, seeds, setting.effort, setting.seed))
     scored.sort(key=lambda s: s.cost)
     crowd = crowd_at(judge, setting)
-    finalists = [kept_inside(judge, setting, crowd, s.candidate) for s in scored[:FINALISTS]]
-    inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists if c is not None]
+    leg = _best_of(judge, setting, crowd, scored)
+    if not leg.flown_from_list_in(setting.envelope):
+        leg = _best_of(judge, setting, crowd, [s for s in scored if s.candidate.record.rule is None])
+    costs = {s.candidate.spec: float(np.exp(s.cost)) for s in scored[:6]}
+    return replace(leg, alternatives=costs)
+
+
+def _best_of(judge: Judge, setting: Setting, crowd: Crowd, scored: Sequence[Scored]) -> Leg:
+    """Return the leg of the best of some maneuvers, best first, at the angles at which it stays inside; raises UsageError."""
+    kept = (kept_inside(judge, setting, crowd, s.candidate) for s in scored)
+    finalists = islice((c for c in kept if c is not None), FINALISTS)
+    inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists]
     if not inside:
         raise UsageError(
-            f"no maneuver stays inside the envelope at {speed:g} m/s with a probability of {1 - setting.envelope.share:.0%}",
+            f"no maneuver stays inside the envelope at {judge.scene.speed:g} m/s with a probability of "
+            f"{1 - setting.envelope.share:.0%}",
             found=", ".join(f"{k} {v:.3g}" for k, v in setting.envelope.rooms().items()),
             hint="widen the envelope, or narrow the prior with a first model: `--model MODEL`",
         )
     best = surely_inside(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate)
-    costs = {s.candidate.spec: float(np.exp(s.cost)) for s in scored[:6]}
-    return replace(leg_of(judge, setting, best, crowd), alternatives=costs)
+    return leg_of(judge, setting, best, crowd)
 
 
 def crowd_at(judge: Judge, setting: Setting) -> Crowd:
@@ -82,8 +94,12 @@ def risk_of(judge: Judge, crowd: Crowd, candidate: Candidate) -> tuple[float, di
 
 def leg_of(judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | None = None, purpose: str = "parameters") -> Leg:
     """Return a candidate as a leg: expected errors beside those of the paper's pulses, excursions, risk."""
-    scene = judge.scene
-    risk, excursions = risk_of(judge, crowd or crowd_at(judge, setting), candidate)
+    scene, crowd = judge.scene, crowd or crowd_at(judge, setting)
+    risk, excursions = risk_of(judge, crowd, candidate)
+    nominal = _nominal(judge, candidate)
+    blind = float("nan")
+    if nominal.size:
+        blind = float(np.mean(fly_list(crowd, nominal, judge.envelope, judge.autopilot, judge.run_up).outside(judge.envelope)))
     turn = turn_back_s(scene.base.damping, scene.base.authority, judge.envelope.fin)
     return Leg(
         speed=scene.speed,
@@ -96,7 +112,8 @@ def leg_of(judge: Judge, setting: Setting, candidate: Candidate, crowd: Crowd | 
         excursions=excursions,
         break_probability=risk,
         purpose=purpose,
-        nominal=_nominal(judge, candidate),
+        nominal=nominal,
+        replay_risk=blind,
     )
 
 

@@ -11,11 +11,14 @@ from fieldsid.errors import UsageError
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.planning.build import Setting, leg_of
 from fieldsid.planning.candidate import Candidate
+from fieldsid.planning.envelope import MOST_TURNS
 from fieldsid.planning.judge import judge_of
-from fieldsid.planning.leg import Leg
+from fieldsid.planning.leg import CIRCLE, Leg
 
 SETTLED_TURN = 2.5 * np.pi
 """Heading (rad) to turn through: half a circle to settle, one to be measured on."""
+LARGEST_TURN = MOST_TURNS * 2.0 * np.pi
+"""Heading (rad) at which a circle is ended: one that is flown by the clock turns farther the stronger the fin is."""
 SLACK = 1.6
 LONGEST_S = 300.0
 
@@ -23,14 +26,14 @@ LONGEST_S = 300.0
 def circle_legs(setting: Setting, speeds: Sequence[float]) -> list[Leg]:
     """Return a circle at the fin limit to port and one to starboard at every speed.
 
-    The heading and track limits of the other maneuvers do not hold here: a circle leaves any of them; the area does.
-    Raises UsageError when a circle does not fit the area.
+    A circle turns through more than a whole turn: its heading has a limit of its own. All other limits hold.
+    Raises UsageError when a circle does not fit them.
     """
     return [leg for speed in speeds for leg in (_circle(setting, speed, 0.0), _circle(setting, speed, 1.0))]
 
 
 def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
-    free = replace(setting.envelope, heading=None, track=None)
+    free = replace(setting.envelope, heading=LARGEST_TURN)
     probe = judge_of(setting.model, speed, free, setting.window, {}, setting.run_up_s)
     rate = abs(probe.scene.base.authority) * free.fin / max(probe.scene.base.damping, 0.02)
     maneuver = pick_maneuver("turning_circle")
@@ -40,12 +43,28 @@ def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:
     around = setting.window
     window = replace(around, length=length + around.lead + around.recover)
     judge = judge_of(setting.model, speed, free, window, {}, setting.run_up_s)
-    leg = leg_of(judge, setting, Candidate(maneuver.name, maneuver.checked(values)), purpose="turn radius")
+    leg = leg_of(judge, setting, Candidate(maneuver.name, maneuver.checked(values)), purpose=CIRCLE)
+    leg = replace(leg, heading=LARGEST_TURN)
     if leg.break_probability > free.share:
-        need = {k: leg.excursions[k] for k in ("along", "across")}
-        raise UsageError(
-            f"a full-fin circle at {speed:g} m/s does not fit the envelope",
-            found=f"{leg.break_probability:.0%} leave it: {need['along']:.0f} m along, {need['across']:.0f} m across",
-            hint=f"give `--area {1.1 * need['along']:.0f}x{1.1 * need['across']:.0f}`, or leave `--radius` out",
-        )
+        raise _no_room(leg, setting)
     return leg
+
+
+def _no_room(leg: Leg, setting: Setting) -> UsageError:
+    """Return the error of a circle that leaves the envelope, with what would hold it."""
+    far, limits = leg.excursions, setting.envelope
+    wanted = []
+    if limits.area_length is not None:
+        wanted.append(f"`--area {max(1.1 * far['along'], limits.area_length):.0f}x{2.2 * far['across']:.0f}`")
+    if limits.area_length is not None and far["behind"] > 0.0:
+        wanted.append(f"`--run-up {setting.run_up_s + 1.1 * far['behind'] / leg.speed:.0f}`")
+    if limits.track is not None:
+        wanted.append(f"`--max-track {1.1 * far['track']:.0f}`")
+    return UsageError(
+        f"a full-fin circle at {leg.speed:g} m/s does not fit the envelope",
+        found=f"{leg.break_probability:.0%} leave it: {far['along']:.0f} m along, {far['across']:.0f} m to a side, "
+        f"{far['behind']:.0f} m behind the start, roll {far['roll']:.2g} rad",
+        hint=f"give {' and '.join(wanted)}, or leave `--radius` out"
+        if wanted
+        else "leave `--radius` out, or give a smaller `--fin-max`",
+    )

@@ -55,6 +55,8 @@ class Flights:
         broken = np.zeros(self.angle.shape[1])
         for name, room in envelope.rooms().items():
             broken = np.maximum(broken, self.excursions[name] > room)
+        if envelope.area_length is not None:
+            broken = np.maximum(broken, self.excursions["behind"] > 0.0)
         return broken
 
     def quantiles(self, share: float) -> dict[str, float]:
@@ -87,6 +89,14 @@ def fly_crowd(crowd: Crowd, candidate: Candidate, envelope: Envelope, autopilot:
         n = crowd.window.time.size
         angle, rate = flight.angle[:n], flight.rate[:n]
     return _measured(crowd, angle, rate, run_up_m)
+
+
+def fly_list(crowd: Crowd, fins: FloatArray, envelope: Envelope, autopilot: Autopilot, run_up_m: float) -> Flights:
+    """Return fins about trim, (n,) rad with NaN for the autopilot, flown blind by a crowd; the autopilot has what follows."""
+    asked = np.full(crowd.window.time.size, np.nan)
+    count = min(asked.size, fins.size)
+    asked[:count] = fins[:count]
+    return _measured(crowd, *_open_loop(crowd, asked, envelope, autopilot), run_up_m)
 
 
 def _open_loop(crowd: Crowd, asked: FloatArray, envelope: Envelope, autopilot: Autopilot) -> tuple[FloatArray, FloatArray]:
@@ -126,7 +136,8 @@ def _measured(crowd: Crowd, angle: FloatArray, rate: FloatArray, run_up_m: float
         "depth": none if yaw else off,
         "pitch": none if yaw else most,
         "roll": crowd.roll * speed * np.max(np.abs(rate), axis=0) / GRAVITY if yaw else none,
-        "along": run_up_m + np.ptp(along, axis=0),
-        "across": np.ptp(side, axis=0) if yaw else none,
+        "along": run_up_m + np.max(along, axis=0),
+        "behind": np.maximum(0.0, -run_up_m - np.min(along, axis=0)),
+        "across": off if yaw else none,
     }
     return Flights(crowd.window.time[: angle.shape[0]], angle, rate, along, side, excursions)

@@ -84,6 +84,7 @@ class _Arena:
     envelope: Envelope
     window: Window
     rounds: int
+    run_up: float
 
     @property
     def speed(self) -> float:
@@ -97,7 +98,7 @@ class _Arena:
         for rival in self.rivals:
             flights += flown_all([rival.scene], candidate, self.window, limits, pilot)
         for rival, flight in zip(self.rivals, flights, strict=True):
-            far = excursion_of(rival.scene.axis, flight, self.speed).over(self.envelope)
+            far = excursion_of(rival.scene.axis, flight, self.speed, run_up=self.run_up).over(self.envelope)
             if not np.isfinite(flight.angle).all() or used(far) > 1.0:
                 return None
         return flights
@@ -124,13 +125,15 @@ def separate(
     speeds: Sequence[float],
     rate_hz: float = 20.0,
     window_s: float = WINDOW_S,
+    run_up_s: float = 0.0,
+    candidates: Sequence[Candidate] | None = None,
     fast: bool = False,
 ) -> Separation:
     """Return the maneuver inside the envelope that tells rival models apart best, at the best of the speeds (m/s).
 
     fast: at most 10 Hz, the maneuvers the rivals' effects name as exciting them, no tuning, and the first that decides
-    beyond doubt is taken. Raises UsageError for fewer than two rivals, rivals of different axes,
-    or when no maneuver stays inside the envelope.
+    beyond doubt is taken. candidates: what to choose among, in place of the catalogue. Raises UsageError for fewer than two
+    rivals, rivals of different axes, or when no maneuver stays inside the envelope.
     """
     _check(models)
     if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
@@ -139,8 +142,9 @@ def separate(
     for speed in speeds:
         rivals = tuple(rival_of(scene_of(m, speed)) for m in models)
         rate = min(rate_hz, FAST_HZ) if fast else rate_hz
-        arena = _Arena(rivals, envelope, Window(window_s, rate_hz=rate), FAST_ROUNDS if fast else ROUNDS)
-        found = _at_speed(arena, fast=fast)
+        rounds = FAST_ROUNDS if fast else ROUNDS
+        arena = _Arena(rivals, envelope, Window(window_s, rate_hz=rate), rounds, run_up_s * speed)
+        found = _at_speed(arena, candidates, fast=fast)
         if found is not None and fast:
             found = replace(found, window=replace(found.window, rate_hz=rate_hz))
         if found is not None and (best is None or found.expected_log_odds > best.expected_log_odds):
@@ -148,10 +152,22 @@ def separate(
     if best is None:
         raise UsageError(
             "no maneuver of the catalogue stays inside the envelope for every rival",
-            found=", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()) or "no room",
-            hint="widen the envelope: leave `--max-heading` out, or give a larger `--area`",
+            found=f"at {', '.join(f'{u:g}' for u in speeds)} m/s; "
+            + (", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()) or "no room"),
+            hint="widen the envelope" + (": `--max-heading none` lets circles in" if envelope.heading is not None else ""),
         )
     return best
+
+
+def as_flown(found: Separation, models: Sequence[Model], envelope: Envelope, candidate: Candidate, run_up_s: float) -> Separation:
+    """Return what a separation is expected to show with another candidate, the one that is flown."""
+    rivals = tuple(rival_of(scene_of(m, found.speed)) for m in models)
+    arena = _Arena(rivals, envelope, found.window, ROUNDS, run_up_s * found.speed)
+    pairs = arena.pairs(candidate)
+    return replace(
+        found, maneuver=candidate.maneuver, parameters=candidate.parameters, pairs=pairs,
+        expected_log_odds=min(pairs.values(), default=0.0),
+    )  # fmt: skip
 
 
 def _check(models: Sequence[Model]) -> None:
@@ -161,13 +177,13 @@ def _check(models: Sequence[Model]) -> None:
         raise UsageError("the rivals are of different axes", found=", ".join(m.axis.value for m in models), hint="plan one axis")
 
 
-def _at_speed(arena: _Arena, *, fast: bool) -> Separation | None:
-    scored = _scored(arena, fast=fast)
+def _at_speed(arena: _Arena, candidates: Sequence[Candidate] | None, *, fast: bool) -> Separation | None:
+    scored = _scored(arena, entrants(arena.window, arena.envelope) if candidates is None else candidates, fast=fast)
     if not scored:
         return None
-    scored.sort(key=lambda s: -_worth(s[1]))
+    scored.sort(key=lambda s: -worth(s[1]))
     tuned = scored if fast else [_tuned(arena, *s) for s in scored[:TUNED]]
-    candidate, pairs = max(tuned, key=lambda s: _worth(s[1]))
+    candidate, pairs = max(tuned, key=lambda s: worth(s[1]))
     window = _shortened(arena.window, arena.responses(candidate))
     return Separation(
         candidate.maneuver, candidate.parameters, arena.speed, min(pairs.values()), pairs, window,
@@ -175,11 +191,11 @@ def _at_speed(arena: _Arena, *, fast: bool) -> Separation | None:
     )  # fmt: skip
 
 
-def _scored(arena: _Arena, *, fast: bool) -> list[tuple[Candidate, Mapping[str, float]]]:
-    """Return the entrants that stay inside the envelope, with the log odds of their pairs."""
+def _scored(arena: _Arena, candidates: Sequence[Candidate], *, fast: bool) -> list[tuple[Candidate, Mapping[str, float]]]:
+    """Return the candidates that stay inside the envelope, with the log odds of their pairs."""
     named = {m for r in arena.rivals for e in r.scene.effects for m in e.excited_by}
     scored: list[tuple[Candidate, Mapping[str, float]]] = []
-    for candidate in entrants(arena.window, arena.envelope):
+    for candidate in candidates:
         if fast and named and candidate.maneuver not in named:
             continue
         if pairs := arena.pairs(candidate):
@@ -189,7 +205,7 @@ def _scored(arena: _Arena, *, fast: bool) -> list[tuple[Candidate, Mapping[str, 
     return scored
 
 
-def _worth(pairs: Mapping[str, float]) -> float:
+def worth(pairs: Mapping[str, float]) -> float:
     """Return how much a maneuver decides: each pair counts until it is beyond doubt, a little more after that.
 
     A rival whose effect has been fitted to nothing is as good as the plain model, and no maneuver shows it to be the
@@ -230,7 +246,7 @@ def _tuned(arena: _Arena, candidate: Candidate, pairs: Mapping[str, float]) -> t
         for value in moves_of(parameter, candidate.parameters[parameter.name], arena.envelope.fin):
             trial = candidate.with_(**{parameter.name: value})
             found = arena.pairs(trial) if fits(trial, arena.window) else {}
-            if found and _worth(found) > _worth(pairs):
+            if found and worth(found) > worth(pairs):
                 candidate, pairs = trial, found
                 break
     return candidate, pairs

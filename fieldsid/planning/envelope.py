@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from fieldsid.angles import said
 from fieldsid.errors import UsageError
 from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers import Limits
@@ -16,6 +17,9 @@ from fieldsid.planning.loop import Response
 GRAVITY = 9.80665
 LARGEST_FIN = 0.7
 LARGEST_SPEED = 15.0
+MOST_TURNS = 4.0
+"""Turns that a deviation of heading may be: more was meant in degrees."""
+NOT_LIMITED = "NOT LIMITED"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +27,9 @@ class Envelope:
     """Limits about straight and level; None where there is none.
 
     heading, pitch, roll (rad) and track (m) are largest deviations to either side; `depth_low` and `depth_high` (m)
-    the band, entered at its middle; `area_length` along the leg and `area_width` across it (m). `fin` (rad) and
-    `fin_rate` (rad/s) bound every command. `share` is the accepted probability of leaving any of them.
+    the band, entered at its middle; `area_length` (m) along the leg from the start of its run-up, `area_width` (m) across it,
+    half to either side of its line. `fin` (rad) and `fin_rate` (rad/s) bound every command. `share` is the accepted
+    probability of leaving any of them.
     """
 
     fin: float
@@ -45,6 +50,7 @@ class Envelope:
         _at_most("fin", self.fin, LARGEST_FIN, "rad", "fin angle")
         for name in ("pitch", "roll"):
             _at_most(name, getattr(self, name), np.pi / 2, "rad", f"{name} limit")
+        _at_most("heading", self.heading, MOST_TURNS * 2 * np.pi, "rad", "heading limit")
         _at_most("share", self.share, 0.5, "", "accepted probability")
         low, high = self.depth_low, self.depth_high
         if low is not None and high is not None and not 0 <= low < high:
@@ -69,7 +75,8 @@ class Envelope:
         """Return the limit of every excursion that has one."""
         known = {
             "heading": self.heading, "track": self.track, "depth": self.depth_room(), "pitch": self.pitch,
-            "roll": self.roll, "along": self.area_length, "across": self.area_width,
+            "roll": self.roll, "along": self.area_length,
+            "across": None if self.area_width is None else 0.5 * self.area_width,
         }  # fmt: skip
         return {k: v for k, v in known.items() if v is not None}
 
@@ -81,7 +88,10 @@ class Envelope:
 
 @dataclass(frozen=True, slots=True)
 class Excursion:
-    """How far one flight went: rad and m, zero where the axis does not move it."""
+    """How far one flight went: rad and m, zero where the axis does not move it.
+
+    along is the farthest ahead of the start of the run-up, behind the farthest back of it, across the farthest to a side.
+    """
 
     heading: float
     track: float
@@ -89,11 +99,15 @@ class Excursion:
     pitch: float
     roll: float
     along: float
+    behind: float
     across: float
 
     def over(self, envelope: Envelope) -> dict[str, float]:
-        """Return the share of its limit that each limited excursion uses, 1 at the limit."""
-        return {k: getattr(self, k) / room for k, room in envelope.rooms().items()}
+        """Return the share of its limit that each limited excursion uses, 1 at the limit: the area begins at the start."""
+        over = {k: getattr(self, k) / room for k, room in envelope.rooms().items()}
+        if envelope.area_length is not None and self.behind > 0.0:
+            over["along"] = max(over["along"], 1.0 + self.behind / envelope.area_length)
+        return over
 
 
 def track_of(axis: Axis, response: Response, speed: float) -> tuple[FloatArray, FloatArray]:
@@ -112,12 +126,12 @@ def excursion_of(axis: Axis, response: Response, speed: float, *, run_up: float 
     """
     along, side = track_of(axis, response, speed)
     angle = float(np.max(np.abs(response.angle)))
-    length = run_up + float(np.max(along) - np.min(along))
+    ahead, behind = run_up + float(np.max(along)), max(0.0, -run_up - float(np.min(along)))
+    off = float(np.max(np.abs(side)))
     if axis is Axis.PITCH:
-        return Excursion(0.0, 0.0, float(np.max(np.abs(side))), angle, 0.0, length, 0.0)
+        return Excursion(0.0, 0.0, off, angle, 0.0, ahead, behind, 0.0)
     roll = roll_gain * speed * float(np.max(np.abs(response.rate))) / GRAVITY
-    sideways = float(np.max(np.abs(side)))
-    return Excursion(angle, sideways, 0.0, 0.0, roll, length, float(np.max(side) - np.min(side)))
+    return Excursion(angle, off, 0.0, 0.0, roll, ahead, behind, off)
 
 
 def check_speeds(speeds: tuple[float, ...], low: float | None, high: float | None) -> None:
@@ -165,7 +179,8 @@ def _positive(name: str, value: float | None) -> None:
 
 def _at_most(name: str, value: float | None, most: float, unit: str, says: str) -> None:
     if value is not None and value > most:
-        degrees = f"write `{value:g}deg` if it is in degrees" if unit == "rad" else f"at most {most:g}"
+        meant = unit == "rad" and value > 2.0 * most and np.radians(value) <= most
+        degrees = f"write `{value:g}deg` if it is in degrees" if meant else f"at most {most:.4g} {unit}".rstrip()
         raise UsageError(
             f"the {says} {value:g} {unit}".rstrip() + " cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=degrees
         )
@@ -174,3 +189,23 @@ def _at_most(name: str, value: float | None, most: float, unit: str, says: str) 
 def used(over: Mapping[str, float]) -> float:
     """Return the largest share of a limit that is used, 0 where there is no limit."""
     return max(over.values(), default=0.0)
+
+
+def limits_said(envelope: Envelope) -> dict[str, str]:
+    """Return every limit in words, in both units, NOT_LIMITED where there is none; the depth is about the middle of its band."""
+    low, high, length, width = envelope.depth_low, envelope.depth_high, envelope.area_length, envelope.area_width
+    fin_rate = envelope.fin_rate if np.isfinite(envelope.fin_rate) else None
+
+    def angle(value: float | None, per: str = "") -> str:
+        return NOT_LIMITED if value is None else f"{said(value)}{per}"
+
+    return {
+        "fin": angle(envelope.fin),
+        "fin rate": angle(fin_rate, " per s"),
+        "heading": angle(envelope.heading),
+        "track": NOT_LIMITED if envelope.track is None else f"{envelope.track:g} m to either side",
+        "pitch": angle(envelope.pitch),
+        "roll": angle(envelope.roll),
+        "depth": NOT_LIMITED if low is None or high is None else f"{low:g} to {high:g} m",
+        "area": NOT_LIMITED if length is None or width is None else f"{length:g} m along, {0.5 * width:g} m to either side",
+    }

@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
+from fieldsid.display import Brief
 from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers import Autopilot
 from fieldsid.planning.candidate import Candidate, Window, asked_of
 from fieldsid.planning.envelope import Envelope
+from fieldsid.rounding import number
 
+CIRCLE = "turn radius"
+"""The purpose of a leg that is a circle."""
 TURN_LAG = 2.31
 """Time constants a turn needs to settle: ln 10 (the paper's u-turn)."""
 
 
+LARGEST_SHARE = 0.5
+"""Share of a value that its standard error may be before the value may as well be zero."""
+
+
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What a parameter will be known to: value, standard error, and the error 5 of 6 draws of the prior stay below."""
+    """What a parameter will be known to: value, standard error, and the error 5 of 6 draws of the prior stay below.
+
+    `relative` is the error over what it is measured against: the value or, where that may be zero, another scale (prior.py).
+    """
 
     value: float
     std_error: float
@@ -33,12 +44,20 @@ class Expected:
         return Expected(self.value, self.std_error / root, self.std_error_high / root, self.relative / root, self.baseline)
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
+def error_in_words(value: float, std_error: float, relative: float) -> str:
+    """Return a standard error in per cent of the value it is measured against, else, and where that may be zero, as it is."""
+    of_value = np.isclose(relative * abs(value), std_error, rtol=1e-6, atol=0.0)
+    return f"{100.0 * relative:.1f} %" if of_value and relative < LARGEST_SHARE else f"+/- {number(std_error, 2)}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Leg(Brief):
     """One maneuver at one speed (m/s), flown `passes` times: run-up, window, turn back.
 
     `expected` is for all passes together. `excursions` are 95 % quantiles over the prior (rad, m).
     `nominal` (n,) is the fin about trim in rad that a rule is expected to ask for, NaN where the autopilot steers.
+    `replay_risk` is the probability that they, flown blind, leave the envelope.
+    `heading` (rad) is a limit of its own, in place of the plan's.
     """
 
     speed: float
@@ -52,6 +71,8 @@ class Leg:
     break_probability: float
     passes: int = 1
     purpose: str = "parameters"
+    heading: float | None = None
+    replay_risk: float = float("nan")
     nominal: FloatArray = field(default_factory=lambda: np.zeros(0))
     alternatives: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
@@ -69,6 +90,14 @@ class Leg:
     def distance_m(self) -> float:
         """Metres through the water of all passes."""
         return self.duration_s * self.speed
+
+    def envelope_in(self, envelope: Envelope) -> Envelope:
+        """Return the limits that hold on this leg of a plan with an envelope."""
+        return envelope if self.heading is None else replace(envelope, heading=self.heading)
+
+    def flown_from_list_in(self, envelope: Envelope) -> bool:
+        """Whether a list of fins may be sent for it: it is one, or that of its rule keeps inside as often as is asked."""
+        return self.open_loop or self.replay_risk <= envelope.share
 
     @property
     def open_loop(self) -> bool:

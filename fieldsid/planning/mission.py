@@ -14,8 +14,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.models.axis import NAMES
-from fieldsid.planning.abort import Abort, aborts_of
-from fieldsid.planning.leg import Leg, commands_of
+from fieldsid.planning import helm
+from fieldsid.planning.abort import aborts_of
+from fieldsid.planning.envelope import NOT_LIMITED, limits_said
+from fieldsid.planning.leg import CIRCLE, Leg, commands_of
 from fieldsid.planning.plan import Plan
 from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
@@ -55,7 +57,11 @@ def steps_of(plan: Plan, leg: Leg) -> tuple[Step, ...]:
 
 
 def render(plan: Plan, leg: Leg, style: str) -> str:
-    """Return one leg as text in a style; raises UsageError for an unknown one, ArtifactError for a broken template."""
+    """Return one leg as text in a style.
+
+    Raises UsageError for an unknown style or a leg that cannot be flown from a list, ArtifactError for a broken template.
+    """
+    refuse_blind(plan, leg)
     if style not in styles():
         raise UsageError(f"there is no mission style {style!r}", found=", ".join(styles()) or "none", hint=near(style, styles()))
     try:
@@ -67,6 +73,24 @@ def render(plan: Plan, leg: Leg, style: str) -> str:
     return text.rstrip() + "\n"
 
 
+def refuse_blind(plan: Plan, leg: Leg) -> None:
+    """Raise UsageError for a leg that follows the motion and whose expected fins, flown blind, would leave the envelope."""
+    if leg.flown_from_list_in(plan.envelope):
+        return
+    raise UsageError(
+        f"`{leg.candidate.maneuver}` at {leg.speed:g} m/s follows the motion: no list of fins can be sent in its place",
+        found=f"its expected fins, flown blind, leave the envelope {leg.replay_risk:.0%} of the time, accepted is "
+        f"{plan.envelope.share:.0%}",
+        hint=instead(leg),
+    )
+
+
+def instead(leg: Leg) -> str:
+    """Return what to do where no list of fins can be sent: a circle has no kin without a rule, all others have."""
+    rule = "fly it by the vehicle's own rule"
+    return rule if leg.purpose == CIRCLE else f"{rule}, or plan with `--open-loop`"
+
+
 @cache
 def _environment() -> Environment:
     loader = FileSystemLoader(template_path(FOLDER))
@@ -75,7 +99,7 @@ def _environment() -> Environment:
 
 
 def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
-    names = NAMES[plan.axis]
+    names, aborts = NAMES[plan.axis], aborts_of(leg, plan.envelope)
     return {
         "tool": f"fieldsid {__version__}",
         "plan": plan,
@@ -84,15 +108,23 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "fin": names.fin.removesuffix("_rad"),
         "angle": names.angle,
         "vehicle": "".join(c for c in plan.vehicle if c.isprintable())[:80],
-        "rule": None if leg.open_loop else leg.candidate.record.says,
+        "rule": None if leg.open_loop else _blind(leg),
         "spec": leg.candidate.spec,
-        "steps": steps_of(plan, leg) if leg.open_loop else (),
-        "aborts": aborts_of(plan.axis, leg, plan.envelope),
-        "limits": plan.envelope,
+        "steps": steps_of(plan, leg),
+        "aborts": aborts,
+        "limits": leg.envelope_in(plan.envelope),
+        "unlimited": [n for n, words in limits_said(leg.envelope_in(plan.envelope)).items() if words == NOT_LIMITED],
         "degrees": math.degrees,
-        "limit_of": _limit_of(aborts_of(plan.axis, leg, plan.envelope)),
+        "limit_of": {f"{a.signal}.{a.kind}": a.limit for a in aborts},
+        "headings": helm.headings(leg, aborts, plan.course),
+        "needed": helm.needed(leg, aborts, plan.course),
+        "polygon": helm.polygon(leg, aborts, plan.course),
     }
 
 
-def _limit_of(aborts: tuple[Abort, ...]) -> dict[str, float]:
-    return {f"{a.signal}.{a.kind}": a.limit for a in aborts}
+def _blind(leg: Leg) -> str:
+    """Say what the commands of a rule are: those it is expected to ask for, flown whatever the vehicle does."""
+    return (
+        f"The maneuver is a rule, {leg.candidate.record.says}: these are the fins it is expected to ask for, flown blind; "
+        f"{leg.replay_risk:.1%} of the vehicles that are thought possible leave the limits so."
+    )

@@ -13,7 +13,7 @@ from fieldsid.models.model import Model
 from fieldsid.planning.candidate import flown
 from fieldsid.planning.crowd import crowd_of, fly_crowd
 from fieldsid.planning.envelope import Envelope, track_of
-from fieldsid.planning.leg import Leg, commands_of
+from fieldsid.planning.leg import Leg, commands_of, error_in_words
 from fieldsid.planning.plan import Plan
 from fieldsid.planning.scene import scene_of
 
@@ -26,7 +26,8 @@ TRACKS = 25
 class LegView:
     """One leg over time (n,) s: fin (rad), where the autopilot steers, angle (rad) and its quantiles (4, n).
 
-    `along` and `across` (n,) are the track on the prior's mean, `tracks` (2, m, n) those of some draws, in m.
+    `along` and `across` (n,) are the track on the prior's mean, `tracks` (2, m, n) those of some draws, in m; `errors`
+    the parameters' expected standard errors in words.
     """
 
     axis: Axis
@@ -40,8 +41,7 @@ class LegView:
     across: FloatArray
     tracks: FloatArray
     envelope: Envelope
-    bounded: bool
-    errors: Mapping[str, tuple[float, float]]
+    errors: Mapping[str, str]
 
 
 def view_of(plan: Plan, leg: Leg, model: Model) -> LegView:
@@ -55,8 +55,8 @@ def view_of(plan: Plan, leg: Leg, model: Model) -> LegView:
     along, across = track_of(plan.axis, mean, leg.speed)
     tracks = np.stack([flights.along[:n, :TRACKS].T, flights.side[:n, :TRACKS].T])
     shown = np.where(steered[:n] > 0, mean.command[:n], fin[:n])
+    errors = {k: error_in_words(e.value, e.std_error, e.relative) for k, e in leg.expected.items() if np.isfinite(e.std_error)}
     return LegView(
         plan.axis, f"{leg.speed:g} m/s  {leg.candidate.maneuver}", mean.time[:n], shown, steered[:n], mean.angle[:n],
-        np.quantile(flights.angle[:n], LEVELS, axis=1), along[:n], across[:n], tracks, envelope,
-        leg.purpose != "turn radius", {k: (e.relative, e.baseline / e.std_error) for k, e in leg.expected.items()},
+        np.quantile(flights.angle[:n], LEVELS, axis=1), along[:n], across[:n], tracks, leg.envelope_in(envelope), errors,
     )  # fmt: skip

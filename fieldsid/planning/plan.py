@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fieldsid.display import Brief
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import NAMES, Axis
@@ -41,10 +42,11 @@ class Request:
     vehicle: str = "vehicle"
     slowest: float | None = None
     fastest: float | None = None
+    course: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+@dataclass(frozen=True, slots=True, repr=False)
+class Plan(Brief):
     """Legs in the order they are flown, and all that is needed to fly them within the limits again."""
 
     axis: Axis
@@ -54,6 +56,8 @@ class Plan:
     legs: tuple[Leg, ...]
     want: Mapping[str, float]
     seed: int = 1
+    course: float | None = None
+    """Compass course of the first pass of every leg in rad, None where nobody has said."""
 
     @property
     def minutes(self) -> float:
@@ -78,16 +82,18 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
     a prior that is unstable.
     """
     check_speeds(request.speeds, request.slowest, request.fastest)
-    _check_budget(request)
+    check_budget(request)
     check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
     checked_prior(model, request.axis, request.speeds)
     legs = _legs(model, request, step)
     legs = [_repeated(leg, request.want) for leg in legs]
     if request.radius:
-        legs += circle_legs(_setting(model, request, max(request.speeds)), request.speeds)
-    _check_minutes(legs, request)
+        legs += circle_legs(setting_at(model, request, max(request.speeds)), request.speeds)
+    check_minutes(legs, request)
     name = str(model.info.get("name", "")) or model.method or "model"
-    return Plan(request.axis, request.vehicle, name, request.envelope, tuple(legs), dict(request.want), request.seed)
+    return Plan(
+        request.axis, request.vehicle, name, request.envelope, tuple(legs), dict(request.want), request.seed, request.course
+    )
 
 
 def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]:
@@ -103,7 +109,7 @@ def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]
         speed = request.speeds[i]
         factor = damping[request.speeds[order[0]]] / damping[speed]
         known = [*best, *(c.stretched(factor) for c in best if factor > 0)]
-        made[i] = best_leg(_setting(model, request, speed), speed, known)
+        made[i] = best_leg(setting_at(model, request, speed), speed, known)
         step()
         best = best or _finalists(made[i])
     return [made[i] for i in range(len(request.speeds))]
@@ -114,7 +120,7 @@ def _finalists(leg: Leg) -> list[Candidate]:
     return [leg.candidate, *(Candidate(m.name, p) for m, p in parsed[:4])]
 
 
-def _setting(model: Model, request: Request, speed: float) -> Setting:
+def setting_at(model: Model, request: Request, speed: float) -> Setting:
     """Return the setting at a speed, its window shortened where the area is."""
     window = request.window
     if request.envelope.area_length is not None:
@@ -143,7 +149,8 @@ def with_passes(leg: Leg, passes: int) -> Leg:
     return replace(leg, passes=passes, expected={n: e.over(passes) for n, e in leg.expected.items()})
 
 
-def _check_budget(request: Request) -> None:
+def check_budget(request: Request) -> None:
+    """Raise UsageError for a budget that cannot be meant, or circles in pitch."""
     if request.minutes is not None and not 0 < request.minutes <= 1440:
         raise UsageError(
             f"a budget of {request.minutes:g} minutes cannot be meant",
@@ -156,7 +163,7 @@ def _check_budget(request: Request) -> None:
         )
 
 
-def _check_minutes(legs: list[Leg], request: Request) -> None:
+def check_minutes(legs: list[Leg], request: Request) -> None:
     """Raise UsageError when the legs take longer than the budget, with the wish that the budget would buy."""
     total = sum(leg.duration_s for leg in legs) / 60.0
     if request.minutes is None or total <= request.minutes:

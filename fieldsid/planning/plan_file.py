@@ -16,7 +16,7 @@ from fieldsid.maneuvers import Autopilot, pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.planning.abort import aborts_of
 from fieldsid.planning.candidate import Candidate, Window, fits
-from fieldsid.planning.envelope import LARGEST_SPEED, Envelope
+from fieldsid.planning.envelope import LARGEST_SPEED, Envelope, limits_said
 from fieldsid.planning.leg import Expected, Leg
 from fieldsid.planning.plan import MOST_PASSES, Plan
 
@@ -37,11 +37,13 @@ def plan_body(plan: Plan) -> dict[str, Any]:
         "vehicle": plan.vehicle,
         "prior": plan.prior,
         "seed": plan.seed,
+        "course_rad": plan.course,
         "want": dict(plan.want),
         "minutes": plan.minutes,
         "metres": plan.metres,
         "break_probability": plan.break_probability,
         "envelope": plan.envelope.plain(),
+        "limits": limits_said(plan.envelope),
         "legs": [_leg_body(plan, leg) for leg in plan.legs],
     }
     out: dict[str, Any] = plain(body)
@@ -65,9 +67,11 @@ def _leg_body(plan: Plan, leg: Leg) -> dict[str, Any]:
         "expected": {n: {f: getattr(e, f) for f in Expected.__dataclass_fields__} for n, e in leg.expected.items()},
         "excursions": dict(leg.excursions),
         "break_probability": leg.break_probability,
-        "abort": [asdict(a) for a in aborts_of(plan.axis, leg, plan.envelope)],
+        "heading_limit_rad": leg.heading,
+        "abort": [asdict(a) for a in aborts_of(leg, plan.envelope)],
     }
     if not leg.open_loop:
+        body["replay_break_probability"] = leg.replay_risk
         body["expected_fin_rad"] = [None if math.isnan(v) else round(v, 5) for v in leg.nominal.tolist()]
     return body
 
@@ -103,6 +107,7 @@ def _plan_of(body: Mapping[str, Any]) -> Plan:
         legs=tuple(_leg_of(leg, envelope) for leg in legs),
         want={str(k): _within(v, f"want {k}", 0.0, 1.0) for k, v in body["want"].items()},
         seed=int(body["seed"]),
+        course=None if body.get("course_rad") is None else _within(body["course_rad"], "course_rad", 0.0, 2.0 * math.pi),
     )
 
 
@@ -133,6 +138,10 @@ def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
         break_probability=_within(body["break_probability"], "break_probability", 0.0, 1.0),
         passes=round(_within(body["passes"], "passes", 1, MOST_PASSES)),
         purpose=str(body["purpose"]),
+        heading=None
+        if body["heading_limit_rad"] is None
+        else _within(body["heading_limit_rad"], "heading_limit_rad", 1e-3, 30.0),
+        replay_risk=_risk(body.get("replay_break_probability")),
         nominal=np.clip([_fin(v) for v in body.get("expected_fin_rad", [])], -envelope.fin, envelope.fin),
     )
 
@@ -150,6 +159,10 @@ def _check_fins(candidate: Candidate, envelope: Envelope) -> None:
 
 def _expected(body: Mapping[str, Any]) -> Expected:
     return Expected(**{f: math.nan if body[f] is None else float(body[f]) for f in Expected.__dataclass_fields__})
+
+
+def _risk(value: Any) -> float:
+    return math.nan if value is None else _within(value, "replay_break_probability", 0.0, 1.0)
 
 
 def _fin(value: Any) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from fieldsid.artifacts import load_record, read_yaml
 from fieldsid.effects import pick_effect
 from fieldsid.errors import ArtifactError
+from fieldsid.logs.mistaken import unless_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise, load_model
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
@@ -23,7 +24,8 @@ KIND = "fieldsid/prior"
 
 def load_believed(path: Path) -> Model:
     """Read a prior, or an identified model, as what is believed before a dive; raises ArtifactError."""
-    schema = str(read_yaml(path).get("schema", ""))
+    with unless_log(path, "a model or a prior"):
+        schema = str(read_yaml(path).get("schema", ""))
     return load_prior(path) if schema.startswith(f"{KIND}/") else load_model(path)
 
 

@@ -1,4 +1,4 @@
-"""Numbers as a user types them: angles in rad or like `20deg`, an area like `200x60`, a band like `1:5`, lists of speeds."""
+"""Numbers as a user types them: an area like `200x60`, a band like `1:5`, lists of speeds; angles are read in `angles.py`."""
 
 from __future__ import annotations
 
@@ -9,15 +9,6 @@ import numpy as np
 from fieldsid.errors import UsageError
 
 MOST_SPEEDS = 50
-
-
-def parse_angle(text: str | None, option: str) -> float | None:
-    """Read an angle in rad, or in degrees like `20deg`; raises UsageError."""
-    if text is None:
-        return None
-    word = text.strip()
-    value = _number(word.removesuffix("deg"), option, text, "20deg")
-    return math.radians(value) if word.endswith("deg") else value
 
 
 def parse_area(text: str | None) -> tuple[float, float] | None:

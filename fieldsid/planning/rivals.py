@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import load_record
-from fieldsid.effects import pick_effect
+from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.logs.mistaken import unless_log
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Coefficient
+from fieldsid.models.effect import Coefficient, definitions_of, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 
@@ -46,7 +47,8 @@ def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
 
     Raises ArtifactError when the file is not a complete diagnosis, UsageError when fewer than two rivals are left.
     """
-    body = load_record(path, KIND)
+    with unless_log(path, "a diagnosis"):
+        body = load_record(path, KIND)
     try:
         axis = Axis(body["axis"])
         candidates = sorted(body["candidates"], key=lambda c: -float(c["probability"]))
@@ -100,14 +102,20 @@ def _effects(name: str) -> tuple[str, ...]:
 
 
 def _with(model: Model, effects: tuple[str, ...]) -> Model:
-    for name in effects:
-        effect = pick_effect(name)
+    held = {name: effect_held(name, model.own) for name in model.effects}
+    added = {name: pick_effect(name) for name in effects if name not in held}
+    for name, effect in added.items():
+        refuse_clash(effect, held.values())
         if model.axis not in effect.axes:
             raise UsageError(
                 f"effect `{name}` does not act on the {model.axis.value} axis",
                 found=", ".join(a.value for a in effect.axes),
                 hint=f"use `--axis {effect.axes[0].value}`",
             )
-    added = tuple(e for e in effects if e not in model.effects)
-    values = {c.name: typical(c) for e in added for c in pick_effect(e).shared}
-    return replace(model, effects=(*model.effects, *added), values={**values, **model.values})
+    values = {c.name: typical(c) for e in added.values() for c in e.shared}
+    return replace(
+        model,
+        effects=(*model.effects, *added),
+        values={**values, **model.values},
+        own={**model.own, **definitions_of(added.values())},
+    )

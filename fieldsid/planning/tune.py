@@ -187,7 +187,7 @@ def _started(maneuver: Maneuver, judge: Judge) -> Candidate | None:
             whole = next(p.whole for p in maneuver.parameters if p.name == name)
             value = candidate.parameters[name]
             lower = value - 1.0 if whole else value / STRETCH if value > 0.1 else 0.0
-            if lower < low:
+            if lower < low or lower >= value:
                 break
             candidate = candidate.with_(**{name: lower})
     return candidate if fits(candidate, judge.window) else None

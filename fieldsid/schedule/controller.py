@@ -39,7 +39,7 @@ class Gains:
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
-        "p": "proportional, kp = a^2 / (4 zeta^2 b): the paper's",
+        "p": "proportional, kp = a^2 / (4 zeta^2 b)",
         "pd": "proportional and rate, poles at a chosen damping and bandwidth",
         "pi": "proportional and integral: no steady error without knowing the trim",
         "pid": "all three",

@@ -8,7 +8,7 @@ found as the largest gain whose poles keep that damping, which is the same numbe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -24,6 +24,8 @@ INTEGRAL_SHARE = 0.1
 """Integral corner over the proportional loop's crossover: a tenth costs six degrees of phase."""
 SLOWER = 0.93
 SLOWEST_ROUNDS = 160
+PROPORTIONAL = ("p", "pi")
+Trial = Callable[[float], Gains]
 DEPTH_SEPARATION = 5.0
 """How much slower the depth loop is than the pitch loop under it."""
 
@@ -55,28 +57,32 @@ def check_wish(wish: Wish) -> None:
     if wish.kind not in KINDS:
         raise UsageError(f"there is no controller {wish.kind!r}", found=", ".join(KINDS), hint=near(wish.kind, list(KINDS)))
     if not 0.1 <= wish.damping <= 3.0:
-        raise UsageError("the damping ratio must lie in 0.1 .. 3", found=f"{wish.damping:g}", hint="0.7 overshoots by 5 %")
+        raise UsageError(
+            "the damping ratio must lie in 0.1 .. 3", found=f"{wish.damping:g}", hint="`--damping 0.7` overshoots by 5 %"
+        )
     if not 10.0 <= wish.phase_margin_deg <= 80.0:
-        raise UsageError("the phase margin must lie in 10 .. 80 deg", found=f"{wish.phase_margin_deg:g}", hint="45 is usual")
+        hint = "`--phase-margin 45` is usual"
+        raise UsageError("the phase margin must lie in 10 .. 80 deg", found=f"{wish.phase_margin_deg:g}", hint=hint)
 
 
 def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
     """Return the gains of one speed; raises ModelError when no gain keeps the loop damped."""
-    one = plant.one()
-    # the loop is designed at zero trim; `trial` maps a speed of the loop (share of the wished) to gains
+    one = plant.one()  # the loop is designed at zero trim
+    if wish.kind in PROPORTIONAL and _slow_damping(one) <= 0:
+        raise ModelError(
+            f"the plant is unstable at {plant.speed:.3g} m/s, and a proportional gain alone cannot hold it",
+            found=f"damping {_slow_damping(one):.3g} 1/s",
+            hint=_remedy(one, wish, fin_limit),
+        )
     trial = _TRIALS[wish.kind](one, wish, fin_limit)
-    factor = 1.0
-    for _ in range(SLOWEST_ROUNDS):
-        gains = trial(factor)
-        if _good(one, gains, wish):
-            break
-        factor *= SLOWER
-    else:
+    factor = _fastest(one, trial, wish)
+    if factor is None:
         raise ModelError(
             f"no {wish.kind} gain keeps damping {wish.damping:g} and {wish.phase_margin_deg:g} deg at {plant.speed:.3g} m/s",
             found=f"damping {one.damping[0]:.3g} 1/s, fin lag {one.lag[0]:.3g} s, delay {one.delay[0]:.3g} s",
-            hint="take a controller with rate feedback, `--controller pd`, or a lower `--damping`",
+            hint=_remedy(one, wish, fin_limit),
         )
+    gains = trial(factor)
     if factor < 1.0:
         factor = _refined(one, trial, wish, factor)
         gains = trial(factor)
@@ -84,6 +90,27 @@ def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
     authority = _static(one)
     reference = float(one.stiffness[0]) / authority
     return Designed(gains, crossover, factor, reference, crossover / (DEPTH_SEPARATION * plant.speed))
+
+
+def _fastest(plant: LinearPlant, trial: Trial, wish: Wish) -> float | None:
+    """Return the share of the wished speed of the loop that serves, found by slowing it; None where none does."""
+    factors = SLOWER ** np.arange(SLOWEST_ROUNDS)
+    return next((float(f) for f in factors if _good(plant, trial(float(f)), wish)), None)
+
+
+def _remedy(plant: LinearPlant, wish: Wish, fin_limit: float) -> str:
+    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does."""
+    others = {
+        **{f"--controller {kind}": replace(wish, kind=kind) for kind in ("pd", "pid", "lqr") if kind != wish.kind},
+        **{f"--damping {d:g}": replace(wish, damping=d) for d in (0.5, 0.3) if d < wish.damping},
+        **{f"--phase-margin {p:g}": replace(wish, phase_margin_deg=p) for p in (30.0, 20.0) if p < wish.phase_margin_deg},
+    }
+    for option, other in others.items():
+        if other.kind in PROPORTIONAL and _slow_damping(plant) <= 0:
+            continue
+        if _fastest(plant, _TRIALS[other.kind](plant, other, fin_limit), other) is not None:
+            return f"at this speed there is one with `{option}`"
+    return ""
 
 
 def _good(plant: LinearPlant, gains: Gains, wish: Wish) -> bool:
@@ -100,7 +127,7 @@ def _phase(plant: LinearPlant, gains: Gains) -> float:
     return float(margins(plant, gains).phase_deg[0])
 
 
-def _refined(plant: LinearPlant, trial: Callable[[float], Gains], wish: Wish, good: float) -> float:
+def _refined(plant: LinearPlant, trial: Trial, wish: Wish, good: float) -> float:
     """Return the fastest loop between a good factor and the last bad one, by halving."""
     bad = good / SLOWER
     for _ in range(20):
@@ -118,21 +145,15 @@ def _slow_damping(plant: LinearPlant) -> float:
     return float(plant.damping[0] + plant.cross_rate[0] / plant.cross_damping[0])
 
 
-def _proportional(plant: LinearPlant, wish: Wish, fin_limit: float) -> Callable[[float], Gains]:
+def _proportional(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
     a, k, b = _slow_damping(plant), float(plant.stiffness[0]), _static(plant)
-    if a <= 0:
-        raise ModelError(
-            f"the plant is unstable at {plant.speed:.3g} m/s, and a proportional gain alone cannot hold it",
-            found=f"damping {a:.3g} 1/s",
-            hint="take rate feedback: `--controller pd`",
-        )
     wished = (a * a / (4.0 * wish.damping**2) - k) / b
     if k > 0 and wished * b <= 0:
         wished = 0.5 * k / b  # stiff already beyond the wished damping: any gain lowers it, a modest one is left to the margins
     return lambda factor: Gains(wished * factor)
 
 
-def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> Callable[[float], Gains]:
+def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
     a, k, b = _slow_damping(plant), float(plant.stiffness[0]), _static(plant)
     # full fin at the largest error: faster would only saturate
     fastest = np.sqrt(max(k, 0.0) + abs(b) * fin_limit / wish.largest_error)
@@ -145,7 +166,7 @@ def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> Callable[[float],
     return gains
 
 
-def _with_integral(trial: Callable[[float], Gains], plant: LinearPlant) -> Callable[[float], Gains]:
+def _with_integral(trial: Trial, plant: LinearPlant) -> Trial:
     def gains(factor: float) -> Gains:
         base = trial(factor)
         crossover = float(np.nan_to_num(margins(plant, base).crossover[0]))
@@ -154,7 +175,7 @@ def _with_integral(trial: Callable[[float], Gains], plant: LinearPlant) -> Calla
     return gains
 
 
-def _quadratic(plant: LinearPlant, wish: Wish, fin_limit: float) -> Callable[[float], Gains]:
+def _quadratic(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
     a, k, b = _slow_damping(plant), float(plant.stiffness[0]), _static(plant)
     system, drive = np.array([[0.0, 1.0], [-k, -a]]), np.array([[0.0], [b]])
 
@@ -167,7 +188,7 @@ def _quadratic(plant: LinearPlant, wish: Wish, fin_limit: float) -> Callable[[fl
     return gains
 
 
-_TRIALS: Mapping[str, Callable[[LinearPlant, Wish, float], Callable[[float], Gains]]] = MappingProxyType(
+_TRIALS: Mapping[str, Callable[[LinearPlant, Wish, float], Trial]] = MappingProxyType(
     {
         "p": _proportional,
         "pd": _rate,

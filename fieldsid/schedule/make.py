@@ -14,8 +14,9 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import Wish, check_wish, design_gains
 from fieldsid.schedule.margins import margins
-from fieldsid.schedule.plant import FinLimits, LinearPlant, plants_at
+from fieldsid.schedule.plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.record import Row, Schedule
+from fieldsid.turning.remedies import in_radians, wider_fin
 from fieldsid.turning.source import Source
 
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
@@ -46,7 +47,9 @@ def design_schedule(
     if depth and source.axis is not Axis.PITCH:
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
     if not 0.0 < fin_limit <= 1.5708:
-        raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint="for 15 deg: `--fin-limit 0.26`")
+        hint = in_radians("--fin-limit", fin_limit)
+        raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
+    _refuse_offsets(source, knots, fin_limit, limits)
     rows = tuple(_row(source, speed, fin_limit, wish, limits, depth=depth) for speed in knots)
     return Schedule(
         axis=source.axis,
@@ -55,8 +58,9 @@ def design_schedule(
         phase_margin_deg=wish.phase_margin_deg,
         depth=depth,
         rows=rows,
-        actuator=_actuator(source, limits),
+        actuator=actuator_of(source, limits),
         provenance=_provenance(source, wish),
+        stated=limits.record(),
     )
 
 
@@ -78,7 +82,6 @@ def _row(source: Source, speed: float, fin_limit: float, wish: Wish, limits: Fin
         reference += share * designed.reference_gain
         depth_gain += share * designed.depth_gain
         slowed = min(slowed, designed.slowed)
-    _refuse_offset(forward, fin_limit, speed, source.axis)
     worst = [_margins_at(plant, gains) for _, plant, _ in made]
     phase, gain, delay = (min(w[i] for w in worst) for i in range(3))
     return Row(
@@ -91,24 +94,27 @@ def _margins_at(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
     return margins(plant.one(), gains).worst()
 
 
-def _refuse_offset(forward: float, fin_limit: float, speed: float, axis: Axis) -> None:
-    if abs(forward) < fin_limit:
+def _refuse_offsets(source: Source, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
+    """Refuse a fin limit below the offset, at the speed where it is worst."""
+    plants = {speed: plants_at(source, speed, limits, 1, 0) for speed in knots}
+    offsets = {speed: sum(share * float(plant.offset[0]) for plant, share in at) for speed, at in plants.items()}
+    speed = max(offsets, key=lambda s: abs(offsets[s]))
+    if abs(offsets[speed]) < fin_limit:
         return
     raise UsageError(
-        f"the fin limit is below the offset at {speed:.3g} m/s: holding a straight run would take the whole {FIN[axis]}",
-        found=f"limit {fin_limit:.4g} rad, offset {NAMES[axis].trim_fin} = {-forward:.4g} rad",
-        hint="trim the fin, or give the true limit: `--fin-limit 0.35`",
+        f"the fin limit is below the offset at {speed:.3g} m/s: holding a straight run would take the whole {FIN[source.axis]}",
+        found=f"limit {fin_limit:.4g} rad, offset {NAMES[source.axis].trim_fin} = {offsets[speed]:.4g} rad",
+        hint=wider_fin("--fin-limit", abs(offsets[speed]), source),
     )
 
 
-def _actuator(source: Source, limits: FinLimits) -> dict[str, float | None]:
-    """Return lag, delay and rate limit the design counted with: stated ones first, else the first model's effects."""
-    values = source.models[0].values if source.models else {}
-    return {
-        "lag_s": limits.lag if limits.lag is not None else values.get("lag", 0.0),
-        "delay_s": limits.delay if limits.delay is not None else values.get("delay", 0.0),
-        "fin_rate_rad_s": limits.rate if limits.rate is not None else values.get("max_rate"),
-    }
+def actuator_of(source: Source, limits: FinLimits) -> dict[str, float | None]:
+    """Return lag, delay and rate limit the design counted with: stated ones, else the worst of the models'."""
+    values = [m.values for m in source.models]
+    lag, delay = (max((v.get(n, 0.0) for v in values), default=0.0) for n in ("lag", "delay"))
+    rate = min((v["max_rate"] for v in values if "max_rate" in v), default=None)
+    own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate}
+    return own | {name: value for name, value in limits.record().items() if value is not None}
 
 
 def _provenance(source: Source, wish: Wish) -> dict[str, Any]:
@@ -120,6 +126,7 @@ def _provenance(source: Source, wish: Wish) -> dict[str, Any]:
         "models": [{"path": str(p), "sha256": sha256_of(p)} for p in source.paths if p.is_file()],
         "runs": [r for m in source.models for r in m.runs],
         "effects": sorted({e for m in source.models for e in m.effects}),
+        "effects_not_counted": list(not_counted(source.models)),
         "schedule_variable": "speed_m_s: forward speed through the water, m/s",
         "between_rows": "linear in speed",
         "outside_rows": "clamp: the nearest row's gains",

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.errors import UsageError
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core
+from fieldsid.models.effect import CORE_FIELDS, Core, Effect, Stage
 from fieldsid.models.model import Model
 from fieldsid.models.simulate import effects_of
-from fieldsid.turning.plant import EXPONENT, straight_moment
+from fieldsid.turning.plant import EXPONENT, follows_the_run, straight_moment
 from fieldsid.turning.source import Source, draw_values
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -26,6 +27,9 @@ PARTS = (
     "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "crossflow", "cross_damping",
     "cross_rate", "cross_fin", "cross_quadratic", "lag", "delay", "fin_rate",
 )  # fmt: skip
+
+ACTUATOR = ("lag", "delay", "max_rate")
+"""Coefficients of the actuator's effects that the plant holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +105,18 @@ class FinLimits:
     delay: float | None = None
     rate: float | None = None
 
+    def record(self) -> dict[str, float | None]:
+        """Return what is said, by the names a schedule's file has."""
+        return {"lag_s": self.lag, "delay_s": self.delay, "fin_rate_rad_s": self.rate}
+
 
 def plants_at(source: Source, speed: float, limits: FinLimits, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
     """Return the plants next to a speed, scaled to it, with weights that sum to one: one per neighbouring model."""
     if not source.models:
         return [(_plant_of_points(source, speed, limits, draws, seed), 1.0)]
-    return [(_plant_of_model(source.models[i], speed, limits, draws, seed + i), share) for i, share in source.near(speed)]
+    centre = source.centred_at(speed)
+    near = [(source.models[i], seed + i, share) for i, share in source.near(speed)]
+    return [(_plant_of_model(model, speed, limits, draws, own_seed, centre), share) for model, own_seed, share in near]
 
 
 def family_at(source: Source, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
@@ -131,12 +141,23 @@ def _plant_of_points(source: Source, speed: float, limits: FinLimits, draws: int
     )  # fmt: skip
 
 
-def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
+def _plant_of_model(
+    model: Model, speed: float, limits: FinLimits, draws: int, seed: int, centre: Mapping[str, float]
+) -> LinearPlant:
+    """Return the plant of a model at a speed, its base parameters moved, draws and all, to where laws have them (`centre`)."""
     names = NAMES[model.axis]
     values, exponents = draw_values(model, draws, np.random.default_rng(seed))
     scale = model.law.scale(speed)
     at = model.at_speed(speed)
-    ratio = at[names.authority] / model.values[names.authority]
+    ratio = centre.get(names.authority, at[names.authority]) / model.values[names.authority]
+    if ratio <= 0.0:
+        raise UsageError(
+            f"the law of {names.authority} crosses zero before {speed:.3g} m/s",
+            found=f"{names.authority} = {centre[names.authority]:.4g} there",
+            hint="leave that speed out of `--speeds`, or give a law: `--law "
+            f"{names.authority}=0,{at[names.authority] / speed**2:.3g}`",
+        )
+    moved = {n: value - at[n] for n, value in centre.items()}
     parts = effects_of(model)
     cores = []
     for v, exponent in zip(values, exponents, strict=True):
@@ -154,13 +175,14 @@ def _plant_of_model(model: Model, speed: float, limits: FinLimits, draws: int, s
 
     authority = column(names.authority) * ratio
     coupled = cored("cross_damping")
-    shared = {n: np.array([v[n] for v in values]) for n in ("lag", "delay", "max_rate") if n in model.values}
-    trim = column(names.trim) * model.law.trim_factor(speed) + straight_moment(model, parts, values, np.array([speed]))[:, 0]
+    shared = {n: np.array([v[n] for v in values]) for n in ACTUATOR if n in model.values}
+    trim = column(names.trim) * model.law.trim_factor(speed) + moved.get(names.trim, 0.0)
+    trim = trim + straight_moment(model, parts, values, np.array([speed]))[:, 0]
     return LinearPlant(
         axis=model.axis,
         speed=speed,
-        damping=column(names.damping) * scale**exponents,
-        stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness),
+        damping=column(names.damping) * scale**exponents + moved.get(names.damping, 0.0),
+        stiffness=np.zeros(draws) if names.stiffness is None else column(names.stiffness) + moved.get(names.stiffness, 0.0),
         authority=authority,
         offset=trim / authority,
         quadratic=cored("quadratic"),
@@ -178,7 +200,7 @@ def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -
     stated = (limits.lag, limits.delay, limits.rate)
     absent = (0.0, 0.0, np.inf)
     out = []
-    for name, said, none in zip(("lag", "delay", "max_rate"), stated, absent, strict=True):
+    for name, said, none in zip(ACTUATOR, stated, absent, strict=True):
         out.append(np.full(draws, said) if said is not None else shared.get(name, np.full(draws, none)))
     return out
 
@@ -186,3 +208,18 @@ def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -
 def _same_sign(draws: FloatArray) -> FloatArray:
     sign = np.sign(draws[0])
     return np.asarray(sign * np.maximum(sign * draws, 0.05 * abs(draws[0])))
+
+
+def not_counted(models: Sequence[Model]) -> tuple[str, ...]:
+    """Return the effects of models that bend the path from fin to motion in a way a linear plant does not hold."""
+    return tuple(sorted({e.name for m in models for e in effects_of(m) if not _counted(e, m)}))
+
+
+def _counted(effect: Effect, model: Model) -> bool:
+    if effect.stage is Stage.SENSOR:
+        return True
+    if effect.core is not None:
+        core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
+        return all(getattr(core, n) == getattr(Core(), n) for n in CORE_FIELDS if n not in PARTS and n != "length")
+    own = {c.name for c in effect.every if c.name in model.values}
+    return own <= set(ACTUATOR) or follows_the_run(effect)

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import load_record, save_record
+from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
+from fieldsid.logs.mistaken import unless_log
 from fieldsid.models.axis import Axis
 from fieldsid.schedule.controller import Gains
 
@@ -19,8 +21,8 @@ COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", 
 """What every export writes, in this order; depth_gain in pitch only."""
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+@dataclass(frozen=True, slots=True, repr=False)
+class Row(Displayed):
     """Gains at one speed: fin = kp e + ki int e - kd rate + feed_forward + reference_gain ref, limited to fin_limit.
 
     depth_gain (pitch): pitch reference = depth_gain (depth - depth wanted), rad/m, nose up positive.
@@ -57,9 +59,12 @@ class Row:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Schedule:
-    """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions)."""
+@dataclass(frozen=True, slots=True, repr=False)
+class Schedule(Plotted):
+    """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions).
+
+    actuator is the fin's lag, delay and rate that the design counted with, stated those of them that were said, not modelled.
+    """
 
     axis: Axis
     kind: str
@@ -69,6 +74,7 @@ class Schedule:
     rows: tuple[Row, ...]
     actuator: Mapping[str, float | None]
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    stated: Mapping[str, float | None] = field(default_factory=dict)
 
     @property
     def speeds(self) -> tuple[float, ...]:
@@ -113,6 +119,7 @@ def body_of(schedule: Schedule) -> dict[str, Any]:
         "phase_margin_wanted_deg": schedule.phase_margin_deg,
         "depth": schedule.depth,
         "actuator": dict(schedule.actuator),
+        "stated": dict(schedule.stated),
         "rows": [r.record() for r in schedule.rows],
         "provenance": dict(schedule.provenance),
     }
@@ -125,7 +132,8 @@ def save_schedule(schedule: Schedule, path: Path, *, inputs: Sequence[Path] = ()
 
 def load_schedule(path: Path) -> Schedule:
     """Read a schedule back; raises ArtifactError naming what is missing or wrong."""
-    body = load_record(path, KIND)
+    with unless_log(path, "a schedule"):
+        body = load_record(path, KIND)
     try:
         rows = tuple(_row(r) for r in body["rows"])
         first = rows[0]
@@ -138,6 +146,7 @@ def load_schedule(path: Path) -> Schedule:
             rows=(first, *rows[1:]),
             actuator=dict(body["actuator"]),
             provenance={**body["provenance"], "inputs": body.get("inputs", [])},
+            stated=dict(body["stated"]),
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise ArtifactError(

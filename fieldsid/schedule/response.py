@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.display import Brief
 from fieldsid.logs.run import FloatArray
 from fieldsid.schedule.kernels import close_loop
 from fieldsid.schedule.plant import LinearPlant
@@ -16,8 +17,8 @@ SETTLED = 0.05
 FASTEST_LAG_S = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Steps:
+@dataclass(frozen=True, slots=True, repr=False)
+class Steps(Brief):
     """Responses of n cases: time (t,) s, angle (t, n) rad, fin command or angle (t, n) rad, depth (t, n) m."""
 
     time: FloatArray

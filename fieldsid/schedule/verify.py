@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 from fieldsid.copies import each
+from fieldsid.display import Displayed, Plotted
 from fieldsid.models.axis import Axis
 from fieldsid.schedule.margins import control_margins, margins
-from fieldsid.schedule.plant import FinLimits, LinearPlant, family_at
+from fieldsid.schedule.plant import PARTS, FinLimits, LinearPlant, family_at, plants_at
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.response import Steps, depth_response, overshoot, settling, steady_error, step_response
 from fieldsid.turning.source import Source
@@ -26,8 +29,8 @@ DEPTH_STEP_S = 120.0
 PITCH_LIMIT = 0.3490658503988659
 
 
-@dataclass(frozen=True, slots=True)
-class Check:
+@dataclass(frozen=True, slots=True, repr=False)
+class Check(Displayed):
     """One speed under one set of gains: margins at the estimate (python-control) and the least over the set; the step.
 
     Overshoot as a share, settling in s (5 %), largest over the set beside that of the estimate; `bent_error` the steady
@@ -67,29 +70,44 @@ class Check:
         }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Verification:
+READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyType(
+    {
+        "phase_margin_deg": (1.0, lambda c: c.phase_least_deg),
+        "gain_margin_db": (1.0, lambda c: c.gain_least_db),
+        "delay_margin_s": (1.0, lambda c: c.delay_least_s),
+        "overshoot_percent": (-1.0, lambda c: 100.0 * c.overshoot_most),
+    }
+)
+"""The numbers a gate may ask for: 1 where more is better, -1 where less is, and how each is read off a check."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Verification(Plotted):
     """Checks of the schedule and of the constant gain at the same speeds; the constant row; nominal steps for the figure."""
 
+    schedule: Schedule
     scheduled: tuple[Check, ...]
     constant: tuple[Check, ...]
     constant_row: Row
     steps: tuple[tuple[float, Steps, Steps], ...]
+    draws: int
+    spread: bool
+    """Draws of the errors for each model, and whether they differ: a table may state no errors."""
 
     @property
     def worst(self) -> dict[str, float]:
         """The least margins and the most overshoot of the schedule, over speeds and the set."""
-        return {
-            "phase_margin_deg": min(c.phase_least_deg for c in self.scheduled),
-            "gain_margin_db": min(c.gain_least_db for c in self.scheduled),
-            "delay_margin_s": min(c.delay_least_s for c in self.scheduled),
-            "overshoot_percent": 100 * max(c.overshoot_most for c in self.scheduled),
-        }
+        return {name: read(self.weakest(name)) for name, (_, read) in READ_OFF.items()}
+
+    def weakest(self, name: str) -> Check:
+        """Return the schedule's check where one of these numbers is worst."""
+        sign, read = READ_OFF[name]
+        return min(self.scheduled, key=lambda c: sign * read(c))
 
 
 def verify_schedule(schedule: Schedule, source: Source, *, draws: int = DRAWS, limits: FinLimits | None = None) -> Verification:
     """Check a schedule on the parameters it was made from, with their errors, at its knots and midway between them."""
-    limits = limits or _limits(schedule)
+    limits = limits or stated_limits(schedule)
     constant = constant_row(schedule)
 
     def checked(place: tuple[int, tuple[float, bool]]) -> tuple[Check, Check, tuple[float, Steps, Steps]]:
@@ -102,7 +120,9 @@ def verify_schedule(schedule: Schedule, source: Source, *, draws: int = DRAWS, l
         return one, other, (speed, steps_of_row, steps_of_constant)
 
     scheduled, compared, steps = zip(*each(checked, list(enumerate(checked_speeds(schedule)))), strict=True)
-    return Verification(scheduled, compared, constant, steps)
+    (plant, _), *_ = plants_at(source, schedule.speeds[0], limits, draws, SEED)
+    spread = any(bool((getattr(plant, name) != getattr(plant, name)[0]).any()) for name in PARTS)
+    return Verification(schedule, scheduled, compared, constant, steps, draws, spread)
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
@@ -122,9 +142,9 @@ def nominal_steps(plant: LinearPlant, row: Row, axis: Axis, seconds: float = STE
     return step_response(plant.one(), row, reference=STEP[axis], seconds=seconds)
 
 
-def _limits(schedule: Schedule) -> FinLimits:
-    """Return the actuator the design counted with, unless the models' own effects vary it over their draws."""
-    a = schedule.actuator
+def stated_limits(schedule: Schedule) -> FinLimits:
+    """Return what was said of the fin: what was not is that of the models it is tried on, varied over their draws."""
+    a = schedule.stated
     return FinLimits(a.get("lag_s"), a.get("delay_s"), a.get("fin_rate_rad_s"))
 
 

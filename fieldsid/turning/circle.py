@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from fieldsid.display import Brief
 from fieldsid.errors import DataError
 from fieldsid.logs.run import FloatArray
 from fieldsid.turning.line import t_factor
 
 HUBER = 1.345
 MAD_TO_SD = 1.4826
+ROUNDED = 1e-9
+"""Share of the track's size below which its extent, or its curvature, is rounding."""
 LEAST_SAMPLES = 12
 REWEIGHTS = 12
 LEAST_TURN_RAD = 1.5
@@ -26,8 +29,8 @@ LEAST_TURN_FOR_CURRENT_RAD = 5.0
 """Below most of a full circle a current cannot be told from a shift of the centre."""
 
 
-@dataclass(frozen=True, slots=True)
-class Circle:
+@dataclass(frozen=True, slots=True, repr=False)
+class Circle(Brief):
     """A fitted circle: radius and its standard error (m), centre at t = 0 (m), current (m/s), residual (n,) m."""
 
     radius: float
@@ -56,12 +59,22 @@ def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArr
     `heading` (n,) rad, unwrapped, gives a start that stands any current; without it a weak current is taken for granted.
     Raises DataError when there are too few samples or too short an arc.
     """
-    ok = np.isfinite(x) & np.isfinite(y)
+    ok = np.isfinite(x) & np.isfinite(y) & (True if heading is None else np.isfinite(heading))
     t, track = time[ok] - time[ok][0] if ok.any() else time[:0], np.stack([x[ok], y[ok]], axis=1)
     if t.size < LEAST_SAMPLES:
-        raise DataError("too few positions for a circle", found=f"{t.size}, at least {LEAST_SAMPLES}", hint="log x_m and y_m")
+        raise DataError(
+            "too few positions for a circle",
+            found=f"{t.size}, at least {LEAST_SAMPLES}",
+            hint="give a run with x_m and y_m throughout the turn",
+        )
     middle = track.mean(axis=0)
-    scale = float(np.sqrt(np.mean(np.sum((track - middle) ** 2, axis=1)))) or 1.0
+    scale = float(np.sqrt(np.mean(np.sum((track - middle) ** 2, axis=1))))
+    if not scale > ROUNDED * float(np.max(np.abs(track))):
+        raise DataError(
+            "the track does not leave its first position, no circle",
+            found=f"{t.size} positions alike",
+            hint="give the run of a turn",
+        )
     points = (track - middle) / scale
     if heading is None:
         start = np.concatenate([_taubin(_medians(points)), [0.0, 0.0]])
@@ -73,7 +86,7 @@ def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArr
         raise DataError(
             "the settled part of the turn is too short an arc for a circle",
             found=f"{np.degrees(turned):.0f} deg, at least {np.degrees(LEAST_TURN_RAD):.0f}",
-            hint="fly the turn on: `sysid plan --maneuver turning_circle`",
+            hint="fly the turn on, one and a half times round: `sysid plan --axis yaw --radius`",
         )
     free = 5 if turned >= LEAST_TURN_FOR_CURRENT_RAD else 3
     return _refined(t, track, middle, scale, start, free, turned)
@@ -149,7 +162,7 @@ def _taubin(points: FloatArray) -> FloatArray:
     _, _, vt = np.linalg.svd(np.stack([z0, centred[:, 0], centred[:, 1]], axis=1), full_matrices=False)
     a = vt[2].copy()
     a[0] /= 2.0 * np.sqrt(mean_z)
-    if a[0] == 0.0:
+    if abs(a[0]) < ROUNDED:
         raise DataError("the track is a straight line, no circle", found="no curvature", hint="give the run of a turn")
     last = -mean_z * a[0]
     centre = -a[1:] / (2.0 * a[0])

@@ -54,25 +54,25 @@ def counted_offset(offset: float, tolerance: float = FIN_ZERO_TOLERANCE) -> floa
     return offset if abs(offset) > tolerance else 0.0
 
 
-def refuse_unstable(damping: float, where: str) -> None:
+def refuse_unstable(damping: float, where: str, hint: str) -> None:
     """Raise ModelError when a22 <= 0: there is no steady rate, and the formula has no meaning."""
     if damping > 0:
         return
     raise ModelError(
         f"a22 <= 0 {where}: the yaw rate would grow without end, so the u-turn formula has no meaning",
         found=f"a22 = {damping:.4g} 1/s",
-        hint="add the damping that holds it: `sysid extend MODEL --add quadratic_damping RUN...`, then turn-radius simulates it",
+        hint=hint,
     )
 
 
-def refuse_short_fin(limit: float, offset: float, where: str) -> None:
+def refuse_short_fin(limit: float, offset: float, where: str, hint: str) -> None:
     """Raise UsageError when the fin limit does not exceed the offset: one side cannot be turned to at all."""
     if limit > abs(offset):
         return
     raise UsageError(
         f"the fin limit is below the offset {where}: the vehicle can turn to one side only",
         found=f"limit {limit:.4g} rad, offset delta_r0 = {offset:.4g} rad",
-        hint="trim the fin first, or give the true limit: `--rudder-max 0.35`",
+        hint=hint,
     )
 
 

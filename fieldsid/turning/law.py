@@ -13,11 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.display import Brief
 from fieldsid.fitting.tails import student_quantile, student_tail
 from fieldsid.logs.run import FloatArray, Note
-from fieldsid.turning.line import Line, fit_power_law, fit_powers, t_factor
+from fieldsid.rounding import nine_digits
+from fieldsid.turning.line import Line, fit_power_law, fit_powers, rounding_of, t_factor
 
 FAMILY_ALPHA = 0.05
+FEWEST_DEGREES = 2
+"""Degrees of freedom of the others' scatter from which on a point is judged by it: with one, two points in line by chance
+(as digits that were rounded have it) leave a third any number of its standard errors off."""
+NO_SCATTER = 1e-9
+"""Share of a value below which its scatter is that of the arithmetic."""
 AUTHORITY = (("affine", (0.0, 2.0)), ("through_zero", (2.0,)))
 OTHERS = (("constant", (0.0,)), ("linear", (0.0, 1.0)), ("affine", (0.0, 2.0)))
 EXPONENT_OF_LIFT = 2.0
@@ -47,9 +54,12 @@ class Exponent:
         return f"{spread}: u^2 is not refuted (p = {self.p_against_2:.2g}); a high R^2 alone would not have shown that"
 
 
-@dataclass(frozen=True, slots=True)
-class PointCheck:
-    """One point left out: what the law of the others says there, and how far off the point is."""
+@dataclass(frozen=True, slots=True, repr=False)
+class PointCheck(Brief):
+    """One point left out: what the law of the others says there, and how far off the point is, in its standard errors.
+
+    Beyond the limit it does not belong; infinite where the points are too few to say so of any.
+    """
 
     name: str
     speed: float
@@ -65,8 +75,8 @@ class PointCheck:
         return not abs(self.studentised) > self.limit
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterLaw:
+@dataclass(frozen=True, slots=True, repr=False)
+class ParameterLaw(Brief):
     """A parameter's law: `sign` times the chosen one of the `candidates`; magnitudes (n,) at speeds (n,)."""
 
     name: str
@@ -117,7 +127,8 @@ def other_law(
     """
     lines = [fit_powers(k, p, speeds, values, std_errors) for k, p in OTHERS if len(p) <= max(1, values.size - 1)]
     rising = [line for line in lines[1:] if _clear_of_zero(line, 1)]
-    best = max(rising, key=lambda line: line.r2) if rising else lines[0]
+    # at two speeds both go through the same two means: the first of them then
+    best = max(rising, key=lambda line: nine_digits(line.r2)) if rising else lines[0]
     checks = leave_one_out(best, speeds, values, std_errors, labels)
     return ParameterLaw(name, 1.0, speeds, values, std_errors, tuple(lines), best.kind, None, checks)
 
@@ -127,9 +138,10 @@ def leave_one_out(
 ) -> tuple[PointCheck, ...]:
     """Refit without each point; empty where too few points would be left to measure a scatter."""
     count, size = values.size, len(line.powers)
-    if count - 1 - size < 1:
+    degrees = count - 1 - size
+    if degrees < 1:
         return ()
-    limit = student_quantile(1.0 - FAMILY_ALPHA / (2 * count), count - 1 - size)
+    limit = student_quantile(1.0 - FAMILY_ALPHA / (2 * count), degrees) if degrees >= FEWEST_DEGREES else float("inf")
     checks = []
     for i in range(count):
         keep = np.arange(count) != i
@@ -137,7 +149,8 @@ def leave_one_out(
         other = fit_powers(line.kind, line.powers, speeds[keep], values[keep], rest)
         guess, spread = float(other.at(speeds[i])[0]), float(other.std(speeds[i])[0])
         own = _scatter(other, speeds[keep], values[keep], rest) * (1.0 if std_errors is None else float(std_errors[i]))
-        off = (float(values[i]) - guess) / float(np.hypot(own, spread)) if np.hypot(own, spread) > 0 else 0.0
+        least = max(NO_SCATTER * abs(float(values[i])), float(np.finfo(np.float64).tiny))
+        off = (float(values[i]) - guess) / max(float(np.hypot(own, spread)), least)
         checks.append(PointCheck(labels[i], float(speeds[i]), float(values[i]), guess, float(other.coefficients[-1]), off, limit))
     return tuple(checks)
 
@@ -146,7 +159,7 @@ def _scatter(line: Line, speeds: FloatArray, values: FloatArray, std_errors: Flo
     """Return the residual's standard deviation in units of the stated errors (at least one of them)."""
     error = values - line.at(speeds)
     if std_errors is None:
-        return float(np.sqrt(np.sum(error**2) / line.dof))
+        return float(np.hypot(np.sqrt(np.sum(error**2) / line.dof), rounding_of(values)))
     return max(1.0, float(np.sqrt(np.sum((error / std_errors) ** 2) / line.dof)))
 
 

@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import load_record, save_record
+from fieldsid.display import Plotted
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import KIND as MODEL_KIND
+from fieldsid.models.model import Model, model_of
+from fieldsid.rounding import nine_digits
 from fieldsid.turning.law import ParameterLaw, authority_law, other_law, without_candidates
 from fieldsid.turning.line import Line, line_of
 from fieldsid.turning.points import Point, check_authority, distinct_speeds
@@ -21,8 +25,8 @@ from fieldsid.turning.points import Point, check_authority, distinct_speeds
 KIND = "fieldsid/fit"
 
 
-@dataclass(frozen=True, slots=True)
-class Laws:
+@dataclass(frozen=True, slots=True, repr=False)
+class Laws(Plotted):
     """The laws of one axis by parameter name, and the points they were drawn through."""
 
     axis: Axis
@@ -55,7 +59,7 @@ def fit_laws(axis: Axis, points: Sequence[Point], *, weighted: bool = True) -> L
     Weighted by the points' standard errors where all have one (`weighted`), else every point counts alike. Raises
     DataError when there is one speed only (no law), or the authority's sign is not the same everywhere.
     """
-    points = tuple(sorted(points, key=lambda p: p.speed))
+    points = tuple(sorted(points, key=lambda p: nine_digits(p.speed)))
     sign = check_authority(axis, points)
     _refuse_single_speed(axis, points)
     laws, notes = {}, []
@@ -120,7 +124,8 @@ def law_notes(laws: Laws) -> tuple[Note, ...]:
         Note(
             "does_not_belong",
             f"{law.name} of `{p.name}` ({p.value:.4g} at {p.speed:.2f} m/s) does not belong to the others' law "
-            f"({p.predicted_without:.4g}): studentised {p.studentised:+.1f}, limit {p.limit:.1f}",
+            f"({p.predicted_without:.4g}): {p.studentised:+.1f} of its standard errors off (limit {p.limit:.1f} for "
+            f"{len(law.points)} points)",
             {"point": p.name, "parameter": law.name},
         )
         for law in laws.by_name.values()
@@ -130,9 +135,26 @@ def law_notes(laws: Laws) -> tuple[Note, ...]:
     return (*odd, *(n for law in laws.by_name.values() for n in law.notes))
 
 
-def save_laws(laws: Laws, path: Path, *, inputs: Sequence[Path] = (), force: bool = False) -> Path:
-    """Write the laws as YAML; raises ArtifactError."""
-    return save_record(path, f"{KIND}/1", report(laws), inputs=inputs, force=force)
+def save_laws(laws: Laws, path: Path, *, models: Sequence[Path] = (), inputs: Sequence[Path] = (), force: bool = False) -> Path:
+    """Write the laws as YAML, with the models they came from whole: effects, covariance and all; raises ArtifactError."""
+    carried = [{"name": p.stem, "record": load_record(p, MODEL_KIND)} for p in models]
+    return save_record(path, f"{KIND}/1", report(laws) | {"models": carried}, inputs=inputs, force=force)
+
+
+def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
+    """Return the models a fit file carries with their names, none where it came from a table; raises ArtifactError.
+
+    A file that does not say which models it came from would lose their effects without a word: it is refused.
+    """
+    body = load_record(path, KIND)
+    try:
+        return tuple((str(m["name"]), model_of(m["record"], path)) for m in body["models"])
+    except (KeyError, TypeError) as error:
+        raise ArtifactError(
+            f"`{path}` does not carry the models it was made from: their effects would be lost",
+            found=f"{type(error).__name__}: {error}",
+            hint="make it again: `sysid fit MODEL... -o " + f"{path} --force`",
+        ) from error
 
 
 def load_laws(path: Path) -> Laws:

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError
 from fieldsid.fitting.tails import student_quantile
 from fieldsid.logs.run import FloatArray
 
 LEVEL = 0.95
+ROUNDED = 1e-9
+"""Share of the largest value to which values are known at best: what a line leaves below it is rounding, and says nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+@dataclass(frozen=True, slots=True, repr=False)
+class Line(Brief):
     """y(u) = sum_k c_k u^p_k, or exp(c_0) u^c_1 where `powers` is empty, with the covariance of c and its degrees of freedom."""
 
     kind: str
@@ -96,7 +99,7 @@ def fit_powers(kind: str, powers: tuple[float, ...], speed: FloatArray, value: F
     With weights the covariance is widened by the scatter when that exceeds the errors given (Birge ratio), never narrowed.
     """
     x = np.stack([speed**p for p in powers], axis=1)
-    coefficients, covariance, dof = _least_squares(x, value, std_error)
+    coefficients, covariance, dof = _least_squares(x, value, std_error, rounding_of(value))
     error = value - x @ coefficients
     return Line(kind, powers, coefficients, covariance, dof, _r2(value, error), _rms(error))
 
@@ -105,7 +108,7 @@ def fit_power_law(speed: FloatArray, value: FloatArray, std_error: FloatArray | 
     """Fit value = k u^e (value > 0) in logarithms, errors carried over as std_error/value."""
     x = np.stack([np.ones_like(speed), np.log(speed)], axis=1)
     log_error = None if std_error is None else std_error / value
-    coefficients, covariance, dof = _least_squares(x, np.log(value), log_error)
+    coefficients, covariance, dof = _least_squares(x, np.log(value), log_error, ROUNDED)
     error = value - np.exp(x @ coefficients)
     return Line("power", (), coefficients, covariance, dof, _r2(value, error), _rms(error))
 
@@ -115,13 +118,21 @@ def t_factor(dof: int) -> float:
     return student_quantile(0.5 + LEVEL / 2, dof)
 
 
-def _least_squares(x: FloatArray, y: FloatArray, std_error: FloatArray | None) -> tuple[FloatArray, FloatArray, int]:
+def rounding_of(value: FloatArray) -> float:
+    """Return the size of what cannot be told from rounding in values (n,)."""
+    return ROUNDED * float(np.max(np.abs(value)))
+
+
+def _least_squares(
+    x: FloatArray, y: FloatArray, std_error: FloatArray | None, rounding: float
+) -> tuple[FloatArray, FloatArray, int]:
     weight = np.ones_like(y) if std_error is None else 1.0 / std_error
     q, r = np.linalg.qr(x * weight[:, None])
     coefficients = np.linalg.solve(r, q.T @ (y * weight))
     inverse = np.linalg.inv(r)
     dof = y.size - x.shape[1]
-    scatter = float(np.sum(((y - x @ coefficients) * weight) ** 2)) / dof if dof > 0 else float("nan")
+    left = np.hypot(y - x @ coefficients, rounding) * weight
+    scatter = float(np.sum(left**2)) / dof if dof > 0 else float("nan")
     if std_error is not None:
         scatter = max(1.0, scatter) if dof > 0 else 1.0
     return coefficients, np.asarray(inverse @ inverse.T * scatter), dof
@@ -129,7 +140,7 @@ def _least_squares(x: FloatArray, y: FloatArray, std_error: FloatArray | None) -
 
 def _r2(value: FloatArray, error: FloatArray) -> float:
     total = float(np.sum((value - value.mean()) ** 2))
-    return 1.0 - float(np.sum(error**2)) / total if total > 0 else float("nan")
+    return 1.0 - float(np.sum(error**2)) / total if total > value.size * rounding_of(value) ** 2 else float("nan")
 
 
 def _rms(error: FloatArray) -> float:

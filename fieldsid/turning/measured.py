@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.display import Plotted
 from fieldsid.errors import DataError
 from fieldsid.logs.run import FloatArray, Run
+from fieldsid.models.record import knows_speed
 from fieldsid.turning.circle import Circle, fit_circle
 
 TURNING_SHARE = 0.5
@@ -18,8 +20,8 @@ APPROACH_S = 5.0
 LEAST_RATE_RAD_S = 0.01
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredTurn:
+@dataclass(frozen=True, slots=True, repr=False)
+class MeasuredTurn(Plotted):
     """A measured circle: side, fin flown (rad, signed), entry and path speed (m/s, NaN where unknown), settled span (s).
 
     `track` is x and y (m) of the whole run, `settled` those of the settled part with the current taken out.
@@ -70,7 +72,7 @@ def _need_positions(run: Run) -> None:
         raise DataError(
             f"run {run.name!r} has no position, so no circle can be fitted",
             found=", ".join(k for k in run.signals if run.has(k)) or "no signals",
-            hint=f"map {' and '.join(missing)} on import: `sysid inspect LOG`",
+            hint=f"map {' and '.join(missing)} on import, where the log has them",
         )
 
 
@@ -150,7 +152,7 @@ def _entry_speed(run: Run, turn_start: int) -> float:
     span = slice(int(np.searchsorted(run.time, since)), turn_start + 1)
     if turn_start < 10:
         return float("nan")
-    if run.has("surge_m_s"):
+    if knows_speed(run):
         return float(np.nanmedian(run["surge_m_s"][span]))
     x, y, t = run["x_m"][span], run["y_m"][span], run.time[span]
     ok = np.isfinite(x) & np.isfinite(y)

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from fieldsid.display import Brief
 from fieldsid.errors import DataError
 from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
@@ -17,8 +18,8 @@ SAME_SPEED = 0.03
 """Speeds closer than this fraction count as one: log-to-log spread of a held thrust setting."""
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+@dataclass(frozen=True, slots=True, repr=False)
+class Point(Brief):
     """Parameters identified at one speed (m/s), by name, with standard errors where they are known."""
 
     name: str

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 from typing import Any
 
+from fieldsid.display import Displayed, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.turning.measured import MeasuredTurn
 from fieldsid.turning.surge import SurgeModel
 
 SIDES: Mapping[str, float] = {"port": -1.0, "starboard": 1.0}
+SAME_TURN = 0.05
+"""Share by which speed and rudder of two turns may differ and still be one."""
+MOST_SPEEDS = 4
+"""Speeds that are listed one by one."""
+HOW = "one and a half circles, x_m and y_m logged"
 
 
-@dataclass(frozen=True, slots=True)
-class TurnRow:
+@dataclass(frozen=True, slots=True, repr=False)
+class TurnRow(Displayed):
     """The turn at one entry speed to one side; lengths m, times s, rates rad/s, NaN where the method does not give it."""
 
     speed: float
@@ -68,13 +75,21 @@ class TurnRow:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredRow:
+@dataclass(frozen=True, slots=True, repr=False)
+class MeasuredRow(Displayed):
     """A measured circle beside what the model predicts for the fin and the speed it was flown with."""
 
     turn: MeasuredTurn
     predicted: float
     predicted95: tuple[float, float]
+
+    def entered(self, speed: float, side: str) -> bool:
+        """Whether the circle was turned to a side from about a speed in m/s."""
+        return self.turn.side == side and abs(self.turn.entry_speed - speed) <= SAME_TURN * speed
+
+    def held(self, rudder: float) -> bool:
+        """Whether it was turned with about a rudder in rad."""
+        return abs(abs(self.turn.fin) - rudder) <= SAME_TURN * rudder
 
     def record(self) -> dict[str, Any]:
         """Return the row as `--json` prints it."""
@@ -100,8 +115,8 @@ class MeasuredRow:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class TurnPrediction:
+@dataclass(frozen=True, slots=True, repr=False)
+class TurnPrediction(Plotted):
     """All rows, the measured circles, the surge model behind them, and remarks."""
 
     rows: tuple[TurnRow, ...]
@@ -109,6 +124,26 @@ class TurnPrediction:
     rudder_max: float
     surge: SurgeModel | None
     notes: tuple[Note, ...]
+
+    @property
+    def settling(self) -> tuple[str, ...]:
+        """What would settle the rows that are extrapolated: circles that were given, asked for otherwise, and a flight."""
+        rows = [r for r in self.rows if r.extrapolated]
+        if not rows:
+            return ()
+        flights = [f"to {side} at {_speeds([r.speed for r in rows if r.side == side])}" for side in SIDES if _to(rows, side)]
+        return (*self._asked_otherwise(rows), f"turning_circle {', '.join(flights)} with {self.rudder_max:.3g} rad: {HOW}")
+
+    def _asked_otherwise(self, rows: Sequence[TurnRow]) -> Iterator[str]:
+        """Yield why circles that were given are none of the turns asked for."""
+        fins: dict[str, list[str]] = {}
+        for m in self.measured:
+            if not m.held(self.rudder_max) and any(m.entered(r.speed, r.side) for r in rows):
+                fins.setdefault(f"{abs(m.turn.fin):.3g}", []).append(m.turn.run)
+            elif m.held(self.rudder_max) and isnan(m.turn.entry_speed) and _to(rows, m.turn.side):
+                yield f"{m.turn.run} begins in the turn, so that its speed before it is not known: log the approach too"
+        for fin, names in fins.items():
+            yield f"with `--rudder-max {fin}`, as they were turned with, {', '.join(names)} count as measured"
 
     def best(self, side: str) -> TurnRow | None:
         """Return the local minimum of the radius over speed that is farthest up, None where it only rises or falls."""
@@ -126,6 +161,7 @@ class TurnPrediction:
             "rudder_max_rad": self.rudder_max,
             "rows": [r.record() for r in self.rows],
             "measured": [m.record() for m in self.measured],
+            "settling": list(self.settling),
             "minimum": {s: None if b is None else {"speed_m_s": b.speed, "radius_m": b.radius} for s, b in best.items()},
             "surge": None
             if surge is None
@@ -140,3 +176,14 @@ class TurnPrediction:
             },
             "warnings": [{"code": n.code, "message": n.message} for n in self.notes],
         }
+
+
+def _to(rows: Sequence[TurnRow], side: str) -> bool:
+    return any(r.side == side for r in rows)
+
+
+def _speeds(speeds: Sequence[float]) -> str:
+    """Return speeds in m/s as words, many of them as the range they span."""
+    if len(speeds) > MOST_SPEEDS:
+        return f"{min(speeds):.2f} to {max(speeds):.2f} m/s"
+    return f"{', '.join(f'{s:.2f}' for s in speeds)} m/s"

@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import FloatArray, Note, Run
+from fieldsid.logs.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.turning.doubt import Reach, doubt_draws, doubt_of, reach_of
 from fieldsid.turning.formulas import (
@@ -20,7 +21,8 @@ from fieldsid.turning.formulas import (
     usable_fin,
 )
 from fieldsid.turning.measured import MeasuredTurn, measure_turn
-from fieldsid.turning.prediction import SIDES, MeasuredRow, TurnPrediction, TurnRow
+from fieldsid.turning.prediction import HOW, SIDES, MeasuredRow, TurnPrediction, TurnRow
+from fieldsid.turning.remedies import damping_that_holds, in_radians, wider_fin
 from fieldsid.turning.settled import SettledTurns, settled_turns
 from fieldsid.turning.source import Source
 from fieldsid.turning.surge import SurgeModel, fit_surge
@@ -28,7 +30,6 @@ from fieldsid.turning.surge import SurgeModel, fit_surge
 DRAWS = 500
 SEED = 20240511
 METHODS = ("auto", "u_turn", "steady", "simulated")
-SAME_TURN = 0.05
 NOT_WORTH_SAYING = 0.0025
 """An offset in rad that moves a radius by a hundredth."""
 
@@ -43,27 +44,38 @@ def turn_radius(
     method: str = "auto",
     draws: int = DRAWS,
     fin_zero: float = FIN_ZERO_TOLERANCE,
+    unfit: Refused[Run] | None = None,
 ) -> TurnPrediction:
     """Return the turn at every speed (m/s) to both sides with the rudder at rudder_max (rad).
 
     runs are those the models came from: the loss of speed and the drift in a turn are identified from them. measured
     are runs of turns to compare with. method "auto" simulates where the models carry effects and takes the u-turn
-    formula elsewhere. An offset of the fin below `fin_zero` (rad) is not counted in the formula. Raises UsageError,
-    ModelError for an unstable model, DataError for a measured run without a circle.
+    formula elsewhere. An offset of the fin below `fin_zero` (rad) is not counted in the formula. unfit is told of each of
+    several measured runs without a circle; without it, and where none has one, DataError is raised. Raises UsageError, and
+    ModelError for an unstable model.
     """
     _check(source, speeds, rudder_max, method)
     source = source.flown_by(runs)
     chosen = _chosen(source, method)
+    if chosen == "simulated" and source.own_laws:
+        raise UsageError(
+            "a law of one's own goes with the formula, not with a simulation of models that carry effects",
+            found=f"--law {', '.join(source.own_laws)}",
+            hint="add `--method u_turn`, or leave `--law` out",
+        )
     surge = fit_surge(runs) if chosen == "simulated" and runs else None
-    turns = [measure_turn(run) for run in measured]
+    turns = [turn for _, turn in sifted(measured, (attempt(measure_turn, run) for run in measured), unfit)]
 
     def rows_at(at: Sequence[float], rudder: float) -> list[TurnRow]:
         if chosen == "simulated":
             return _simulated_rows(source, at, rudder, surge, draws)
         return _formula_rows(source, at, rudder, chosen, draws, fin_zero)
 
+    if chosen != "simulated":
+        _refuse_turns(source, speeds, rudder_max)
     rows = rows_at(speeds, rudder_max)
-    compared = [_compared(turn, rows_at) for turn in turns]
+    least = (lambda _speed: 0.0) if chosen == "simulated" else (lambda speed: abs(_offset(source, speed)))
+    compared = [_compared(turn, rows_at, least) for turn in turns]
     rows = [_with_measurement(row, compared, rudder_max) for row in rows]
     return TurnPrediction(tuple(rows), tuple(compared), rudder_max, surge, tuple(_notes(source, rows, chosen, surge, fin_zero)))
 
@@ -77,9 +89,6 @@ def _formula_rows(
     for speed in speeds:
         base = source.base_draws(speed, draws, rng)
         a, b, c = base[names.damping], base[names.authority], base[names.trim]
-        where = f"at {speed:.3g} m/s"
-        refuse_unstable(float(a[0]), where)
-        refuse_short_fin(rudder, float(c[0] / b[0]), where)
         a = np.maximum(a, 0.05 * a[0])
         b = np.sign(b[0]) * np.maximum(np.abs(b), 0.05 * abs(b[0]))
         for side, sign in SIDES.items():
@@ -99,6 +108,22 @@ def _formula_rows(
     return _by_side(rows)
 
 
+def _refuse_turns(source: Source, speeds: Sequence[float], rudder: float) -> None:
+    """Refuse what the formula has no turn for, at the speed where it is worst."""
+    damping = {speed: source.base_at(speed)[NAMES[Axis.YAW].damping] for speed in speeds}
+    loosest = min(damping, key=lambda speed: damping[speed])
+    refuse_unstable(damping[loosest], f"at {loosest:.3g} m/s", damping_that_holds(source, loosest))
+    worst = max(speeds, key=lambda speed: abs(_offset(source, speed)))
+    offset = _offset(source, worst)
+    refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", wider_fin("--rudder-max", abs(offset), source))
+
+
+def _offset(source: Source, speed: float) -> float:
+    """Return the fin's offset delta_r0 at a speed, rad."""
+    base, names = source.base_at(speed), NAMES[Axis.YAW]
+    return base.get(names.trim, 0.0) / base[names.authority]
+
+
 def _simulated_rows(
     source: Source, speeds: Sequence[float], rudder: float, surge: SurgeModel | None, draws: int
 ) -> list[TurnRow]:
@@ -113,7 +138,7 @@ def _simulated_row(source: Source, turns: SettledTurns, index: int, side: str, r
         raise ModelError(
             f"the model has no steady turn to {side} at {speed:.3g} m/s: it is unstable, and nothing in it holds the rate",
             found=f"a22 = {source.base_at(speed).get('a22', 0.0):.4g} 1/s, effects: {', '.join(turns.effects) or 'none'}",
-            hint="add the damping that holds it: `sysid extend MODEL --add quadratic_damping RUN...`",
+            hint=damping_that_holds(source, speed, turns.effects),
         )
     time = turns.transient.time_180[index]
     reach = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
@@ -205,12 +230,15 @@ def _reach(source: Source, speed: float, rudder: float, rate: float, quarter_s: 
 def _settles(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:
     if not because:
         return "nothing more: the data reached this turn"
-    return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: one and a half circles, x_m and y_m logged"
+    return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: {HOW}"
 
 
-def _compared(turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]]) -> MeasuredRow:
+def _compared(
+    turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
+) -> MeasuredRow:
+    """Return a measured turn beside what is predicted for it; nothing is where its fin is below the least at its speed."""
     speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
-    if not (np.isfinite(turn.fin) and abs(turn.fin) > 0.01):
+    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(0.01, least(speed))):
         nan = float("nan")
         return MeasuredRow(turn, nan, (nan, nan))
     row = next(r for r in rows_at([speed], abs(turn.fin)) if r.side == turn.side)
@@ -220,18 +248,15 @@ def _compared(turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], li
 def _with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: float) -> TurnRow:
     """Return the row with the measured radius where a circle was flown at this speed, side and rudder."""
     for m in measured:
-        turn = m.turn
-        near_speed = abs(turn.entry_speed - row.speed) <= SAME_TURN * row.speed
-        near_fin = abs(abs(turn.fin) - rudder) <= SAME_TURN * rudder
-        if turn.side == row.side and near_speed and near_fin:
+        if m.entered(row.speed, row.side) and m.held(rudder):
             return replace(
                 row,
-                radius=turn.circle.radius,
-                interval95=turn.circle.interval95,
+                radius=m.turn.circle.radius,
+                interval95=m.turn.circle.interval95,
                 method="measured",
                 trust="measured",
                 because=(),
-                settle_with=f"settled by `{turn.run}`",
+                settle_with=f"settled by `{m.turn.run}`",
             )
     return row
 
@@ -255,7 +280,9 @@ def _check(source: Source, speeds: Sequence[float], rudder_max: float, method: s
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
     if not 0.0 < rudder_max <= 1.5708:
         raise UsageError(
-            "the rudder limit must be an angle in rad", found=f"{rudder_max:g}", hint="for 15 deg: `--rudder-max 0.26`"
+            "the rudder limit must be an angle in rad",
+            found=f"{rudder_max:g}",
+            hint=in_radians("--rudder-max", rudder_max),
         )
     if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):
         raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")

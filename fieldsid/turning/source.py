@@ -10,15 +10,19 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import read_yaml
+from fieldsid.display import Brief
 from fieldsid.errors import UsageError
+from fieldsid.logs.mistaken import unless_log
 from fieldsid.logs.run import FloatArray, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, load_model
+from fieldsid.models.record import knows_speed
 from fieldsid.models.simulate import effects_of
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.rounding import nine_digits
 from fieldsid.turning.law import ParameterLaw
 from fieldsid.turning.laws import KIND as FIT_KIND
-from fieldsid.turning.laws import Laws, fit_laws, load_laws, with_own_law
+from fieldsid.turning.laws import Laws, carried_models, fit_laws, load_laws, with_own_law
 from fieldsid.turning.plant import EXPONENT
 from fieldsid.turning.points import SAME_SPEED, Point, check_authority, distinct_speeds, points_of
 from fieldsid.turning.table import read_table
@@ -26,9 +30,12 @@ from fieldsid.turning.table import read_table
 TABLES = (".csv", ".txt", ".tsv")
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
-    """Points of one axis at rising speeds; the models they came from (none for a table); laws where two speeds allow them."""
+@dataclass(frozen=True, slots=True, repr=False)
+class Source(Brief):
+    """Points of one axis at rising speeds; the models they came from (none for a table); laws where two speeds allow them.
+
+    A fit file carries its models, and its laws are those of the file.
+    """
 
     axis: Axis
     points: tuple[Point, ...]
@@ -38,11 +45,17 @@ class Source:
     paths: tuple[Path, ...]
     own_laws: tuple[str, ...] = ()
     flown: tuple[float, float] | None = None
+    is_fit_file: bool = False
 
     @property
     def speeds(self) -> FloatArray:
         """Speeds of the points, (n,) m/s, rising."""
         return np.sort(np.array([p.speed for p in self.points]))
+
+    @property
+    def largest_fin(self) -> float:
+        """The largest fin in the models' runs, rad; 0 where there is no model."""
+        return max((m.trained.get("fin_max", 0.0) for m in self.models), default=0.0)
 
     def supports(self, speed: float) -> bool:
         """Whether a speed lies within those the data were taken at."""
@@ -56,25 +69,25 @@ class Source:
 
     def flown_by(self, runs: Sequence[Run]) -> Source:
         """Return the source knowing the speeds its runs really had: the entry speed of a turn is above a run's median."""
-        surges = [r["surge_m_s"] for r in runs if r.has("surge_m_s")]
+        surges = [r["surge_m_s"] for r in runs if knows_speed(r)]
         if not surges:
             return self
         spans = np.array([np.nanpercentile(s, [2.0, 98.0]) for s in surges])
         return replace(self, flown=(float(spans[:, 0].min()), float(spans[:, 1].max())))
 
     def near(self, speed: float) -> list[tuple[int, float]]:
-        """Return the one or two models next to a speed with weights that sum to one, linear in log speed."""
-        known = np.array([m.law.reference for m in self.models])
+        """Return the models next to a speed with weights that sum to one, linear in log speed, alike for models of one speed."""
+        known = np.array([nine_digits(m.law.reference) for m in self.models])
         if known.size == 1 or not np.isfinite(known).all():
             return [(0, 1.0)]
-        order = np.argsort(known)
-        logs = np.log(known[order])
-        place = float(np.interp(np.log(speed), logs, np.arange(known.size)))
+        speeds, of_model = np.unique(known, return_inverse=True)
+        place = float(np.interp(np.log(speed), np.log(speeds), np.arange(speeds.size)))
         below = int(np.floor(place))
         share = place - below
-        if share < 1e-9 or below + 1 >= known.size:
-            return [(int(order[below]), 1.0)]
-        return [(int(order[below]), 1.0 - share), (int(order[below + 1]), share)]
+        weights = {below: 1.0} if share < 1e-9 or below + 1 >= speeds.size else {below: 1.0 - share, below + 1: share}
+        return [
+            (int(i), w / np.count_nonzero(of_model == at)) for at, w in weights.items() for i in np.flatnonzero(of_model == at)
+        ]
 
     def base_at(self, speed: float) -> dict[str, float]:
         """Return the base parameters at a speed: the point's own where one is there and no law of the user's overrides it.
@@ -96,9 +109,24 @@ class Source:
             return own or dict(self.points[0].std_errors)
         return {**{n: _spread(law, speed) for n, law in self.laws.by_name.items()}, **own}
 
+    def centred_at(self, speed: float) -> dict[str, float]:
+        """Return the base parameters at a speed that laws say and models do not: the user's own laws, everywhere.
+
+        Beyond the speeds of the points a fit file's laws say how they go on from the last of them.
+        """
+        if self.laws is None:
+            return {}
+        at = self.laws.at(speed)
+        own = {n: at[n] for n in self.own_laws}
+        edge = float(np.clip(speed, self.speeds[0], self.speeds[-1]))
+        if not self.is_fit_file or abs(edge - speed) <= SAME_SPEED * speed:
+            return own
+        last, there = self.base_at(edge), self.laws.at(edge)
+        return {n: last[n] + at[n] - there[n] for n in at} | own
+
     def _point_at(self, speed: float) -> Point | None:
         """Return the point whose speed counts as the same, None where there is none."""
-        nearest = min(self.points, key=lambda p: abs(p.speed - speed))
+        nearest = min(self.points, key=lambda p: abs(nine_digits(p.speed) - nine_digits(speed)))
         return nearest if abs(nearest.speed - speed) <= SAME_SPEED * speed else None
 
     def _scaled(self, point: Point, speed: float) -> dict[str, float]:
@@ -148,18 +176,38 @@ def load_source(paths: Sequence[Path], *, laws: Sequence[str] = ()) -> Source:
     if tables:
         axis, points = read_table(paths[0])
         return _with_laws(axis, points, (), (), paths, laws)
-    bodies = [read_yaml(p) for p in paths]
+    bodies = []
+    for path in paths:
+        with unless_log(path, "a model or a table of parameters over speed"):
+            bodies.append(read_yaml(path))
     if any(_is_fit(b) for b in bodies):
         if len(paths) > 1:
             raise UsageError(
                 "a fit file stands alone", found=", ".join(map(str, paths)), hint="give the fit file only, or models only"
             )
-        found = load_laws(paths[0])
-        return _source_of_laws(found, paths, laws)
-    models = tuple(load_model(p) for p in paths)
-    names = tuple(p.stem for p in paths)
+        return source_of_laws(load_laws(paths[0]), carried_models(paths[0]), laws=laws, paths=paths)
+    return source_of_models([load_model(p) for p in paths], [p.stem for p in paths], laws=laws, paths=paths)
+
+
+def source_of_models(
+    models: Sequence[Model], names: Sequence[str], *, laws: Sequence[str] = (), paths: Sequence[Path] = ()
+) -> Source:
+    """Return the source of models with a name each; raises UsageError and DataError as `load_source` does."""
+    if not models:
+        raise UsageError("nothing to work on", found="no model", hint="give models, or the files of models")
     axis, points = points_of(models, names)
-    return _with_laws(axis, points, models, names, paths, laws)
+    return _with_laws(axis, points, tuple(models), tuple(names), paths, laws)
+
+
+def source_of_laws(
+    found: Laws, carried: Sequence[tuple[str, Model]] = (), *, laws: Sequence[str] = (), paths: Sequence[Path] = ()
+) -> Source:
+    """Return the source of fitted laws and the models they carry, the user's own laws in place of theirs; raises UsageError."""
+    for text in laws:
+        found = with_own_law(found, text)
+    own = tuple(t.partition("=")[0] for t in laws)
+    names, models = tuple(n for n, _ in carried), tuple(m for _, m in carried)
+    return Source(found.axis, found.points, models, names, found, tuple(paths), own, is_fit_file=True)
 
 
 def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[list[dict[str, float]], FloatArray]:
@@ -202,10 +250,11 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
     return str(body.get("schema", "")).startswith(f"{FIT_KIND}/")
 
 
-def _source_of_laws(found: Laws, paths: Sequence[Path], own: Sequence[str]) -> Source:
-    for text in own:
-        found = with_own_law(found, text)
-    return Source(found.axis, found.points, (), (), found, tuple(paths), tuple(t.partition("=")[0] for t in own))
+def logs_of(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """Return the logs that model files, or a fit file's models, name as what they were made from, each once."""
+    bodies = [read_yaml(p) for p in paths]
+    records = [r for b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
+    return tuple(dict.fromkeys(Path(str(i["path"])) for r in records for i in r.get("inputs", [])))
 
 
 def _with_laws(
@@ -217,7 +266,7 @@ def _with_laws(
     own: Sequence[str],
 ) -> Source:
     check_authority(axis, points)
-    ordered = tuple(sorted(points, key=lambda p: p.speed))
+    ordered = tuple(sorted(points, key=lambda p: nine_digits(p.speed)))
     laws = fit_laws(axis, ordered) if distinct_speeds(np.array([p.speed for p in ordered])) > 1 else None
     if own:
         if laws is None:

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from fieldsid.display import Brief
 from fieldsid.logs.run import FloatArray, Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.record import record_of
+from fieldsid.models.record import knows_speed, record_of
 
 BLOCK_S = 0.2
 LEAST_SAMPLES = 40
@@ -28,8 +29,12 @@ TYPICAL_DRIFT_LOG_SD = 0.5
 The ensemble of `doubt.py` lost 9 .. 38 % and drifted 2 .. 5 deg."""
 
 
-@dataclass(frozen=True, slots=True)
-class SurgeModel:
+SMALLEST = 1e-18
+"""Variance below which a coefficient counts as known."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SurgeModel(Brief):
     """a_u (1/m), k_r (m), k_d (1/m), l_r (m) with their covariance (4, 4); what was measured; the fit's scatter m/s."""
 
     drag: float
@@ -81,13 +86,21 @@ def draw_slowing(model: SurgeModel | None, typical_curvature: float, count: int,
     drag = np.full(count, 0.1)
     drift = np.tan(np.clip(TYPICAL_DRIFT_RAD * np.exp(TYPICAL_DRIFT_LOG_SD * z[:, 3]), 0.0, 0.6)) / typical_curvature
     if model is not None and model.surge_measured:
-        spread = z[:, :3] @ np.linalg.cholesky(model.covariance[:3, :3] + 1e-18 * np.eye(3)).T
+        spread = z[:, :3] @ _root(model.covariance[:3, :3]).T
         drag = np.maximum(model.drag + spread[:, 0], 0.2 * model.drag)
         turn = np.maximum(model.turn_loss + spread[:, 1], 0.0) / drag
         fin = np.maximum(model.fin_loss + spread[:, 2], 0.0) / drag
     if model is not None and model.sway_measured:
         drift = model.drift_per_rate + z[:, 3] * np.sqrt(model.covariance[3, 3])
     return Slowing(turn[:, None], fin[:, None], drift[:, None], drag[:, None])
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Return the lower root (n, n) of a covariance: Cholesky's, and one where rounding has made it indefinite as well."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), SMALLEST))
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
+    upper = np.asarray(np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T, mode="r"))
+    return np.asarray(scale[:, None] * (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T)
 
 
 def fit_surge(runs: Sequence[Run]) -> SurgeModel | None:
@@ -138,9 +151,8 @@ def _case(run: Run) -> _Case | None:
     thrust = record.signals.get("thrust")
     start = float(np.median(thrust[: max(10, thrust.size // 20)])) if thrust is not None else 0.0
     ratio = thrust / start if thrust is not None and start > 0 else np.ones(len(record))
-    columns = (
-        record.time, _filled(run, "surge_m_s", none), _filled(run, "sway_m_s", none), rate, record.fin, ratio
-    )  # fmt: skip
+    surge = _filled(run, "surge_m_s", none) if knows_speed(run) else none
+    columns = (record.time, surge, _filled(run, "sway_m_s", none), rate, record.fin, ratio)
     blocks = [_blocks(c, width) for c in columns]
     if blocks[0].size < LEAST_SAMPLES or float(np.max(np.abs(blocks[3]))) < LEAST_TURN_RAD_S:
         return None

@@ -11,7 +11,9 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from fieldsid.errors import DataError
+from fieldsid.errors import DataError, FieldsidError
+from fieldsid.logs.mistaken import if_log
+from fieldsid.logs.names import TIME, canonical
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.turning.points import Point
 
@@ -26,11 +28,7 @@ def read_table(path: Path) -> tuple[Axis, tuple[Point, ...]]:
     """
     table = _frame(path)
     if SPEED not in table.columns:
-        raise DataError(
-            f"table `{path}` has no column `{SPEED}`",
-            found=", ".join(map(str, table.columns)) or "no columns",
-            hint=f"name the columns {SPEED},a22,b2,C0 or {SPEED},c22,c23,d2,Cb",
-        )
+        raise _no_speed(path, table)
     axis = _axis_of(table, path)
     _check_numbers(table, path, axis)
     points = tuple(
@@ -39,12 +37,27 @@ def read_table(path: Path) -> tuple[Axis, tuple[Point, ...]]:
     return axis, points
 
 
+def _no_speed(path: Path, table: pd.DataFrame) -> FieldsidError:
+    """Return the error of a table without speeds: a log, where it has a column of time."""
+    if any((said := canonical(str(c))) is not None and said.signal == TIME for c in table.columns):
+        mistaken = if_log(path, "a table of parameters over speed")
+        if mistaken is not None:
+            return mistaken
+    return DataError(
+        f"table `{path}` has no column `{SPEED}`",
+        found=", ".join(map(str, table.columns)) or "no columns",
+        hint=f"name the columns {SPEED},a22,b2,C0 or {SPEED},c22,c23,d2,Cb",
+    )
+
+
 def _frame(path: Path) -> pd.DataFrame:
     try:
         source = io.StringIO(sys.stdin.read()) if str(path) == "-" else path
         table = pd.read_csv(source, comment="#", skipinitialspace=True)
     except OSError as error:
-        raise DataError(f"`{path}` cannot be read: {error.strerror or error}", hint="check the path") from error
+        raise DataError(
+            f"`{path}` cannot be read: {error.strerror or error}", hint="check the path and its permissions"
+        ) from error
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise DataError(
             f"`{path}` is not a table", found=str(error).strip(), hint=f"give a CSV file with a header line, {SPEED},a22,b2,C0"

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cli import trial
 
 from fieldsid._version import __version__
 from fieldsid.cli import app
@@ -117,8 +118,7 @@ def test_an_interrupt_is_130(run_cli, monkeypatch):
 
 def test_an_interrupt_inside_a_command_says_so(run_cli, monkeypatch, tmp_path):
     monkeypatch.setattr("fieldsid.extension.history_of", Broken(KeyboardInterrupt()))
-    (tmp_path / "model.yaml").touch()
-    answer = run_cli("history", tmp_path / "model.yaml")
+    answer = run_cli("history", trial.model_file(tmp_path))
     assert (answer.code, answer.err) == (130, "interrupted\n")
 
 

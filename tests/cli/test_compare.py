@@ -15,14 +15,47 @@ from fieldsid.models.model import save_model
 
 
 def test_the_model_that_made_a_run_is_down_to_its_noise(run_cli, tmp_path):
-    body = run_cli("compare", trial.model_file(tmp_path), trial.flown(tmp_path, spec="zigzag"), "--json").json
+    asked = ("compare", trial.model_file(tmp_path), trial.flown(tmp_path, spec="zigzag"))
+    body = run_cli(*asked, "--json").json
     (run,) = body["runs"]
     assert body["schema"] == "fieldsid/compare/1"
     assert run["rate_rms_rad_s"] == pytest.approx(0.004, rel=0.1)
     assert run["angle_rms_rad"] == pytest.approx(0.005, rel=0.1)
     assert 0.0 <= run["theil"] <= 1.0
     assert run["r2"] <= 1.0
+    assert (run["failing"], run["where"], run["worst"], run["moves_with"]) == ([], [], [], [])
+    text = run_cli(*asked).out
+    assert "down to the noise: " in text
+    assert "fails" not in text
+    assert "worst" not in text
+    assert "missing moment" not in text
+
+
+@pytest.fixture
+def drifting(tmp_path):
+    """A model whose trim is off: the rate is followed tolerably, the angle it adds up to is not."""
+    return save_model(trial.vehicle(Axis.YAW, C0=0.05), tmp_path / "drifting.yaml")
+
+
+def test_the_channel_that_fails_worse_leads_the_text_and_the_json_and_both_are_there(run_cli, tmp_path, drifting):
+    log = trial.flown(tmp_path, spec="zigzag")
+    (run,) = run_cli("compare", drifting, log, "--json").json["runs"]
+    assert run["angle_fit_percent"] < 0.0
+    assert run["rate_fit_percent"] > 50.0
+    assert (run["judged_by"], list(run["over_floor"])) == ("angle", ["angle", "rate"])
+    assert [f["channel"] for f in run["failing"]] == ["angle", "rate"]
+    assert run["where"] == run["failing"][0]["where"] != run["failing"][1]["where"]
+    assert run["worst"] == run["failing"][0]["worst"]
     assert {"condition", "share_of_error", "rms_ratio", "t_start_s", "t_end_s"} <= set(run["where"][0])
+    text = run_cli("compare", drifting, log).out
+    assert 0 < text.index(f"where the angle fails, {run['over_floor']['angle']:.1f} x") < text.index("where the rate fails")
+
+
+def test_the_gate_sees_the_angle_too(run_cli, tmp_path, drifting):
+    answer = run_cli("compare", drifting, trial.flown(tmp_path, spec="zigzag"), "--min-fit", 30)
+    assert answer.code == 1
+    assert "gate failed: run7 has angle fit -" in answer.err
+    assert "has rate fit" not in answer.err
 
 
 def test_what_a_log_rounds_between_its_samples_is_said_with_the_error_as_logged(run_cli, tmp_path):
@@ -53,7 +86,7 @@ def test_a_speed_that_is_a_little_off_is_said_with_the_error_as_logged(run_cli, 
 
 
 def test_one_figure_per_run_is_drawn_beside_each_other(run_cli, tmp_path):
-    runs = [trial.flown(tmp_path, spec="zigzag", name=n) for n in ("one", "two")]
+    runs = [trial.flown(tmp_path, spec="zigzag", seed=k, name=n) for k, n in enumerate(("one", "two"))]
     body = run_cli("compare", trial.model_file(tmp_path), *runs, "-o", tmp_path / "out", "--json").json
     assert [r["figure"] for r in body["runs"]] == [str(tmp_path / "out" / f"truth_on_{n}.png") for n in ("one", "two")]
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["truth_on_one.png", "truth_on_two.png"]

@@ -20,6 +20,7 @@ from fieldsid.logs import load_run
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.planning.leg import commands_of
 from fieldsid.planning.plan_file import load_plan
+from fieldsid.rounding import number
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +84,23 @@ def test_the_error_on_unseen_runs_falls_to_the_noise(tour):
     before, after = results_of(tour, "compare")
     for one, two in zip(before["runs"], after["runs"], strict=True):
         assert two["rate_rms_rad_s"] < 0.5 * one["rate_rms_rad_s"]
+
+
+def test_the_tour_quotes_the_channel_that_fails_worse_and_the_other(tour):
+    for step in (s for s in tour["steps"] if s["command"].split()[1] == "compare"):
+        run = max(step["result"]["runs"], key=lambda r: max(r["over_floor"].values()))
+        worse, other = run["over_floor"]
+        assert run["over_floor"][worse] >= run["over_floor"][other]
+        said = [
+            f"{name} fit is {number(run[f'{name}_fit_percent'], 3)} % ({over:.1f} x" for name, over in run["over_floor"].items()
+        ]
+        assert step["means"].index(said[0]) < step["means"].index(said[1])
+
+
+def test_a_comparison_that_is_down_to_the_noise_sends_nobody_looking():
+    compared = next(s for s in STEPS if s.line.startswith("compare"))
+    run = {"run": "a", "judged_by": "angle", "over_floor": {"angle": 1.02}, "angle_fit_percent": 96.0, "failing": [], "where": []}
+    assert compared.means({"runs": [run]}).endswith("That is the noise: here the model lacks nothing.")
 
 
 def test_a_step_that_needs_what_nobody_learned_is_left_out():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hidden_lag
 import pytest
 from cli import trial
+from in_time import in_time
 
 from fieldsid.artifacts import load_record
 from fieldsid.effects import forget_effects
@@ -79,36 +80,51 @@ def test_a_run_cannot_be_learned_from_and_judge(run_cli, logs):
     assert "is given twice" in answer.err
 
 
-def test_a_fin_that_hardly_moves_is_no_excitation(run_cli, tmp_path):
+@pytest.mark.parametrize("share", [0.0, 1e-4, 0.02], ids=["constant", "the servo's own step", "a third of a degree"])
+@pytest.mark.parametrize("place", ["learned from", "to judge by"])
+def test_a_run_whose_fin_hardly_moves_is_refused_at_once_and_named(run_cli, logs, tmp_path, share, place):
     run = hidden_lag.runs()[0][0]
-    still = hidden_lag.replace(run, signals={**run.signals, "rudder_rad": 1e-4 * run["rudder_rad"]})
-    answer = run_cli("diagnose", save_run(still, tmp_path / "still.parquet"), "--axis", "yaw")
-    assert answer.code == 2
-    assert "does not excite yaw" in answer.err
-    assert "\nhint: fly an excitation" in answer.err
+    still = hidden_lag.replace(run, name="still", signals={**run.signals, "rudder_rad": share * run["rudder_rad"]})
+    path = save_run(still, tmp_path / "still.parquet")
+    given = (logs.train[0], path) if place == "learned from" else (logs.train[0], "--validate", path)
+    with in_time(20):
+        answer = run_cli("diagnose", *given, "--axis", "yaw")
+    assert answer.code == (1 if place == "learned from" else 2)  # of several to learn from the others are used
+    assert "`rudder_rad` of run 'still' never leaves its trim" in answer.err
+    assert "hint: leave that run out, or fly an excitation: `sysid plan --axis yaw`" in answer.err
+    assert "never leaves its trim" in run_cli("identify", path, "--axis", "yaw", "-o", tmp_path).err
 
 
 OWN = "name: own\nmoment: '{}'\ncoefficients: {{k_own: {{unit: rad/s^2, low: 0, high: 20, start: 1.0}}}}\n"
 
 
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """Write the moment of an effect of one's own in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "effects").mkdir()
+    yield lambda moment: (tmp_path / "effects" / "own.yaml").write_text(OWN.format(moment))
+    forget_effects()
+
+
 @pytest.mark.parametrize(
     ("moment", "says"),
     [
-        ("k_own * rr", "there is no signal or coefficient `rr`"),
-        ("k_own * (r +", "cannot be read here"),
         ("k_own / (r - r)", "divides by zero at t = 0.000 s"),
         ("k_own * exp(50 * abs(r))", "grows without bound"),
     ],
 )
-def test_a_users_effect_that_is_wrong_is_refused_with_the_place(run_cli, logs, tmp_path, monkeypatch, moment, says):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "effects").mkdir()
-    (tmp_path / "effects" / "own.yaml").write_text(OWN.format(moment))
-    try:
-        answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
-    finally:
-        forget_effects()
+def test_a_users_effect_that_fails_in_flight_is_refused_with_the_place(run_cli, logs, own, moment, says):
+    own(moment)
+    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
     assert (answer.code, answer.out) == (2, "")
     assert says in answer.err
     assert "\nhint: " in answer.err
     assert moment in answer.err
+
+
+def test_a_users_effect_that_cannot_be_read_takes_no_part(run_cli, logs, own):
+    own("k_own * rr")
+    answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen, "--json")
+    assert answer.json["effects"] == ["servo_lag"]
+    assert "`effects/own.yaml`: there is no signal or coefficient `rr`; it takes no part\n  found: k_own * rr\n" in answer.err

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 import hidden_lag
 import pytest
 from cli import trial
@@ -43,6 +45,41 @@ def test_an_effect_that_pays_is_kept_beside_its_parent_with_its_lineage(run_cli,
     assert said["data"][0]["sha256"] == sha256_of(logs.train[0])
 
 
+@pytest.fixture(scope="module")
+def two_missing(tmp_path_factory):
+    """A trial whose vehicle lacks two effects: a slow servo and drag that grows with the rate."""
+    return hidden_lag.files(tmp_path_factory.mktemp("two missing"), quadratic=4.0)
+
+
+def test_what_is_left_is_said_and_the_next_command_can_be_pasted(run_cli, two_missing, parent):
+    asked = ("extend", parent, *two_missing.train, "--add", "servo_lag", "--validate", two_missing.unseen)
+    body = run_cli(*asked, "--json").json
+    assert body["kept"]
+    assert body["left"]["unseen"] == body["over_floor"]["after"] > 1.15
+    assert body["left"]["more_than_noise"]
+    answer = run_cli(*asked, "--force")
+    said = f"left: {body['left']['unseen']:.2f} x the noise floor on unseen data"
+    assert said in answer.out
+    (pasted,) = (line.removeprefix("next: sysid ") for line in answer.out.splitlines() if line.startswith("next: "))
+    assert pasted == body["next"].removeprefix("sysid ")
+    found = run_cli(*shlex.split(pasted), "--json").json
+    assert (found["known"], found["effects"]) == (["servo_lag"], ["quadratic_damping"])
+
+
+def test_where_an_addition_is_not_kept_the_next_command_is_about_the_parent(run_cli, two_missing, parent):
+    body = run_cli("extend", parent, *two_missing.train, "--add", "gyro_scale", "--json").json
+    assert not body["kept"]
+    assert body["left"]["fitted"] > 1.15
+    assert shlex.split(body["next"])[-2:] == ["--model", str(parent)]
+
+
+def test_at_the_noise_the_next_command_uses_the_model(run_cli, logs, parent):
+    body = run_cli("extend", parent, *logs.train, "--add", "servo_lag", "--validate", logs.unseen, "--json").json
+    assert not body["left"]["more_than_noise"]
+    assert body["next"] == f"sysid turn-radius {body['model']}"
+    assert run_cli(*shlex.split(body["next"])[1:]).code == 0
+
+
 def test_an_effect_that_does_not_pay_is_not_kept_and_nothing_is_written(run_cli, straight, parent):
     asked = ("extend", parent, *straight.train, "--add", "deadband", "--validate", straight.unseen)
     body = run_cli(*asked, "--json").json
@@ -55,7 +92,7 @@ def test_keep_overrules_and_is_remembered(run_cli, straight, parent, tmp_path):
     answer = run_cli("extend", parent, *straight.train, "--add", "deadband", "--validate", straight.unseen, "--keep", "-o", out)
     assert answer.code == 0
     assert "kept because of --keep: on unseen data it does not pay" in answer.out
-    assert max(len(line.rstrip()) for line in answer.out.splitlines() if not line.startswith("model: ")) <= 80
+    assert max(len(line.rstrip()) for line in answer.out.splitlines() if not line.startswith(("model: ", "next: "))) <= 80
     assert load_model(out).info["extension"]["kept_by"] == "--keep"
 
 

@@ -36,6 +36,18 @@ def test_text_shows_the_candidates_and_says_what_the_exponent_says(run_cli, tmp_
     assert "proves little" in answer.err
 
 
+def test_the_limit_of_a_point_is_said_with_its_meaning(run_cli, tmp_path):
+    out = " ".join(run_cli("fit", table(tmp_path)).out.split())
+    assert (
+        "off: how far from the law of the others, in standard errors; one of 5 points is beyond +/-9.9 by chance in 1 law of 20"
+        in out
+    )
+    assert "out of place" not in out
+    few = run_cli("fit", table(tmp_path, rows=YAW[:4]))
+    assert "4 points are too few to say which does not belong" in " ".join(few.out.split())
+    assert "b2 of" not in few.err
+
+
 def test_the_file_is_written_with_its_figure_and_not_twice(run_cli, tmp_path):
     law = tmp_path / "law.yaml"
     assert run_cli("fit", table(tmp_path), "-o", law).code == 0

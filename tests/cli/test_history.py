@@ -33,6 +33,12 @@ def test_the_error_is_told_before_and_after_each_addition(run_cli, line, tmp_pat
     assert (tmp_path / "h.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.parametrize(("suffix", "first"), [(".svg", b"<?xml"), (".pdf", b"%PDF-")])
+def test_the_figure_is_of_the_kind_that_its_name_says(run_cli, line, tmp_path, suffix, first):
+    assert run_cli("history", line, "--figure", tmp_path / f"h{suffix}").code == 0
+    assert (tmp_path / f"h{suffix}").read_bytes().startswith(first)
+
+
 def test_text_is_a_table_effect_by_effect(run_cli, line):
     answer = run_cli("history", line)
     assert answer.code == 0

@@ -70,13 +70,37 @@ def test_several_speeds_make_one_joint_model(run_cli, tmp_path):
     assert (tmp_path / "joint_yaw.yaml").is_file()
 
 
+def test_the_parameters_of_a_joint_fit_are_printed_with_the_speed_they_belong_to(run_cli, tmp_path):
+    runs = [trial.flown(tmp_path, speed=u, seed=i, name=f"v{u}") for i, u in enumerate((1.0, 1.4, 1.8))]
+    first = run_cli("identify", runs[1], "--axis", "yaw").out
+    joint = run_cli("identify", *runs, "--axis", "yaw", "--joint").out
+    named = [[line[len(label) :].split()[0] for line in text.splitlines() if "+/-" in line and "warning" not in line]
+             for text, label in ((first, "v1.4"), (joint, "3 runs"))]  # fmt: skip
+    assert named[0] == ["a22", "b2", "C0", "delta_r0"]
+    assert named[1] == ["a22@1.4", "b2@1.4", "C0", "damping_exponent", "b2@1", "b2@1.8", "delta_r0@1.4"]
+
+
 def test_two_files_of_one_name_are_told_apart_by_their_folders(run_cli, tmp_path):
     runs = []
-    for folder in ("a", "b"):
+    for seed, folder in enumerate(("a", "b")):
         (tmp_path / folder).mkdir()
-        runs.append(trial.flown(tmp_path / folder))
+        runs.append(trial.flown(tmp_path / folder, seed=seed))
     body = run_cli("identify", *runs, "--axis", "yaw", "--json").json
     assert [f["run"] for f in body["fits"]] == ["a_run7", "b_run7"]
+
+
+def test_two_legs_of_one_log_have_a_model_each_and_the_same_leg_twice_is_refused(run_cli, tmp_path):
+    log = trial.flown(tmp_path)
+    legs = [tmp_path / "legs" / name for name in ("out.parquet", "back.parquet")]
+    for leg, part in zip(legs, (["--to", 17], ["--from", 16]), strict=True):
+        assert run_cli("import", log, *part, "-o", leg).code == 0
+    asked = ["--axis", "yaw", "-o", tmp_path / "m", "--no-figures", "--json"]
+    body = run_cli("identify", *legs, *asked).json
+    assert [f["run"] for f in body["fits"]] == ["out", "back"]
+    assert sorted(p.name for p in (tmp_path / "m").iterdir()) == ["back_yaw.yaml", "out_yaw.yaml"]
+    answer = run_cli("identify", legs[0], legs[1], legs[0], *asked, "--force")
+    assert answer.code == 2
+    assert f"`{legs[0]}` is given twice" in answer.err
 
 
 def test_text_fits_eighty_columns_and_says_that_nothing_was_kept(run_cli, tmp_path):

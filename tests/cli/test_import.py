@@ -122,7 +122,7 @@ def test_import_warns_on_stderr_and_keeps_the_finding_in_the_run(run_cli, log, t
 
 def test_the_vehicle_of_the_trial_folder_says_where_the_fin_saturates(run_cli, log, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("vehicle.yaml").write_text("name: a\nrudder_max_rad: 0.2\n")
+    Path("vehicle.yaml").write_text("name: a\nrudder_max_rad: 0.15\n")
     assert "[saturated]" in run_cli("import", log, "-o", "runs").err
 
 
@@ -164,7 +164,7 @@ BAD = {
     "header only": (lambda p: edited(p, lambda r: r[:1]), "has no rows", "copy it"),
     "truncated gzip": (truncated, "truncated gzip", "--salvage"),
     "a missing file": (lambda p: p.with_name("other.csv"), "there is no log", "path"),
-    "a folder": (lambda p: p.parent, "is no log", ".csv"),
+    "a folder": (lambda p: p.parent, "is a folder", ".csv"),
 }
 
 
@@ -183,11 +183,41 @@ def test_bad_input_is_a_three_part_error_and_leaves_everything_as_it_was(run_cli
     assert not (tmp_path / "runs").exists()
 
 
-def test_one_bad_log_among_several_writes_none_of_them(run_cli, log, tmp_path):
+def test_one_bad_log_among_several_is_skipped_with_its_reason_and_the_others_are_written(run_cli, log, tmp_path):
     bad = tmp_path / "bad.csv"
     bad.write_text("")
-    assert run_cli("import", log, bad, "-o", tmp_path / "runs").code == 2
+    answer = run_cli("import", bad, log, "-o", tmp_path / "runs", "--json")
+    assert answer.code == 1
+    assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run7.parquet"]
+    body = json.loads(answer.out)
+    assert [r["run"] for r in body["runs"]] == ["run7"]
+    (skipped,) = body["skipped_runs"]
+    assert (skipped["run"], skipped["file"], skipped["found"]) == ("bad", str(bad), "0 bytes")
+    assert f"skipped `{bad}`" in answer.err
+    assert "1 of 2 logs skipped" in answer.err
+
+
+def test_nothing_is_written_where_no_log_can_be_used_or_the_mapping_is_wrong(run_cli, log, tmp_path):
+    bad = [tmp_path / f"bad{i}.csv" for i in range(2)]
+    for path in bad:
+        path.write_text("")
+    answer = run_cli("import", *bad, "-o", tmp_path / "runs")
+    assert answer.code == 2
+    assert "no log is left that can be used" in answer.err
+    mapping = tmp_path / "m.yaml"
+    mapping.write_text("signalz: {}\n")
+    answer = run_cli("import", log, log.with_name("no.csv"), "-m", mapping, "-o", tmp_path / "runs")
+    assert (answer.code, "skipped" in answer.err) == (2, False)
+    answer = run_cli("import", log, log.with_name("no.csv"), "--channel", "yaw=heading", "-o", tmp_path / "runs")
+    assert (answer.code, "skipped" in answer.err) == (2, False)
     assert not (tmp_path / "runs").exists()
+
+
+def test_two_parts_of_one_log_are_two_runs_and_called_as_their_files(run_cli, log, tmp_path):
+    for name, part in (("first", ["--to", 9]), ("second", ["--from", 9.05])):
+        body = run_cli("import", log, *part, "-o", tmp_path / f"{name}.parquet", "--json").json
+        assert body["runs"][0]["run"] == name
+    assert load_run(tmp_path / "second.parquet").name == "second"
 
 
 def test_an_output_that_exists_is_kept_unless_forced(run_cli, log, tmp_path):
@@ -211,11 +241,20 @@ def test_a_log_is_never_written_over_itself(run_cli, log):
     assert sha256_of(log) == before
 
 
-def test_two_logs_of_one_name_are_refused(run_cli, log, tmp_path):
-    other = save_run(load_run(log), tmp_path / "run7.csv.gz")
-    answer = run_cli("import", log, other, "-o", tmp_path / "runs")
-    assert answer.code == 2
-    assert "the same run" in answer.err
+def test_two_logs_of_one_name_become_two_runs(run_cli, log, tmp_path):
+    other = save_run(load_run(log).between(0.0, 15.0), tmp_path / "run7.csv.gz")
+    body = run_cli("import", log, other, "-o", tmp_path / "runs", "--json").json
+    assert [r["run"] for r in body["runs"]] == ["logs_run7", f"{tmp_path.name}_run7"]
+    assert [len(load_run(Path(r["file"]))) for r in body["runs"]] == [400, 301]
+
+
+def test_one_log_twice_is_refused_whatever_its_file(run_cli, log, tmp_path):
+    copy = save_run(load_run(log), tmp_path / "copy.parquet")
+    for twice, says in (((log, log), f"`{log}` is given twice"), ((log, copy), f"`{copy}` holds the same data as `{log}`")):
+        answer = run_cli("import", *twice, "-o", tmp_path / "runs")
+        assert answer.code == 2
+        assert says in answer.err
+    assert not (tmp_path / "runs").exists()
 
 
 MAPPINGS = {
@@ -248,3 +287,33 @@ def test_salvage_takes_what_is_left_and_says_so(run_cli, log, tmp_path):
     answer = run_cli("import", truncated(log), "--salvage", "-o", tmp_path / "runs", "--json")
     assert 50 < answer.json["runs"][0]["samples"] < 400
     assert "[truncated]" in answer.err
+
+
+def rates(run_cli, log, *options):
+    return {c["name"]: c["rate"] for c in run_cli("inspect", log, "--json", *options).json["shown"]}
+
+
+@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "parquet"])
+def test_inspect_says_the_rate_of_each_column_of_a_table(run_cli, tmp_path, suffix):
+    slow = np.where(np.arange(TIME.size) % 10 == 0, 5.0 + 0.01 * TIME, np.nan)
+    log = save_run(Run("run7", TIME, {**SIGNALS, "depth_m": slow}), tmp_path / f"run7.{suffix}")
+    assert rates(run_cli, log) == {"time_s": "20", **dict.fromkeys(SIGNALS, "20"), "depth_m": "2"}
+
+
+@pytest.mark.parametrize(
+    ("head", "scale", "options", "rate"),
+    [
+        ("Timestamp,a", 1e9, [], "20"),
+        ("stamp,a", 1.0, [], "20"),
+        ("", 1.0, [], "20"),
+        ("tick,a", 1e3, [], "-"),
+        ("tick,a", 1e3, ["-m", "ms.yaml"], "20"),
+        ("time_ms,a", 1e3, [], "20"),
+    ],
+)
+def test_the_rate_comes_from_the_time_that_names_or_mapping_tell(run_cli, tmp_path, monkeypatch, head, scale, options, rate):
+    monkeypatch.chdir(tmp_path)
+    Path("ms.yaml").write_text("time: {column: tick, unit: ms}\nsignals: {yaw_rad: a}\n")
+    rows = [head] * bool(head) + [f"{round((1.7e9 * (scale == 1e9) + t) * scale, 3):.17g},{0.01 * t:.4f}" for t in TIME]
+    Path("plain.csv").write_text("\n".join(rows) + "\n")
+    assert set(rates(run_cli, "plain.csv", *options).values()) == {rate}

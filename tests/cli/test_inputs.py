@@ -12,7 +12,8 @@ from cli import trial
 from fieldsid.cli import inputs
 from fieldsid.cli.inputs import STDIN, read_runs
 from fieldsid.copies import can_copy
-from fieldsid.errors import LogError, UsageError
+from fieldsid.errors import DataError, LogError, UsageError
+from fieldsid.logs import load_run, save_run
 
 needs_copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
 
@@ -47,9 +48,9 @@ def test_the_files_are_read_in_the_copy(files, nothing_read, monkeypatch):
     here = os.getpid()
     read = inputs._read
 
-    def elsewhere(path, mapping):
+    def elsewhere(path, **more):
         assert os.getpid() != here
-        return read(path, mapping)
+        return read(path, **more)
 
     monkeypatch.setattr(inputs, "_read", elsewhere)
     assert [run.name for run in read_runs(files, meanwhile=lambda: None)] == ["run1", "run2"]
@@ -73,7 +74,7 @@ def test_what_is_wrong_with_a_file_is_told_as_ever(files, nothing_read, tmp_path
 def test_standard_input_is_read_here(monkeypatch):
     seen: list[tuple[Path, int]] = []
 
-    def note(path, _mapping):
+    def note(path, **_more):
         seen.append((path, os.getpid()))
         raise LogError("enough")
 
@@ -81,3 +82,63 @@ def test_standard_input_is_read_here(monkeypatch):
     with pytest.raises(LogError, match="enough"):
         read_runs([STDIN], meanwhile=lambda: None)
     assert seen == [(STDIN, os.getpid())]
+
+
+def test_two_legs_of_one_log_are_two_runs(files, run_cli, tmp_path):
+    legs = [tmp_path / f"leg{k}.parquet" for k in (1, 2)]
+    for leg, part in zip(legs, (["--to", 15], ["--from", 15.05]), strict=True):
+        assert run_cli("import", files[0], *part, "-o", leg).code == 0
+    assert [run.name for run in read_runs(legs)] == ["leg1", "leg2"]
+
+
+@pytest.mark.parametrize(
+    ("places", "names"),
+    [
+        (["a/run7.csv", "b/run7.csv"], ["a_run7", "b_run7"]),
+        (["a/x/run7.csv", "b/x/run7.csv"], ["a_x_run7", "b_x_run7"]),
+        (["a/run7.csv", "a/run7.csv.gz"], ["run7_csv", "run7_gz"]),
+        (["a/run7.csv", "b/run7.csv", "b/a_run7.csv"], ["a_run7", "b_run7", "a_run7_2"]),
+        (["a/v1.2.csv", "a/v1.3.csv"], ["v1.2", "v1.3"]),
+        (["a/Grün 7.csv", "b/Grün 7.csv"], ["a_Grün 7", "b_Grün 7"]),
+    ],
+)
+def test_files_that_share_a_name_are_told_apart(files, tmp_path, places, names):
+    run, paths = load_run(files[0]), [tmp_path / place for place in places]
+    for k, path in enumerate(paths):
+        save_run(run.between(0.0, 20.0 + k), path)
+    assert [r.name for r in read_runs(paths)] == names
+
+
+def test_a_file_that_cannot_be_read_does_not_change_the_names_of_the_others(files, tmp_path):
+    paths = [save_run(load_run(files[k]), tmp_path / folder / "run7.csv") for k, folder in enumerate("ab")]
+    paths[0].write_text("")
+    skipped: list[Path] = []
+    assert [r.name for r in read_runs(paths, refused=lambda path, _error: skipped.append(path))] == ["b_run7"]
+    assert skipped == [paths[0]]
+
+
+def test_the_same_data_are_refused_in_any_file(files, tmp_path):
+    for name in ("copy.parquet", "copy.csv"):
+        copy = save_run(load_run(files[0]), tmp_path / name)
+        with pytest.raises(UsageError, match="holds the same data as") as caught:
+            read_runs([files[0], files[1], copy])
+        assert caught.value.hint == f"leave `{copy}` out"
+
+
+@needs_copies
+@pytest.mark.parametrize("beside", [False, True])
+def test_of_several_files_those_that_can_be_read_are(files, nothing_read, tmp_path, beside):
+    (tmp_path / "cut.csv").write_text("time_s,yaw_rad\n")
+    told: list[tuple[Path, str]] = []
+    paths = [tmp_path / "cut.csv", *files, tmp_path / "gone.csv"]
+    runs = read_runs(
+        paths, refused=lambda path, error: told.append((path, str(error))), meanwhile=(lambda: None) if beside else None
+    )
+    assert [run.name for run in runs] == ["run1", "run2"]
+    assert [path for path, _ in told] == [paths[0], paths[3]]
+    assert "has no rows" in told[0][1]
+    assert "found: " in told[0][1]
+    with pytest.raises(DataError, match="no log is left"):
+        read_runs([paths[0], paths[3]], refused=lambda _path, _error: None)
+    with pytest.raises(LogError, match="has no rows"):
+        read_runs([paths[0]], refused=lambda _path, _error: None)

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
+from moos_helm import script
 
+from fieldsid.planning.leg import error_in_words
 from fieldsid.planning.plan_file import load_plan
+from fieldsid.rounding import number
+from fieldsid.templates import template_path
 
 QUICK = ("plan", "--speeds", "1.4", "--window", "22")
 
@@ -26,6 +31,26 @@ def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(run_cli):
     for word in ("a22", "b2", "C0", "minutes", "risk", "m;", "pulses need"):
         assert word in answer.out
     assert "-o DIR" in answer.err
+
+
+def test_the_error_of_a_trim_that_may_be_zero_is_no_share_of_it(run_cli, written):
+    answer = run_cli(*QUICK)
+    rows = {line.split()[1]: line for line in answer.out.splitlines() if line.startswith("1.40")}
+    assert rows["a22"].count(" %") == rows["b2"].count(" %") == 2
+    assert "%" not in rows["C0"]
+    assert rows["C0"].count("+/-") == 3
+    plan = load_plan(written / "plan.yaml")
+    e = plan.legs[0].expected["C0"]
+    assert error_in_words(e.value, e.std_error, e.relative) == f"+/- {number(e.std_error, 2)}"
+
+
+@pytest.mark.parametrize(
+    ("value", "std_error", "scale", "said"),
+    [(2.0, 0.1, 2.0, "5.0 %"), (-2.0, 0.1, 2.0, "5.0 %"), (0.0, 0.0024, 0.23, "+/- 0.0024"), (0.02, 0.0024, 0.23, "+/- 0.0024"),
+     (0.1, 0.08, 0.1, "+/- 0.080")],
+)  # fmt: skip
+def test_an_error_is_a_share_only_of_a_value_that_is_not_zero(value, std_error, scale, said):
+    assert error_in_words(value, std_error, std_error / scale) == said
 
 
 def test_json_is_one_object_with_every_parameters_expected_error(run_cli):
@@ -66,6 +91,48 @@ def test_rivals_are_told_apart_with_odds(run_cli):
     assert "tells them apart" in body["says"][0]
 
 
+def test_rivals_get_a_leg_at_every_speed_inside_the_default_limits_and_circles_where_asked(run_cli):
+    body = run_cli("plan", "--separate", "servo_lag,delay", "--speeds", "1.0,1.4", "--radius", "--json").json
+    assert [leg["speed_m_s"] for leg in body["legs"]] == [1.0, 1.4, 1.0, 1.0, 1.4, 1.4]
+    assert [leg["purpose"] for leg in body["legs"]].count("turn radius") == 4
+    assert body["envelope"]["heading"] == pytest.approx(np.radians(60.0))
+    for leg, found in zip(body["legs"], body["separations"], strict=False):
+        assert leg["excursions"]["heading"] < np.radians(66.0)
+        assert leg["parameters"] == found["parameters"]  # the odds are those of what is flown
+        assert {"signal": "yaw_rad", "kind": "deviation"}.items() <= next(a for a in leg["abort"] if "yaw" in a["signal"]).items()
+
+
+def test_every_leg_is_written_as_fins_in_every_format_rules_and_circles_too(run_cli, tmp_path):
+    for axis, more in (("pitch", ("--depth-band", "1:8")), ("yaw", ("--radius",))):
+        folder = tmp_path / axis
+        body = run_cli(
+            "plan", "--axis", axis, "--speeds", "1.4", "--window", "22", *more, "--course", "30deg", "-o", folder, "--json"
+        ).json
+        for i, leg in enumerate(body["legs"], 1):
+            assert leg.get("replay_break_probability") is None or leg["replay_break_probability"] <= 0.05
+            events, _ = script(next(folder.glob(f"leg{i:02d}*timer_script.moos")).read_text())
+            assert max(abs(float(v)) for _, n, v in events if n.startswith("DESIRED")) > 5.0
+            assert next(folder.glob(f"leg{i:02d}*dune.ini")).read_text().count(",") > 10
+            assert ", false }" in next(folder.glob(f"leg{i:02d}*ardupilot.lua")).read_text()
+
+
+def test_what_a_maneuver_does_not_show_is_no_number(run_cli):
+    out = run_cli("plan", "--separate", "current,trim_drift", "--max-heading", "none").out
+    assert "inf" not in out
+    assert "nan" not in out
+    assert "heading NOT LIMITED" in out
+
+
+def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
+    out = " ".join(run_cli(*QUICK, "--max-roll", "20deg", "--depth-band", "2:6", "--area", "200x60").out.split())
+    for words in ("fin 14.9 deg (0.26 rad)", "fin rate NOT LIMITED", "heading 60 deg (1.05 rad)", "track NOT LIMITED",
+                  "pitch NOT LIMITED", "roll 20 deg (0.349 rad)", "depth 2 to 6 m", "area 200 m along, 30 m to either side",
+                  "only to be watched in flight: depth"):  # fmt: skip
+        assert words in out, words
+    circles = " ".join(run_cli(*QUICK, "--radius").out.split())
+    assert "turning_circle at 1.4 m/s: heading 1440 deg (25.1 rad)" in circles
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -85,6 +152,16 @@ def test_rivals_are_told_apart_with_odds(run_cli):
         (("--window", "7"), "--window"),
         (("--rate", "0"), "--rate"),
         (("--max-heading", "0.1deg"), "widen"),
+        (("--max-heading", "60"), "60deg`, or `60rad`"),
+        (("--radius", "--max-heading", "90deg"), "--max-heading"),
+        (("--radius", "--open-loop"), "--open-loop"),
+        (("--radius", "--max-track", "5"), "--max-track"),
+        (("--model", "a.yaml", "--prior", "torpedo"), "give one"),
+        (("--separate", "delay,servo_lag", "--want", "a22=5%"), "--want"),
+        (("--separate", "delay,servo_lag", "--minutes", "0.5"), "--minutes"),
+        (("--from", "a.yaml", "--prior", "torpedo"), "leave the latter out"),
+        (("--write", "csv"), "-o DIR"),
+        (("--write", "cvs", "-o", "/dev/null/new"), "csv"),
         (("--axis", "pitch", "--radius"), "--axis yaw"),
         (("--separate", "delay"), "delay,servo_lag"),
         (("--separate", "delay,lag"), "servo_lag"),
@@ -115,9 +192,18 @@ def test_the_vehicles_own_limits_and_signs_are_kept(run_cli, tmp_path):
     assert run_cli("plan", "--speeds", "3", "--vehicle", vehicle).code == 2
 
 
-def test_an_unstable_prior_is_refused(run_cli, tmp_path):
-    from fieldsid.templates import template_path
+def test_a_model_of_the_other_axis_is_refused_in_every_mode_and_its_own_axis_is_taken(run_cli, tmp_path):
+    pitch = template_path("plan/priors/torpedo_pitch.yaml")
+    for more in ((), ("--separate", "delay,servo_lag")):
+        answer = run_cli(*QUICK, "--model", pitch, "--axis", "yaw", *more)
+        assert answer.code == 2
+        assert "pitch" in answer.err
+    body = run_cli(*QUICK, "--model", pitch, "--json").json
+    assert body["axis"] == "pitch"
+    assert body["envelope"]["pitch"] == pytest.approx(np.radians(30.0))
 
+
+def test_an_unstable_prior_is_refused(run_cli, tmp_path):
     prior = tmp_path / "prior.yaml"
     prior.write_text(template_path("plan/priors/torpedo_yaw.yaml").read_text().replace("value: 1.1", "value: -0.2"))
     answer = run_cli(*QUICK, "--model", prior)

@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import re
+from dataclasses import replace
+
 import pytest
+from cli import trial
 from cli.test_fit import table
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import save_model
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.rounding import number
 
 
 @pytest.fixture
@@ -23,6 +33,23 @@ def test_design_prints_the_papers_gains(run_cli, tmp_path):
     assert body["provenance"]["models"][0]["sha256"]
 
 
+def test_the_helps_own_example_counts_with_the_servo_of_the_models(run_cli, tmp_path):
+    paths = []
+    for speed in (1.0, 1.8):
+        model = trial.vehicle(Axis.YAW, "servo_lag", a22=0.8 * speed, b2=-0.6 * speed**2, lag=0.3)
+        paths.append(save_model(replace(model, law=SpeedLaw(speed)), tmp_path / f"m{speed}.yaml"))
+    law = tmp_path / "law.yaml"
+    assert run_cli("fit", *paths, "-o", law, "--no-figures").code == 0
+    body = run_cli("schedule", "design", law, "--fin-limit", "0.26", "--json").json
+    assert body["actuator"]["lag_s"] == 0.3
+    assert body["rows"] == run_cli("schedule", "design", *paths, "--fin-limit", "0.26", "--json").json["rows"]
+    assert "counted with: lag 0.300 s, delay 0 s" in run_cli("schedule", "design", law, "--fin-limit", "0.26").out
+    bare = " ".join(run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26").out.split())
+    assert "counted with: lag 0 s, delay 0 s, no rate limit; a table carries no effects" in bare
+    rows = run_cli("turn-radius", law, "--rudder-max", "0.2", "--json").json["rows"]
+    assert {r["method"] for r in rows} == {"simulated"}
+
+
 def test_verify_passes_and_fails_by_its_gates(run_cli, gains, tmp_path):
     good = run_cli("schedule", "verify", gains, "--require-phase-margin", "40", "--max-overshoot", "30", "-o", tmp_path / "g.png")
     assert good.code == 0, good.err
@@ -31,6 +58,40 @@ def test_verify_passes_and_fails_by_its_gates(run_cli, gains, tmp_path):
     bad = run_cli("schedule", "verify", gains, "--require-phase-margin", "75")
     assert bad.code == 1
     assert "FAILED: phase_margin_deg" in bad.out
+
+
+def test_verify_begins_with_its_verdict_and_what_that_rests_on(run_cli, gains):
+    body = run_cli("schedule", "verify", gains, "--json").json
+    lines = run_cli("schedule", "verify", gains).out.splitlines()
+    assert body["verdict"] == "holds"
+    assert lines[0] == f"holds: {body['says']}"
+    assert f"{body['worst']['phase_margin_deg']:.1f} deg" in lines[0]
+    assert lines[1] == body["rests_on"]
+    assert lines[1].startswith("rests on yaw.csv with no effects; ")
+    assert "lag 0.200 s" in lines[1]
+    table_at = next(i for i, line in enumerate(lines) if line.startswith("margins and steps"))
+    assert table_at > 1
+
+
+def test_a_gate_that_fails_stands_first_with_its_number_and_speed(run_cli, gains):
+    answer = run_cli("schedule", "verify", gains, "--require-phase-margin", "75", "--max-overshoot", "90")
+    first = answer.out.splitlines()[0]
+    body = json.loads(run_cli("schedule", "verify", gains, "--require-phase-margin", "75", "--json").out)
+    (gate,) = body["gates"]
+    assert (body["verdict"], gate["passed"], answer.code) == ("FAILED", False, 1)
+    assert first == (
+        f"FAILED: phase_margin_deg {number(gate['found'], 3)} at {number(gate['speed_m_s'], 3)} m/s, wanted at least 75"
+    )
+    assert "passed: overshoot_percent" in answer.out
+    assert body["worst"]["phase_margin_deg"] == min(c["phase_margin_least_deg"] for c in body["scheduled"])
+
+
+def test_a_step_that_does_not_settle_is_no_schedule_that_holds(run_cli, gains, tmp_path):
+    weak = tmp_path / "weak.yaml"
+    weak.write_text(re.sub(r"kp: (\S+)", r"kp: -0.001", gains.read_text()))
+    first = run_cli("schedule", "verify", weak).out.splitlines()[0]
+    assert first.startswith("does not hold: at ")
+    assert "a 20 deg step is not within 5 % after 60 s" in first
 
 
 def test_verify_says_when_the_models_are_gone(run_cli, gains, tmp_path):

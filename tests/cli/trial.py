@@ -32,5 +32,5 @@ def flown(
     return save_run(replace(run, name=name), folder / f"{name}.parquet")
 
 
-def model_file(folder: Path, axis: Axis = Axis.YAW) -> Path:
-    return save_model(vehicle(axis), folder / "truth.yaml")
+def model_file(folder: Path, axis: Axis = Axis.YAW, *, force: bool = False) -> Path:
+    return save_model(vehicle(axis), folder / "truth.yaml", force=force)

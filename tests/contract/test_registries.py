@@ -49,3 +49,13 @@ def test_a_file_whose_object_has_another_name_is_refused(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(FieldsidError, match="'one'"):
         members("misnamed", "THING")
+
+
+def test_a_folder_of_helpers_beside_the_members_is_none_itself(tmp_path, monkeypatch):
+    folder = tmp_path / "with_helpers"
+    (folder / "helpers").mkdir(parents=True)
+    for place in (folder, folder / "helpers"):
+        (place / "__init__.py").write_text("")
+    (folder / "one.py").write_text("from types import SimpleNamespace\nTHING = SimpleNamespace(name='one')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert set(members("with_helpers", "THING")) == {"one"}

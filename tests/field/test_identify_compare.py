@@ -42,5 +42,6 @@ def test_the_pulses_model_is_seen_to_fail_at_the_onset_of_a_zigzag(run_cli, shar
     ]
     (run,) = run_cli("compare", fit["model"], lauv / "zigzag_v1.50.csv.gz", "--json").json["runs"]
     assert run["rate_rms_rad_s"] > 2 * run["noise_floor"]["rate_rad_s"]
-    (onset,) = [w for w in run["where"] if w["condition"] == "phase: onset"]
+    (rate,) = (fault for fault in run["failing"] if fault["channel"] == "rate")
+    (onset,) = [w for w in rate["where"] if w["condition"] == "phase: onset"]
     assert onset["rms_ratio"] > 1.5

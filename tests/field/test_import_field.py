@@ -124,13 +124,23 @@ def test_a_bag_without_messages_is_a_clear_error(shared_data, name):
         load_run(shared_data / "bags" / name, mapping_of(MAPPING))
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_a_compressed_bag_cut_anywhere_gives_what_is_left(shared_data, tmp_path, share):
+TURTLE = {"signals": {"yaw_rad": {"topic": "/turtle1/pose", "field": "theta"}}}
+
+
+def test_a_compressed_bag_that_is_cut_after_its_block_is_whole(shared_data, tmp_path):
+    whole = shared_data / "bags" / "example-lz4.bag"
+    cut = tmp_path / "cut.bag"
+    cut.write_bytes(whole.read_bytes()[: int(0.9 * whole.stat().st_size)])
+    run, full = (load_run(log, mapping_of(TURTLE), salvage=True) for log in (cut, whole))
+    np.testing.assert_array_equal(run["yaw_rad"], full["yaw_rad"])
+    assert "truncated" in {n.code for n in run.notes}
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_compressed_bag_that_is_cut_inside_its_only_block_says_that_all_is_lost(shared_data, tmp_path, share):
     whole = (shared_data / "bags" / "example-lz4.bag").read_bytes()
     cut = tmp_path / "cut.bag"
     cut.write_bytes(whole[: int(share * len(whole))])
-    mapping = mapping_of({"signals": {"yaw_rad": {"topic": "/turtle1/pose", "field": "theta"}}})
-    run, full = load_run(cut, mapping, salvage=True), load_run(shared_data / "bags" / "example-lz4.bag", mapping, salvage=True)
-    assert 0.5 * share * len(full) < len(run) <= len(full)
-    np.testing.assert_array_equal(run["yaw_rad"], full["yaw_rad"][: len(run)])
-    assert "truncated" in {n.code for n in run.notes}
+    with pytest.raises(LogError, match="has no messages") as error:
+        load_run(cut, mapping_of(TURTLE), salvage=True)
+    assert "is cut: 0 of its" in error.value.found

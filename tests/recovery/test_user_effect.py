@@ -9,8 +9,8 @@ from truth.noise import Clock, calm
 from truth.physics import Physics
 from truth.simple import fly
 
-from fieldsid.effects import add_effects, forget_effects
-from fieldsid.effects._user import load_user_effects
+from fieldsid.effects import forget_effects
+from fieldsid.effects._own import add_user_effects
 from fieldsid.errors import EffectError
 from fieldsid.fitting.fit import fit
 from fieldsid.fitting.predict import predict
@@ -41,7 +41,7 @@ def record(**physics):
 
 def own(tmp_path, text):
     (tmp_path / "own.yaml").write_text(text)
-    add_effects(load_user_effects(tmp_path).values())
+    add_user_effects(tmp_path)
 
 
 def test_an_effect_of_the_motion_comes_back_and_predicts_like_the_built_in_one(tmp_path):

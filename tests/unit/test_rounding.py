@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.rounding import number, with_error
+from fieldsid.rounding import in_unit, number, with_error
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,7 @@ def test_rounding_moves_neither_by_more_than_the_rule_allows(value, error):
 )
 def test_a_number_alone_has_four_digits(value, expected):
     assert number(value) == expected
+
+
+def test_a_plain_number_has_no_unit_behind_it():
+    assert [in_unit(u) for u in ("1", "1/s", "rad", "")] == ["", "1/s", "rad", ""]

@@ -58,7 +58,7 @@ def test_a_file_that_is_no_mapping_is_refused(tmp_path):
     path = tmp_path / "vehicle.yaml"
     assert find_vehicle(tmp_path) is None
     path.write_text("- a\n- b\n")
-    with pytest.raises(ArtifactError, match="does not hold a mapping"):
+    with pytest.raises(ArtifactError, match="holds no keys with values"):
         find_vehicle(tmp_path)
     path.write_text("name: a\n")
     assert find_vehicle(tmp_path).source == path

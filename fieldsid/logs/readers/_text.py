@@ -1,18 +1,16 @@
-"""Text of a table file and its form: encoding, separator, decimal sign, first line of numbers, header."""
+"""The form of a text table: separator, decimal sign, first line of numbers, header."""
 
 from __future__ import annotations
 
 import re
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
+from fieldsid.logs.strangers import COPY_AGAIN
 
-GZIP = b"\x1f\x8b"
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
-LOOKED_AT_BYTES = 1 << 18
 LOOKED_AT = 400
 """Lines at the start of a file among which the first row of numbers must be."""
 AGREEING = 20
@@ -43,97 +41,6 @@ class Form:
         return self.names[index] if self.names else str(index)
 
 
-def bytes_of(path: Path, limit: int = 0) -> tuple[bytes, bool]:
-    """Return a file's bytes, unzipped, and whether a gzip stream ends early; only the first `limit` bytes when given.
-
-    Raises LogError when nothing can be unzipped.
-    """
-    with path.open("rb") as stream_in:
-        raw = stream_in.read(limit or -1)
-    if not raw.startswith(GZIP):
-        return raw, False
-    if limit:
-        try:
-            return zlib.decompressobj(wbits=31).decompress(raw, limit), False
-        except zlib.error:
-            raw = path.read_bytes()
-    parts: list[bytes] = []
-    while raw.startswith(GZIP):
-        stream = zlib.decompressobj(wbits=31)
-        try:
-            parts.append(stream.decompress(raw))
-        except zlib.error as error:
-            return b"".join(parts) + _up_to_damage(raw, path, error), True
-        if not stream.eof:
-            return b"".join(parts), True
-        raw = stream.unused_data
-    return b"".join(parts), False
-
-
-def _up_to_damage(raw: bytes, path: Path, error: zlib.error) -> bytes:
-    """Feed a damaged stream in small pieces and keep what comes out."""
-    stream, parts = zlib.decompressobj(wbits=31), []
-    try:
-        for i in range(0, len(raw), 512):
-            piece = stream.decompress(raw[i : i + 512])
-            parts.append(piece)
-    except zlib.error:
-        pass
-    if not any(parts):
-        raise LogError(
-            f"`{path}` is not a readable gzip file: {error}", found=f"{len(raw)} bytes", hint="copy it from the vehicle again"
-        )
-    return b"".join(parts)
-
-
-def one_byte_text(raw: bytes, encoding: str | None, path: Path) -> tuple[str, bytes]:
-    """Return an encoding in which a line ends in one byte, and the text in it; UTF-16 becomes UTF-8.
-
-    The encoding is the one asked for, else by byte order mark, else UTF-8, else Windows-1252. Raises LogError when
-    the bytes are no text.
-    """
-    named = encoding or _encoding(raw[:LOOKED_AT_BYTES])
-    try:
-        if "\n".encode(named) != b"\n" and named != "utf-8-sig":
-            named, raw = "utf-8", raw.decode(named, errors="strict" if encoding else "replace").encode("utf-8")
-        elif encoding:
-            raw.decode(named)
-    except (UnicodeDecodeError, LookupError) as error:
-        hint = "name the encoding in the mapping: `table: {encoding: cp1252}`"
-        raise LogError(f"`{path}` is not text in {named}", found=str(error), hint=hint) from error
-    if b"\x00" in raw[:4096]:
-        raise LogError(f"`{path}` is not a text table", found="zero bytes", hint="give a table of text, Parquet or a bag")
-    return named, raw if b"\n" in raw else raw.replace(b"\r", b"\n")
-
-
-def head_of(raw: bytes, encoding: str, size: int) -> str:
-    """Return the text at the start of a file; a character that the cut splits is replaced."""
-    return raw[:size].decode(encoding, errors="replace")
-
-
-def offset_of_line(raw: bytes, line: int) -> int:
-    """Return the byte at which a line starts, counted from 0."""
-    at = 0
-    for _ in range(line):
-        at = raw.index(b"\n", at) + 1
-    return at
-
-
-def _encoding(raw: bytes) -> str:
-    for mark, name in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
-        if raw.startswith(mark):
-            return name
-    head = raw[:512]
-    if head.count(b"\x00") > len(head) // 4:
-        return "utf-16-le" if head[1::2].count(b"\x00") > head[::2].count(b"\x00") else "utf-16-be"
-    try:
-        raw.decode("utf-8")
-    except UnicodeDecodeError as error:
-        # A piece of a file may end inside a character; anything else that is no UTF-8 is Windows text.
-        return "utf-8" if error.start >= len(raw) - 3 else "cp1252"
-    return "utf-8"
-
-
 def form_of(text: str, asked: TableForm, path: Path) -> Form:
     """Find out how a table is written, as far as `asked` leaves it open; raises LogError when there is no row of numbers."""
     lines = text.split("\n", LOOKED_AT + AGREEING)[: LOOKED_AT + AGREEING]
@@ -148,11 +55,11 @@ def form_of(text: str, asked: TableForm, path: Path) -> Form:
     if best is None:
         shown = next((line for line in lines if line.strip()), "")[:80]
         if sum(bool(line.strip()) for line in lines) == 1:
-            raise LogError(f"`{path}` has no rows", found=f"one line: {shown!r}", hint="copy it from the vehicle again")
+            raise LogError(f"`{path}` has no rows", found=f"one line: {shown!r}", hint=COPY_AGAIN)
         raise LogError(
             f"`{path}` holds no table of numbers",
             found=f"first line: {shown!r}",
-            hint="say how it is written in the mapping: `table: {separator: ';', skip: 4}`",
+            hint="if it is one, say in a mapping how it is written, as `table: {separator: ';', skip: 4}`",
         )
     return best
 

@@ -10,9 +10,12 @@ from typing import Any
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.names import TIME
+from fieldsid.logs.naming import stem_of
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
+from fieldsid.logs.readers._clock import clock_of
 from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
 from fieldsid.logs.run import SIGNALS, Note
+from fieldsid.logs.strangers import COPY_AGAIN
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"
@@ -29,13 +32,15 @@ def sniff(path: Path) -> bool:
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers and first values."""
     table = _table(path)
+    clock = clock_of(_columns(path, table), options.clock)
     channels = []
     for name in table.column_names:
         column = table.column(name)
         count = len(column) - column.null_count
         kind = "number" if _is_number(column) else "text"
-        channels.append(ChannelInfo(name, kind, count, float("nan"), (FieldInfo("", kind, tuple(column[:3].to_pylist())),)))
-    return Inventory(path, "Parquet table", float("nan"), tuple(channels))
+        rate = clock.rate_hz(column.to_numpy()) if clock else float("nan")
+        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(column[:3].to_pylist())),)))
+    return Inventory(path, "Parquet table", clock.duration_s if clock else float("nan"), tuple(channels))
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -46,10 +51,8 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
         time = _cells(table, TIME)
         series = {n: Series(time, _cells(table, n), n) for n in table.column_names if n in SIGNALS}
         notes = tuple(Note(n["code"], n["message"], n["data"]) for n in ours["notes"])
-        return RawLog(ours["name"], series, notes, finished=True)
-    names = tuple(table.column_names)
-    columns = Columns(path, names, len(names), lambda i: _cells(table, names[i]))
-    return series_of(path, columns, mapping, (), salvage=options.salvage)
+        return RawLog(stem_of(path), series, notes, finished=True)
+    return series_of(path, _columns(path, table), mapping, (), options)
 
 
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
@@ -58,6 +61,11 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
         return own_map_of(import_module("pyarrow.parquet").read_schema(path).names)
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error
+
+
+def _columns(path: Path, table: Any) -> Columns:
+    names = tuple(table.column_names)
+    return Columns(path, names, len(names), lambda i: _cells(table, names[i]))
 
 
 def _table(path: Path) -> Any:
@@ -71,7 +79,7 @@ def _unreadable(path: Path, error: Exception) -> LogError:
     return LogError(
         f"`{path}` is not a readable Parquet file",
         found=str(error).splitlines()[0][:160],
-        hint="copy it again, or import the log again",
+        hint=COPY_AGAIN,
     )
 
 

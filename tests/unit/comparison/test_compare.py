@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fieldsid.comparison.compare import compare
 from fieldsid.comparison.residuals import companions
 from fieldsid.errors import DataError
+from fieldsid.figures.compare import figure, view_of
 from fieldsid.logs.run import Run
 from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
@@ -31,22 +34,44 @@ def test_the_right_model_is_down_to_the_noise():
     (c,) = compare(truth, [run_of(truth)])
     assert c.merit.rate_rms == pytest.approx(0.0035, rel=0.1)
     assert c.merit.rate_rms / c.floor.rate == pytest.approx(1.0, rel=0.1)
-    assert c.metrics.whiteness_p > 1e-3
-    assert c.metrics.r2 > 0.99
+    assert all(channel.metrics.whiteness_p > 1e-3 for channel in c.channels)
+    assert c.leading.metrics.r2 > 0.99
+    assert c.failing == ()
 
 
 def test_a_missing_lag_shows_at_the_onset():
     (c,) = compare(model(), [run_of(model("servo_lag", lag=0.3))])
-    (onset,) = [p for p in c.where if p.condition == "phase: onset"]
+    (rate,) = (channel for channel in c.failing if channel.name == "rate")
+    (onset,) = [p for p in rate.where if p.condition == "phase: onset"]
     assert onset.rms_ratio > 1.5
-    assert c.metrics.whiteness_p < 1e-6
-    assert c.channel == "rate"
+    assert rate.metrics.whiteness_p < 1e-6
 
 
 def test_a_compass_error_is_judged_by_the_angle():
     truth = model("compass_deviation", deviation_sin=0.2, deviation_cos=0.0)
     (c,) = compare(model(), [run_of(truth, "turning_circle")])
-    assert c.channel == "angle"
+    assert c.leading.name == "angle"
+
+
+def test_the_channel_further_above_its_noise_leads_and_the_other_is_not_hidden():
+    truth = model()
+    (c,) = compare(replace(truth, values=truth.values | {"C0": 0.04}), [run_of(truth)])
+    assert c.merit.angle_fit < 50.0 < c.merit.rate_fit  # a rate that is a little off adds up in the angle
+    assert [channel.name for channel in c.failing] == ["angle", "rate"]
+    assert c.leading.over_floor == pytest.approx(c.merit.angle_rms / c.floor.angle)
+    assert c.leading.over_floor > c.channels[1].over_floor
+    assert c.where == c.leading.where
+
+
+def test_the_figure_shows_the_channels_that_fail_in_their_order_and_shades_nothing_at_the_noise():
+    truth = model()
+    run = run_of(truth)
+    bad, good = (compare(replace(truth, values=truth.values | {"C0": c0}), [run])[0] for c0 in (0.04, 0.02))
+    titles = [ax.get_title(loc="left").split("\n")[0] for ax in figure(bad, truth, "bad").axes]
+    assert [t for t in titles if t] == ["where the error of the angle falls", "where the error of the rate falls"]
+    assert view_of(bad).spans == tuple((s.start_s, s.end_s) for s in bad.leading.worst)
+    assert not any(ax.get_title(loc="left") for ax in figure(good, truth, "good").axes)
+    assert view_of(good).spans == ()
 
 
 def test_the_missing_moment_moves_with_the_signal_that_makes_it():
@@ -61,7 +86,7 @@ def test_a_run_without_a_rate_has_no_missing_moment():
     run = run_of(model())
     bare = Run("bare", run.time, {k: v for k, v in run.signals.items() if k != "yaw_rate_rad_s"})
     (c,) = compare(model(), [bare])
-    assert c.channel == "angle"
+    assert [channel.name for channel in c.channels] == ["angle"]
     assert companions(c.shown, 1.0) == ()
     assert np.isnan(c.merit.rate_rms)
 

@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 
 from fieldsid.effects import add_effects, all_effects, forget_effects, pick_effect
 from fieldsid.effects._expression import parse
-from fieldsid.effects._user import SIGNAL_OF, effect_of, load_user_effect, load_user_effects
+from fieldsid.effects._own import add_user_effects
+from fieldsid.effects._user import SIGNAL_OF, effect_of, load_user_effect
 from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Motion, Stage
 from fieldsid.models.record import Record
+from fieldsid.registry import refused
 
 TEMPLATE = Path(__file__).resolve().parents[3] / "templates" / "effect.yaml"
 K = {"k": {"unit": "1/rad", "low": -5.0, "high": 5.0, "start": 0.1}}
@@ -205,20 +207,60 @@ def test_a_coefficient_must_not_take_a_base_parameters_name():
         effect_of({"name": "own", "moment": "b2 * r", "coefficients": {"b2": K["k"]}}, origin="test")
 
 
-def test_a_folder_gives_its_effects_and_a_broken_file_its_name(tmp_path):
-    assert load_user_effects(tmp_path / "absent") == {}
-    (tmp_path / "one.yaml").write_text("name: one\nmoment: '-k*r'\ncoefficients: {k: {unit: 1/s, low: 0, high: 1, start: 0.1}}\n")
+def folder_of(path: Path, text: str) -> tuple[set[str], list[str]]:
+    """Return the user's effects that are known once a second file says so, and what is wrong with the others."""
+    (path / "two.yml").write_text(text)
+    forget_effects()
+    add_user_effects(path)
+    return {n for n, e in all_effects().items() if e.origin != "built in"}, [error.what for error in refused()]
+
+
+ONE = "name: one\nmoment: '-one_k*r'\ncoefficients: {one_k: {unit: 1/s, low: 0, high: 1, start: 0.1}}\n"
+
+
+def test_a_folder_gives_its_effects_and_a_broken_file_only_its_error(tmp_path):
+    add_user_effects(tmp_path / "absent")
+    assert refused() == ()
+    (tmp_path / "one.yaml").write_text(ONE)
     (tmp_path / "notes.txt").write_text("not an effect")
-    assert list(load_user_effects(tmp_path)) == ["one"]
-    (tmp_path / "two.yml").write_text("name: two\nmoment: '-k*rr'\ncoefficients: {k: {unit: 1/s, low: 0, high: 1, start: 0.1}}\n")
-    with pytest.raises(EffectError, match=r"`two.yml`: there is no signal"):
-        load_user_effects(tmp_path)
-    (tmp_path / "two.yml").write_text("name: one\nmoment: '-k*r'\ncoefficients: {k: {unit: 1/s, low: 0, high: 1, start: 0.1}}\n")
-    with pytest.raises(EffectError, match="two effects are named 'one'"):
-        load_user_effects(tmp_path)
-    (tmp_path / "two.yml").write_text("name: [one\n")
-    with pytest.raises(EffectError, match="not valid YAML"):
-        load_user_effects(tmp_path)
+    assert folder_of(tmp_path, ONE.replace("one", "two")) == ({"one", "two"}, [])
+    names, errors = folder_of(tmp_path, ONE.replace("one", "two").replace("*r", "*rr"))
+    assert (names, errors) == ({"one"}, [f"`{tmp_path}/two.yml`: there is no signal or coefficient `rr`"])
+    with pytest.raises(EffectError, match=r"two.yml`: there is no signal"):
+        pick_effect("two")
+    assert folder_of(tmp_path, "name: [one\n") == ({"one"}, [f"`{tmp_path}/two.yml` is not valid YAML"])
+    assert folder_of(tmp_path, ONE + "source: 2001-99-99\n") == (
+        {"one"},
+        [f"`{tmp_path}/two.yml` holds a value that YAML cannot read"],
+    )
+
+
+def test_neither_of_two_files_that_give_one_name_is_taken(tmp_path):
+    (tmp_path / "one.yaml").write_text(ONE)
+    assert folder_of(tmp_path, ONE) == (set(), ["2 files give an effect named 'one'"])
+    with pytest.raises(EffectError, match="2 files give") as caught:
+        pick_effect("one")
+    assert caught.value.found == f"{tmp_path}/one.yaml and {tmp_path}/two.yml"
+
+
+def test_a_folder_or_a_file_that_the_system_does_not_give_is_kept_as_an_error(tmp_path, monkeypatch):
+    (tmp_path / "one.yaml").write_text(ONE)
+
+    def denied(*_arguments, **_options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_text", denied)
+    assert folder_of(tmp_path, ONE)[1] == [f"`{tmp_path}/{n}` cannot be read: Permission denied" for n in ("one.yaml", "two.yml")]
+    monkeypatch.setattr(Path, "iterdir", denied)
+    assert folder_of(tmp_path, ONE)[1] == [f"the folder `{tmp_path}` cannot be read: Permission denied"]
+
+
+@pytest.mark.parametrize("name", ["lambda", "Bad-Name", "none", "9x", "", "a" * 41, 7])
+def test_a_name_no_effect_can_have_is_refused_with_one_it_can_have(name):
+    with pytest.raises(EffectError) as caught:
+        effect_of(spec() | {"name": name}, origin="test")
+    better = caught.value.hint.removeprefix("call it `").removesuffix("`")
+    assert effect_of(spec() | {"name": better}, origin="test").name == better
 
 
 def test_an_own_effect_is_found_by_name_until_it_is_forgotten():

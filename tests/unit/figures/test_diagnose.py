@@ -11,7 +11,7 @@ from fieldsid.figures.diagnose import Bar, draw, words_of
 
 BASE = Bar("model as it is", 3.0, 3.2, 0.0, None, named=False)
 NAMED = Bar("servo_lag", 1.0, 1.1, 0.98, 0.97, named=True)
-WORSE = Bar("clock_offset", 90.0, 95.0, 0.0, 0.001, named=False)
+WORSE = Bar("clock_offset", 90.0, 95.0, 0.0, 0.001, named=False, worse=True)
 
 
 def drawn(*bars):
@@ -39,5 +39,5 @@ def test_without_unseen_runs_the_fitted_ones_are_the_bars():
 
 def test_a_bar_says_error_share_explained_and_probability():
     assert words_of(NAMED, NAMED.unseen) == "1.10 x, 98 % explained, p = 0.97"
-    assert words_of(WORSE, WORSE.unseen) == "95.00 x, 0 % explained, p < 0.01"
+    assert words_of(WORSE, WORSE.unseen) == "95.00 x, worse, p < 0.01"
     assert words_of(BASE, BASE.unseen) == "3.20 x"

@@ -23,6 +23,8 @@ from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import SpeedLaw
 
 SPEED, ANGLE, RATE = 1.5, 0.003, 0.003
+TAKEN = "the standard error of 0.3 % that a measured speed is taken to have"
+FINDING = "the scale of its speed is probably off, or the model is at this speed"
 HULL = Physics(damping=0.8, authority=-0.6, nominal_speed=SPEED)
 TRUE = Model(
     Axis.YAW, (), {"a22": 0.8, "b2": -0.6, "C0": 0.0}, {}, (), np.zeros((0, 0)), SpeedLaw(SPEED), Noise(ANGLE, RATE)
@@ -52,6 +54,21 @@ def test_a_speed_that_is_a_little_off_is_found_and_said(faster):
     note = said(record, shown.faster)
     assert note is not None
     assert f"{100 * abs(shown.faster):.2f} % {'faster' if faster > 0 else 'slower'}" in note.message
+
+
+@pytest.mark.parametrize(
+    ("faster", "ends"),
+    [
+        (0.0051, f"1.7 x {TAKEN}"),
+        (0.0077, f"2.6 x {TAKEN}: {FINDING}"),
+        (-0.009, f"3.0 x {TAKEN} (0.9 % is the most it is moved by): {FINDING}"),
+    ],
+)
+def test_a_speed_moved_further_than_it_should_be_is_a_finding(faster, ends):
+    note = said(logged(0.0), faster)
+    assert note is not None
+    assert note.message.endswith(ends)
+    assert "known to" not in note.message
 
 
 def test_a_heading_once_a_second_and_no_rate_tell_the_speed_as_well():

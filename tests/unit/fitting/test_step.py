@@ -6,7 +6,9 @@ from itertools import product
 
 import numpy as np
 import pytest
+from in_time import in_time
 
+from fieldsid.errors import DivergenceError
 from fieldsid.fitting.step import bounded_step
 
 
@@ -46,3 +48,13 @@ def test_a_step_that_meets_bounds_stays_inside_and_gains_nearly_what_the_best_on
 def test_what_is_at_its_bound_and_would_leave_it_stays():
     step = bounded_step(np.eye(2), np.array([1.0, 1.0]), 0.0, np.array([2.0, 0.0]), np.zeros(2), np.full(2, 2.0))
     np.testing.assert_allclose(step, [0.0, 1.0])
+
+
+@pytest.mark.parametrize(("where", "value"), [("normal", np.nan), ("gradient", np.nan), ("gradient", np.inf), ("x", np.nan)])
+def test_a_number_that_is_none_ends_with_an_error_and_not_never(where, value):
+    given = {"normal": np.eye(3), "gradient": np.ones(3), "x": np.zeros(3)}
+    given[where].flat[-1] = value
+    with in_time(5), pytest.raises(DivergenceError, match="no number") as error:
+        bounded_step(given["normal"], given["gradient"], 1e-3, given["x"], np.full(3, -1.0), np.full(3, 1.0))
+    assert error.value.found
+    assert "sysid inspect" in error.value.hint

@@ -43,7 +43,8 @@ def test_runs_at_one_speed_leave_it_to_the_drag():
     assert thrust_at(known, 1.5) == pytest.approx(5.1)
 
 
-def test_a_thrust_that_stays_is_kept_as_it_is():
-    known = kept((1.0, 2.0), (5.0, 5.0))
+@pytest.mark.parametrize("thrust", [1.0, 5.0], ids=["whose logarithm is zero", "of any other size"])
+def test_a_thrust_that_stays_is_kept_as_it_is(thrust):
+    known = kept((1.0, 2.0), (thrust, thrust))
     assert known["thrust_exponent"] == pytest.approx(0.0, abs=1e-12)
-    assert known["thrust_at_1_m_s"] == pytest.approx(5.0)
+    assert known["thrust_at_1_m_s"] == pytest.approx(thrust)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
 from fieldsid.logs.clocktime import seconds_of
+from fieldsid.logs.reader import ReadOptions
 
 
 def seconds(cells, unit=None, **more):
@@ -56,7 +57,7 @@ def test_a_row_without_a_time_is_an_error_and_left_out_when_salvaging():
     with pytest.raises(LogError, match="rows without a time") as error:
         seconds([0.0, np.nan, 2.0])
     assert "row 2" in error.value.found
-    found, notes = seconds([0.0, np.nan, 2.0], salvage=True)
+    found, notes = seconds([0.0, np.nan, 2.0], options=ReadOptions(salvage=True))
     assert np.isnan(found[1])
     assert notes[0].code == "no_time"
 

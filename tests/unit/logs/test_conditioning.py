@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
 from fieldsid.logs.conditioning import gaps_in, in_order, refuse_long_gaps
+from fieldsid.logs.reader import ReadOptions
 
 
 def test_time_in_order_is_left_alone():
@@ -20,13 +21,13 @@ def test_time_in_order_is_left_alone():
 )
 def test_disorder_is_refused_with_its_first_place(time, what, where):
     with pytest.raises(LogError, match=f"time {what} in t") as error:
-        in_order(np.array(time, dtype=float), "t", log="a.csv")
+        in_order(np.array(time, dtype=float), "t", ReadOptions(command="sysid import a.csv"))
     assert where in error.value.found
     assert "sysid import a.csv --salvage" in error.value.hint
 
 
 def test_salvage_keeps_what_moves_time_on():
-    rows, notes = in_order(np.array([0, 1, 1, 0.5, np.nan, 2, 3]), "t", salvage=True)
+    rows, notes = in_order(np.array([0, 1, 1, 0.5, np.nan, 2, 3]), "t", ReadOptions(salvage=True))
     assert rows.tolist() == [0, 1, 5, 6]
     assert notes[0].data == {"dropped": 2, "of": 6}
 
@@ -34,7 +35,7 @@ def test_salvage_keeps_what_moves_time_on():
 @given(st.lists(st.one_of(st.floats(0, 100), st.just(float("nan"))), min_size=1, max_size=60))
 def test_salvaged_time_always_increases_and_reaches_its_maximum(times):
     time = np.array(times)
-    rows, _ = in_order(time, "t", salvage=True)
+    rows, _ = in_order(time, "t", ReadOptions(salvage=True))
     assert (np.diff(time[rows]) > 0).all()
     if np.isfinite(time).any():
         assert time[rows][-1] == np.nanmax(time)
@@ -50,8 +51,9 @@ def test_a_long_gap_in_a_main_signal_is_refused_and_in_a_helper_is_not():
     time = np.arange(0, 10, 0.1)
     holed = np.where((time > 3) & (time < 6), np.nan, 1.0)
     with pytest.raises(LogError, match=r"`yaw_rad` is missing for 2\.9\d s \(limit 2 s\)") as error:
-        refuse_long_gaps(time, {"yaw_rad": holed}, log="a.csv")
-    assert "--max-gap" in error.value.hint
+        refuse_long_gaps(time, {"yaw_rad": holed}, ReadOptions(command="sysid import a.csv"))
+    assert "`sysid import a.csv --max-gap 3.0 -o imported/`" in error.value.hint
+    assert "`sysid import a.csv --from 6.00 --to 9.90 -o imported/`" in error.value.hint
     refuse_long_gaps(time, {"yaw_rad": holed}, limit_s=5.0)
     refuse_long_gaps(time, {"surge_m_s": holed})
 

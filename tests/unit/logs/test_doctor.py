@@ -5,8 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fieldsid.logs import load_run, save_run
 from fieldsid.logs.doctor import examine
+from fieldsid.logs.mapping import mapping_of
 from fieldsid.logs.run import Run
+from fieldsid.logs.stated import Stated
 
 
 def healthy(seed=1, n=1200):
@@ -110,8 +113,10 @@ def test_gaps_and_jitter_of_the_clock_are_found():
 
 
 def test_saturation_is_judged_by_the_limit_that_is_given():
-    assert ("saturated", "rudder_rad") in codes(healthy(), fin_max_rad={"rudder_rad": 0.25})
-    assert ("saturated", "rudder_rad") not in codes(healthy(), fin_max_rad={"rudder_rad": 0.5})
+    assert ("saturated", "rudder_rad") in codes(healthy(), fin_max_rad={"rudder_rad": 0.2})
+    assert ("saturated", "rudder_rad") not in codes(healthy(), fin_max_rad={"rudder_rad": 0.25})  # there, and not beyond
+    seen = changed(healthy(), rudder_measured_rad=np.clip(healthy()["rudder_rad"], -0.2, 0.2))
+    assert ("saturated", "rudder_rad") not in codes(seen, fin_max_rad={"rudder_rad": 0.2})
 
 
 def test_a_log_without_fin_or_motion_is_said_to_be_of_no_use():
@@ -144,3 +149,61 @@ def test_any_run_is_examined_without_a_crash(n, seed, share):
     for note in examine(Run("any", time, signals), {"rudder_rad": 0.3}):
         assert note.code
         assert note.message
+
+
+def message(run, code, **stated):
+    *_, note = (n for n in examine(run, stated=Stated(**stated)) if n.code == code)
+    return note
+
+
+@pytest.mark.parametrize(
+    ("reach", "units", "advice", "unit"),
+    [
+        (15.0, {}, "set its unit, probably `unit: deg`", "deg"),
+        (15.0, {"rudder_rad": "rad"}, "set its unit, probably `unit: deg`", "deg"),
+        (2.147, {"rudder_rad": "deg"}, "taken as `deg` already: check which one it is", None),
+        (1500.0, {}, "check its unit, and which one it is", None),
+    ],
+)
+def test_a_unit_is_advised_only_where_it_is_not_set_and_makes_the_signal_possible(reach, units, advice, unit):
+    run = healthy()
+    note = message(changed(run, rudder_rad=reach * np.sign(run["rudder_rad"])), "unit", units=units)
+    assert note.message == f"rudder_rad reaches {reach:.4g} rad (limit 1.6): {advice}"
+    assert note.data.get("unit") == unit
+
+
+@pytest.mark.parametrize(
+    ("signal", "units", "advice"),
+    [
+        ("yaw_rad", {}, "yaw_rad is probably in deg: set `unit: deg`"),
+        ("yaw_rad", {"yaw_rad": "deg"}, "taken as `deg` already: check which ones they are"),
+        ("yaw_rad", {"yaw_rate_rad_s": "deg/s"}, "set `unit: deg` or yaw_rate_rad_s is not in `deg/s`"),
+        ("yaw_rad", {"yaw_rad": "deg", "yaw_rate_rad_s": "deg/s"}, "yaw_rate_rad_s is not in `deg/s`"),
+        ("yaw_rate_rad_s", {"yaw_rad": "deg", "yaw_rate_rad_s": "deg/s"}, "yaw_rad is not in `deg`"),
+    ],
+)
+def test_degrees_of_one_of_a_pair_are_told_by_what_is_set(signal, units, advice):
+    run = healthy()
+    assert message(changed(run, **{signal: np.degrees(run[signal])}), "unit", units=units).message.endswith(advice)
+
+
+def test_a_sign_that_is_set_is_taken_back_and_stamps_are_named_where_they_were_chosen():
+    run = healthy()
+    against, astern = changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"]), changed(run, surge_m_s=-run["surge_m_s"])
+    assert "set `sign: -1` at yaw_rad or yaw_rate_rad_s" in message(against, "rate_sign").message
+    turned = frozenset({"yaw_rate_rad_s", "surge_m_s"})
+    assert "take `sign: -1` away from yaw_rate_rad_s" in message(against, "rate_sign", turned=turned).message
+    assert "take `sign: -1` away from surge_m_s" in message(astern, "speed_sign", turned=turned).message
+    late = changed(run, yaw_rad=np.interp(run.time - 0.3, run.time, run["yaw_rad"]))
+    assert "stamp" not in message(late, "clock_offset").message
+    assert "use `stamp: header`" in message(late, "clock_offset", received=frozenset({"yaw_rad"})).message
+
+
+def test_what_a_mapping_states_reaches_the_doctor(tmp_path):
+    run = healthy()
+    log = save_run(changed(run, rudder_rad=123.0 * np.sign(run["rudder_rad"])), tmp_path / "a.csv")
+    mapping = mapping_of(
+        {"time": {"column": "time_s"}, "signals": {"yaw_rad": "yaw_rad", "rudder_rad": {"column": "rudder_rad", "unit": "deg"}}}
+    )
+    notes = {n.code: n.message for n in load_run(log, mapping).notes}
+    assert notes["unit"] == "rudder_rad reaches 2.147 rad (limit 1.6): taken as `deg` already: check which one it is"

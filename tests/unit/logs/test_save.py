@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.logs import Note, Run, load_run, save_run
+from fieldsid.logs.conditioning import LARGEST
 from fieldsid.logs.run import SIGNALS
 
-finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
+finite = st.floats(-LARGEST, LARGEST, width=64)
 
 
 def example(tmp_path):
@@ -37,11 +38,11 @@ def test_a_run_comes_back_to_the_last_bit(tmp_path, name):
     same(load_run(save_run(run, tmp_path / name)), run)
 
 
-def test_parquet_keeps_name_notes_version_and_the_hash_of_the_source(tmp_path):
+def test_parquet_keeps_notes_version_and_the_hash_of_the_source_and_is_called_as_its_file(tmp_path):
     run = example(tmp_path)
     path = save_run(run, tmp_path / "r.parquet")
     back = load_run(path)
-    assert back.name == "run7"
+    assert back.name == "r"
     assert [(n.code, n.message, dict(n.data)) for n in back.notes] == [("unit", "said so", {"value": 1.5, "list": [1, 2]})]
     head = pq.read_schema(path).metadata[b"fieldsid"].decode()
     assert sha256_of(run.source) in head

@@ -58,7 +58,7 @@ def test_no_fin_and_a_constant_fin_are_errors_that_say_what_was_found():
     assert "--axis yaw" in error.value.hint
     with pytest.raises(DataError, match="no fin signal for yaw") as error:
         segment(Run("r", TIME, {"yaw_rad": TIME, "elevator_rad": np.full(TIME.size, np.nan)}), "yaw")
-    assert error.value.hint == "map `rudder_rad` on import: `sysid inspect LOG`"
+    assert error.value.hint == "map `rudder_rad` on import"
     with pytest.raises(DataError, match="never leaves its trim") as error:
         segment(run(np.full(TIME.size, 0.1)), "yaw")
     assert "5.73" in error.value.found

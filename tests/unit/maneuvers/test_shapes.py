@@ -137,7 +137,7 @@ def test_the_autopilot_comes_back_the_shorter_way_round():
         ("zigzag:ampltude=0.1", "did you mean `amplitude`"),
         ("zigzag:amplitude", "amplitude=0.17"),
         ("zigzag:amplitude=big", "15deg"),
-        ("zigzag:amplitude=3", "default"),
+        ("zigzag:amplitude=3", "3deg"),
         ("prbs:order=4.5", "default"),
     ],
 )

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.models.axis import Axis
+from fieldsid.models.speed_law import SpeedLaw, with_speed
 
 GROUPS = SpeedLaw(1.5, 0.8, 2.0, ((1.0, -0.6), (1.5, -1.5), (2.0, -2.4)))
 
@@ -61,3 +62,13 @@ def test_authority_grows_with_speed(one, two):
     slow, fast = sorted([one, two])
     assert abs(GROUPS.authority(slow, -1.5)) <= abs(GROUPS.authority(fast, -1.5)) * (1 + 1e-9)
     assert np.isfinite(GROUPS.authority(slow, -1.5))
+
+
+def test_only_what_moves_with_speed_is_shown_with_it():
+    assert [with_speed(n, Axis.YAW, 1.4, trim_of_fin=True) for n in ("a22", "b2", "C0", "delta_r0", "lag")] == [
+        "a22@1.4", "b2@1.4", "C0@1.4", "delta_r0", "lag",
+    ]  # fmt: skip
+    assert [with_speed(n, Axis.PITCH, 1.4, trim_of_fin=False) for n in ("c22", "c23", "d2", "Cb", "delta_s0")] == [
+        "c22@1.4", "c23", "d2@1.4", "Cb", "delta_s0@1.4",
+    ]  # fmt: skip
+    assert with_speed("b2", Axis.YAW, float("nan"), trim_of_fin=True) == "b2"

@@ -6,24 +6,23 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from in_time import in_time
 
+from fieldsid.angles import parse_angle
 from fieldsid.errors import ArtifactError, FieldsidError, ModelError, UsageError
+from fieldsid.maneuvers import all_maneuvers
 from fieldsid.models.axis import Axis
-from fieldsid.planning.candidate import Window
+from fieldsid.planning.candidate import Window, fits
 from fieldsid.planning.envelope import Envelope, check_room, check_speeds
+from fieldsid.planning.judge import judge_of
 from fieldsid.planning.prior import checked_prior, corner, draws_of, named_prior
 from fieldsid.planning.prior_file import load_believed
-from fieldsid.planning.quantities import parse_angle, parse_area, parse_band, parse_speeds
-from fieldsid.planning.tune import SHORTEST_HOLD_S, tidied
+from fieldsid.planning.quantities import parse_area, parse_band, parse_speeds
+from fieldsid.planning.tune import LEFT_OUT, SHORTEST_HOLD_S, _started, tidied
 from fieldsid.planning.wish import parse_wish, wish_text
 from fieldsid.templates import template_path
 
 KNOWN = ("a22", "b2", "C0")
-
-
-@pytest.mark.parametrize(("text", "value"), [("0.35", 0.35), ("20deg", np.radians(20)), (" 5 deg", np.radians(5)), (None, None)])
-def test_angles_are_read_in_rad_or_deg(text, value):
-    assert parse_angle(text, "--max-roll") == (None if value is None else pytest.approx(value))
 
 
 def test_areas_bands_and_speeds_are_read():
@@ -44,7 +43,7 @@ def test_holds_in_whole_samples_take_no_longer_than_those_they_come_from(holds, 
 
 @given(st.text(max_size=12))
 def test_no_text_makes_the_readers_fail_with_anything_but_a_usage_error(text):
-    for read in (lambda t: parse_angle(t, "--x"), parse_area, parse_band, parse_speeds, lambda t: parse_wish(t, KNOWN)):
+    for read in (lambda t: parse_angle(t, "--x", 1.0), parse_area, parse_band, parse_speeds, lambda t: parse_wish(t, KNOWN)):
         refusal = refused(read, text)
         assert refusal is None or (refusal.hint and refusal.found)
 
@@ -115,6 +114,16 @@ def test_speeds_that_cannot_be_right_are_refused(speeds, low, high):
 def test_a_window_without_room_for_the_excitation_is_refused():
     with pytest.raises(UsageError, match="leaves"):
         Window(8.0)
+
+
+@pytest.mark.parametrize("length", [9.0, 10.0, 12.0])
+def test_a_maneuver_is_made_to_fit_a_short_window_or_left_out(length):
+    """Pulses without a rest between them are still too long there: the rest cannot be shortened for ever."""
+    judge = judge_of(named_prior("torpedo", Axis.YAW), 1.4, Envelope(0.26), Window(length), {}, 10.0)
+    with in_time(20):
+        started = [_started(m, judge) for m in all_maneuvers().values() if m.name not in LEFT_OUT]
+    assert any(s is not None for s in started)
+    assert all(fits(s, judge.window) for s in started if s is not None)
 
 
 def test_an_unstable_prior_is_refused_and_one_held_by_quadratic_damping_is_not(tmp_path):

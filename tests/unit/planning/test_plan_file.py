@@ -2,49 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from plan_legs import ENVELOPE, leg, plan
 from ruamel.yaml import YAML
 
 from fieldsid.artifacts import to_yaml
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.run import Run
-from fieldsid.maneuvers import Autopilot, parse_spec
-from fieldsid.models.axis import Axis
-from fieldsid.planning.candidate import Candidate, Window
+from fieldsid.planning.abort import aborts_of
 from fieldsid.planning.commands import formats, table_text, write_all
-from fieldsid.planning.envelope import Envelope
-from fieldsid.planning.leg import Expected, Leg, commands_of
+from fieldsid.planning.leg import commands_of
 from fieldsid.planning.mission import render, steps_of, styles
-from fieldsid.planning.plan import Plan
 from fieldsid.planning.plan_file import load_plan, plan_body, save_plan
-
-ENVELOPE = Envelope(0.26, 1.5, heading=1.0, depth_low=1.0, depth_high=6.0, roll=0.3, area_length=200.0, area_width=50.0)
-
-
-def leg(spec="square_pulses", **changes):
-    maneuver, values = parse_spec(spec)
-    made = Leg(
-        1.4, Candidate(maneuver.name, values), Window(33.0), 10.0, 15.0, Autopilot(-0.4, -0.1, 0.26),
-        {"a22": Expected(1.1, 0.05, 0.07, 0.045, 0.1)}, {"heading": 0.4}, 0.02,
-        nominal=np.zeros(0) if maneuver.rule is None else np.append(np.linspace(-0.2, 0.2, 540), np.full(60, np.nan)),
-    )  # fmt: skip
-    return replace(made, **changes)
-
-
-def plan(*legs):
-    return Plan(
-        Axis.YAW,
-        "pandan",
-        "torpedo",
-        ENVELOPE,
-        legs or (leg(), leg("zigzag:duration=26"), leg("chirp:duration=26")),
-        {"a22": 0.05},
-    )
 
 
 def test_a_plan_reads_back_as_it_was(tmp_path):
@@ -56,6 +30,8 @@ def test_a_plan_reads_back_as_it_was(tmp_path):
         assert two.candidate == one.candidate
         assert two.window == one.window
         assert two.expected == one.expected
+        assert two.heading == one.heading
+        assert two.replay_risk == pytest.approx(one.replay_risk, nan_ok=True)
         for a, b in zip(commands_of(one, made.envelope), commands_of(two, again.envelope), strict=True):
             np.testing.assert_allclose(a, b, atol=1e-5)
 
@@ -167,7 +143,13 @@ def test_a_bag_of_commands_is_read_back_by_the_projects_own_reader(tmp_path):
     files = write_all(plan(leg()), tmp_path, ["ros2"])
     with AnyReader(files) as reader:
         topics = {c.topic: c for c in reader.connections}
-        assert set(topics) == {"/rudder_command", "/autopilot"}
+        assert set(topics) == {"/rudder_command", "/autopilot", "/abort_conditions"}
+        ((_, when, raw),) = reader.messages([topics["/abort_conditions"]])
+        said = json.loads(reader.deserialize(raw, topics["/abort_conditions"].msgtype).data)
+        assert when == reader.start_time
+        assert [a["signal"] for a in said["abort"]] == [a.signal for a in aborts_of(leg(), ENVELOPE)]
+        assert said["fin_max_rad"] == 0.26
+        assert said["not_limited"] == ["track", "pitch"]
         fins = [reader.deserialize(raw, c.msgtype).data for c, _, raw in reader.messages([topics["/rudder_command"]])]
     np.testing.assert_allclose(fins, commands_of(leg(), ENVELOPE)[1])
 

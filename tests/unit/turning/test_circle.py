@@ -72,8 +72,21 @@ def test_a_short_arc_a_line_and_too_few_points_are_refused():
     with pytest.raises(DataError, match="too few positions"):
         fit_circle(*(v[:5] for v in track()))
     time = np.linspace(0.0, 10.0, 50)
-    with pytest.raises(DataError):
+    with pytest.raises(DataError, match="straight line"):
         fit_circle(time, time, 2.0 * time)
+
+
+@pytest.mark.parametrize("heading", [None, np.linspace(0.0, 7.0, 50)], ids=["alone", "with a heading"])
+def test_positions_that_stay_are_no_circle(heading):
+    with pytest.raises(DataError, match="does not leave its first position"):
+        fit_circle(np.linspace(0.0, 10.0, 50), np.full(50, 4e6), np.full(50, 7.0), heading)
+
+
+def test_headings_that_are_missing_are_passed_over():
+    time, x, y = track()
+    heading = heading_of()
+    heading[7] = np.nan
+    assert fit_circle(time, x, y, heading).radius == pytest.approx(3.0, rel=1e-3)
 
 
 def turning_run(rate=0.3, run_in=10.0, seed=1, with_surge=True, turns=True):

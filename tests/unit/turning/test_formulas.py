@@ -54,6 +54,6 @@ def test_an_offset_within_a_degree_is_not_counted():
 
 def test_an_unstable_damping_and_a_fin_below_its_offset_are_refused():
     with pytest.raises(ModelError, match="a22 <= 0"):
-        refuse_unstable(-0.2, "at 1.5 m/s")
+        refuse_unstable(-0.2, "at 1.5 m/s", "")
     with pytest.raises(UsageError, match="below the offset"):
-        refuse_short_fin(0.05, -0.064, "at 1.4 m/s")
+        refuse_short_fin(0.05, -0.064, "at 1.4 m/s", "")

@@ -86,6 +86,20 @@ def test_a_point_that_does_not_belong_is_named_and_the_others_are_not():
     assert [p.name for p in law.points if not p.belongs] == ["run 3"]
 
 
+@pytest.mark.parametrize("shift", [0.0, 1e-16, -1e-16])
+def test_of_four_points_none_is_judged_by_the_one_degree_that_is_left(shift):
+    u = np.array([1.0, 1.4, 1.8, 2.2])
+    law = authority_law("b2", -1.0, u, -np.array([0.7, 1.3 + shift, 2.4, 3.1]), None, list("abcd"))
+    assert all(p.belongs for p in law.points)
+    assert {p.limit for p in law.points} == {np.inf}
+
+
+def test_of_points_on_a_line_none_is_off_by_the_arithmetic():
+    u = np.linspace(1.0, 2.4, 8)
+    law = authority_law("b2", 1.0, u, 0.2 + 0.3 * u**2, None, list("abcdefgh"))
+    assert all(abs(p.studentised) < 0.01 for p in law.points)
+
+
 def test_deletion_residual_agrees_with_the_textbook_formula():
     rng, u = np.random.default_rng(2), np.linspace(1.0, 2.0, 7)
     y = 0.1 + 0.3 * u**2 + 0.02 * rng.standard_normal(7)

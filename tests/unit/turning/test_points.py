@@ -16,7 +16,7 @@ from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.turning.laws import fit_laws, load_laws, save_laws
 from fieldsid.turning.points import distinct_speeds
-from fieldsid.turning.source import draw_values, load_source
+from fieldsid.turning.source import draw_values, load_source, logs_of
 from fieldsid.turning.table import read_table
 
 TABLE = """thrust_percent,speed_m_s,a22,b2,C0,b2_std_error
@@ -131,6 +131,31 @@ def test_a_fit_file_with_a_missing_key_is_refused(tmp_path):
     path.write_text(path.read_text().replace("chosen:", "chose:"))
     with pytest.raises(ArtifactError, match="not a complete fit file"):
         load_laws(path)
+
+
+def test_a_fit_file_carries_its_models_with_effects_covariance_and_logs(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("x\n")
+    paths = []
+    for i, u in enumerate((1.0, 2.0)):
+        (tmp_path / str(i)).mkdir()  # two models of one name
+        model = yaw_model(u, ("servo_lag",), b2=-0.4 * u**2, lag=0.3)
+        paths.append(save_model(model, tmp_path / str(i) / "model.yaml", inputs=[log]))
+    path = save_laws(load_source(paths).laws, tmp_path / "law.yaml", models=paths)
+    given, carried = load_source(paths), load_source([path])
+    assert [m.effects for m in carried.models] == [("servo_lag",)] * 2
+    for one, other in zip(given.models, carried.models, strict=True):
+        assert one.values == other.values
+        assert np.array_equal(one.covariance, other.covariance)
+    assert logs_of([path]) == logs_of(paths) == (log,)
+
+
+def test_a_fit_file_that_does_not_say_what_its_models_carry_is_refused(tmp_path):
+    path = save_laws(load_source([written(tmp_path, TABLE)]).laws, tmp_path / "law.yaml")
+    path.write_text(path.read_text().replace("models: []", ""))
+    with pytest.raises(ArtifactError, match="effects would be lost") as error:
+        load_source([path])
+    assert f"-o {path} --force" in error.value.hint
 
 
 def test_own_law_overrides_points_and_laws(tmp_path):

@@ -7,10 +7,12 @@ import pytest
 from truth.paper import YAW
 
 from fieldsid.errors import ModelError, UsageError
+from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.turning.doubt import Reach, doubt_of, reach_of
+from fieldsid.turning.laws import save_laws
 from fieldsid.turning.radius import turn_radius
 from fieldsid.turning.source import load_source
 
@@ -60,6 +62,23 @@ def test_effects_are_simulated_and_the_steady_circle_is_the_radius(tmp_path):
     assert np.isfinite([row.advance, row.transfer, row.tactical_diameter]).all()
 
 
+def test_a_fit_file_turns_as_its_models_do(tmp_path):
+    paths = []
+    for speed in (1.0, 2.0):
+        own = {"a22": 0.8 * speed, "b2": -0.7 * speed**2, "C0": 0.0, "quadratic": 2.0}
+        covariance = np.diag([(0.02 * v) ** 2 for v in own.values()])
+        law = SpeedLaw(speed)
+        model = Model(Axis.YAW, ("quadratic_damping",), own, {}, tuple(own), covariance, law, Noise(0.005, 0.005), FULL)
+        paths.append(save_model(model, tmp_path / f"{speed}.yaml"))
+    fit = save_laws(load_source(paths).laws, tmp_path / "law.yaml", models=paths)
+    of_models, of_law = (turn_radius(load_source(given), [1.0, 1.5], 0.3, draws=100).rows for given in (paths, [fit]))
+    assert [r.method for r in of_law] == ["simulated"] * 4
+    assert of_law == of_models
+    with pytest.raises(UsageError, match="goes with the formula"):
+        turn_radius(load_source([fit], laws=["b2=-2"]), [1.5], 0.3)
+    assert turn_radius(load_source([fit], laws=["b2=-2"]), [1.5], 0.3, method="u_turn", draws=50).rows[0].method == "u_turn"
+
+
 def test_data_that_reached_the_turn_are_trusted_and_pulses_are_not(tmp_path):
     reached = turn_radius(source_of(tmp_path, FULL), [1.5], 0.3).rows[0]
     pulses = turn_radius(source_of(tmp_path, PULSES), [1.5], 0.3).rows[0]
@@ -75,6 +94,52 @@ def test_a_speed_outside_the_data_is_said(tmp_path):
     prediction = turn_radius(source_of(tmp_path, FULL), [2.6], 0.3)
     assert prediction.rows[0].because == ("this speed was not flown",)
     assert any(n.code == "outside_support" for n in prediction.notes)
+
+
+def circle(name, *, radius=4.0, speed=1.5, fin=0.3, approach=15.0):
+    """A run straight on for some seconds, then round to starboard for two circles at the same speed."""
+    time = np.arange(0.0, approach + 4.0 * np.pi * radius / speed, 0.1)
+    rate = np.where(time < approach, 0.0, speed / radius)
+    yaw = np.concatenate([[0.0], np.cumsum(0.1 * rate[:-1])])
+    steps = speed * 0.1 * np.stack([np.cos(yaw), np.sin(yaw)])
+    x, y = np.concatenate([np.zeros((2, 1)), np.cumsum(0.5 * (steps[:, 1:] + steps[:, :-1]), axis=1)], axis=1)
+    rudder = np.where(rate > 0, -fin, 0.0)
+    surge = np.full(time.size, speed)
+    signals = {"yaw_rad": yaw, "yaw_rate_rad_s": rate, "x_m": x, "y_m": y, "rudder_rad": rudder, "surge_m_s": surge}
+    return Run(name, time, signals)
+
+
+def asked_of(folder, *measured, speeds=(1.0, 1.5), rudder=0.3):
+    return turn_radius(source_of(folder, PULSES, effects=()), speeds, rudder, measured=measured, draws=50)
+
+
+def test_what_was_measured_is_not_asked_for_again(tmp_path):
+    prediction = asked_of(tmp_path, circle("c1"))
+    assert [r.side for r in prediction.rows if r.trust == "measured"] == ["starboard"]
+    (said,) = prediction.settling
+    assert said.startswith("turning_circle to port at 1.00, 1.50 m/s, to starboard at 1.00 m/s with 0.3 rad")
+    assert (
+        asked_of(tmp_path, circle("c1"), circle("slow", speed=1.0), speeds=(1.5,))
+        .settling[0]
+        .startswith("turning_circle to port")
+    )
+
+
+def test_circles_of_another_rudder_are_named_with_how_to_ask_for_them(tmp_path):
+    said = asked_of(tmp_path, circle("c1", fin=0.4), circle("c2", fin=0.4, speed=1.0)).settling
+    assert said[0] == "with `--rudder-max 0.4`, as they were turned with, c1, c2 count as measured"
+    assert said[1].startswith("turning_circle to port at 1.00, 1.50 m/s, to starboard at 1.00, 1.50 m/s with 0.3 rad")
+    trusted = [r.trust for r in asked_of(tmp_path, circle("c1", fin=0.4), circle("c2", fin=0.4, speed=1.0), rudder=0.4).rows]
+    assert trusted.count("measured") == 2
+
+
+def test_a_circle_without_its_approach_says_what_it_lacks(tmp_path):
+    said = asked_of(tmp_path, circle("c1", approach=0.0)).settling
+    assert said[0] == "c1 begins in the turn, so that its speed before it is not known: log the approach too"
+
+
+def test_nothing_is_asked_for_where_the_data_reached_the_turn(tmp_path):
+    assert turn_radius(source_of(tmp_path, FULL), [1.5], 0.3, draws=50).settling == ()
 
 
 def test_surge_that_was_not_measured_is_said_and_widens_nothing_silently(tmp_path):

@@ -1,0 +1,47 @@
+"""Angles as a user types them, the same everywhere: `15deg`, `0.26rad`, or a bare number, which is rad.
+
+A bare number that no such angle can be in rad is refused with both readings: 60 is 60 deg or 60 rad, never a guess.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fieldsid.errors import UsageError
+
+FIN = math.pi / 4
+"""The largest of each that a bare number can be in rad: no fin lifts beyond 45 deg,"""
+TILT = math.pi / 2
+"""no hull is to pitch or roll beyond the vertical,"""
+HEADING = math.pi
+"""what is beyond half a turn is no deviation of heading but a turn,"""
+FIN_RATE = 2.0 * math.pi
+"""and no servo turns a fin once round in a second."""
+UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
+
+
+def parse_angle(text: str, option: str, most: float) -> float:
+    """Read an angle, or an angle per second, as rad; `most` is the largest a bare number can be. Raises UsageError."""
+    word = text.strip().lower().removesuffix("/s").strip()
+    unit = next((u for u in UNITS if word.endswith(u)), None)
+    try:
+        value = float(word.removesuffix(unit) if unit else word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise UsageError(
+            f"{text.strip()!r} is not an angle", found=f"{option} {text}", hint="write it like `15deg`, `0.26rad` or `0.26`"
+        )
+    if unit is None and value > most:
+        raise UsageError(
+            f"`{option} {value:g}` is {value:g} deg or {value:g} rad?",
+            found=f"{value:g} deg is {math.radians(value):.4g} rad, {value:g} rad is {math.degrees(value):.4g} deg; "
+            f"a bare number is rad, at most {most:.4g}",
+            hint=f"write `{option} {value:g}deg`, or `{value:g}rad` where that is meant",
+        )
+    return value * UNITS[unit or "rad"]
+
+
+def said(angle: float) -> str:
+    """Return an angle in rad as both units: `60 deg (1.05 rad)`."""
+    return f"{math.degrees(angle):.4g} deg ({angle:.3g} rad)"

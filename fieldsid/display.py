@@ -1,0 +1,129 @@
+"""How a record shows itself where a user works: short in a console, whole in a notebook, as a table and as a figure.
+
+A record inherits one of three classes: `Brief` (a short repr made of its fields), `Displayed` (what matters in one line, and
+as a summary, HTML and pandas tables) or `Plotted` (as a figure too). The classes hold no words, tables or drawings: they ask the
+registry `fieldsid.views` for the view named like the record's class, and not before somebody asks them. So the methods
+are written once, an editor and mypy see them on every record, a record's room imports neither pandas nor a figure, and
+a record is given a view by one new file. A decorator would hide the methods from mypy; methods in each record would be
+written twenty times, and their figures would turn the arrow of the imports round.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from fieldsid.errors import UsageError
+from fieldsid.page import Page, cut, html_of, text_of
+from fieldsid.registry import near, pick
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+T = TypeVar("T")
+LONGEST = 399
+"""Characters of a repr: a list of records stays readable."""
+MOST_ITEMS, LONGEST_TEXT = 3, 60
+
+
+def _none(_record: Any) -> Mapping[str, Callable[[], Any]]:
+    return {}
+
+
+def _unread(_table: DataFrame, _name: str) -> Any:
+    raise UsageError("only a run is read from a table")
+
+
+@dataclass(frozen=True, slots=True)
+class View(Generic[T]):
+    """How records of one class are shown; `name` is the class's in small letters, `turn_row` of TurnRow.
+
+    `line` says what matters, `page` everything in words. `frames` and `figures` make tables and matplotlib figures by the
+    name of a part, the first unasked. `label` tells records of one kind apart. `read` makes a record of a table.
+    """
+
+    name: str
+    line: Callable[[T], str]
+    page: Callable[[T], Page]
+    frames: Callable[[T], Mapping[str, Callable[[], DataFrame]]]
+    label: Callable[[T], str] = str
+    figures: Callable[[T], Mapping[str, Callable[[], Any]]] = _none
+    read: Callable[[DataFrame, str], T] = _unread
+
+
+def view_of(kind: type) -> View[Any]:
+    """Return the view of a class of records; raises UsageError where there is none."""
+    view: View[Any] = pick("fieldsid.views", "VIEW", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower())
+    return view
+
+
+class Brief:
+    """A record whose repr is short however much it holds: of arrays the shape, of long fields the beginning."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        shown = (f"{f.name}={_short(getattr(self, f.name))}" for f in fields(self) if f.repr)  # type: ignore[arg-type]
+        return cut(f"{type(self).__name__}({', '.join(shown)})", LONGEST)
+
+
+class Displayed(Brief):
+    """A record that says in one line what matters, and all of it as a summary, as HTML and as pandas tables."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return cut(f"<{type(self).__name__} {view_of(type(self)).line(self)}>", LONGEST)
+
+    def summary(self) -> str:
+        """Return the whole record as text in fixed blocks: warnings first, then statistics, then its tables."""
+        return text_of(view_of(type(self)).page(self))
+
+    def _repr_html_(self) -> str:
+        return html_of(view_of(type(self)).page(self))
+
+    def to_frame(self, part: str = "") -> DataFrame:
+        """Return a part of the record as a pandas table, without a name its first; raises UsageError naming the parts."""
+        table: DataFrame = _part(view_of(type(self)).frames(self), part, f"{type(self).__name__}.to_frame")
+        return table
+
+
+class Plotted(Displayed):
+    """A record that has figures."""
+
+    __slots__ = ()
+
+    def plot(self, part: str = "") -> Any:
+        """Return a matplotlib Figure of the record, of several the one of that name; raises UsageError naming them."""
+        return _part(view_of(type(self)).figures(self), part, f"{type(self).__name__}.plot")
+
+
+def _part(parts: Mapping[str, Callable[[], Any]], name: str, of: str) -> Any:
+    chosen = parts.get(name or next(iter(parts)))
+    if chosen is None:
+        raise UsageError(f"`{of}` has no part {name!r}", found=", ".join(parts), hint=near(name, list(parts)))
+    return chosen()
+
+
+def _short(value: Any) -> str:
+    """Return one field's value in a few words."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if hasattr(value, "shape") and hasattr(value, "dtype"):
+        return f"{value.dtype}{list(value.shape)}"
+    if isinstance(value, (str, Path)):
+        return repr(cut(str(value), LONGEST_TEXT))
+    if isinstance(value, Mapping):
+        return f"{{{_few([f'{cut(str(k), LONGEST_TEXT)}: {_short(v)}' for k, v in value.items()])}}}"
+    if isinstance(value, (tuple, list)):
+        return f"({_few([_short(v) for v in value[: MOST_ITEMS + 1]], len(value))}{',' if len(value) == 1 else ''})"
+    return cut(repr(value), LONGEST_TEXT) if isinstance(value, Brief) else repr(value)
+
+
+def _few(shown: list[str], count: int | None = None) -> str:
+    """Return the first of some words and how many more there are."""
+    more = (len(shown) if count is None else count) - MOST_ITEMS
+    return ", ".join([*shown[:MOST_ITEMS], *([f"... {more} more"] if more > 0 else [])])

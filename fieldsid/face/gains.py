@@ -1,0 +1,122 @@
+"""From models at a few speeds to laws, turns and gains: `sysid fit`, `turn-radius` and `schedule` as functions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fieldsid.face.given import File, designed_from, fin_limits_of, own_effects, rudder_of, run_files, vehicle_of
+from fieldsid.face.models import Models, source_of
+from fieldsid.face.runs import Logs, runs_mapped
+from fieldsid.face.speeds import speeds_of
+
+if TYPE_CHECKING:
+    from fieldsid.logs import ChannelMap
+    from fieldsid.schedule import Schedule, Verification
+    from fieldsid.turning import Laws, TurnPrediction
+    from fieldsid.vehicle import Vehicle
+
+_say = logging.getLogger("fieldsid").info
+"""What a command would say on stderr; heard where a program asks its log for it."""
+
+
+def fit_laws(models: Models, *, unweighted: bool = False) -> Laws:
+    """Return the laws that carry a model from one speed to the next: authority against u^2, damping and trim against u.
+
+    models: models of one axis at two speeds at least, or a table of parameters with a column speed_m_s. unweighted: every point
+    counts alike, standard errors or not. Raises DataError for one speed only.
+    """
+    from fieldsid.turning import fit_laws as fit_points
+
+    own_effects()
+    source = source_of(models)
+    return fit_points(source.axis, source.points, weighted=not unweighted)
+
+
+def turn_radius(
+    models: Models,
+    *,
+    speeds: str | Sequence[float] | None = None,
+    rudder_max: float | None = None,
+    measured: Logs = (),
+    runs: Logs | None = None,
+    method: str = "auto",
+    law: str | Sequence[str] = (),
+    fin_zero: float = 0.0175,
+    mapping: ChannelMap | File | None = None,
+    vehicle: Vehicle | File | None = None,
+) -> TurnPrediction:
+    """Return the turning radius over speed, port and starboard apart, with 95 % bands.
+
+    speeds: in m/s or as `0.5:2.5:0.1`, without them the models' own. rudder_max: in rad, without it the vehicle's limit or the
+    largest in the models' runs. measured: runs of turning circles to compare with. runs: those the models came from, without them
+    the files that the models name; the loss of speed in a turn is identified from them. fin_zero: offsets of the fin (rad) below
+    it are not counted. Raises UsageError, ModelError for an unstable model, DataError for a measured run without a circle.
+    """
+    from fieldsid.turning import turn_radius as radius_over_speed
+
+    own_effects()
+    source = source_of(models, law)
+    return radius_over_speed(
+        source,
+        speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
+        rudder_of(vehicle_of(vehicle), source, _say) if rudder_max is None else rudder_max,
+        runs=runs_mapped(run_files(source, _say) if runs is None else runs, mapping),
+        measured=runs_mapped(measured, mapping),
+        method=method,
+        fin_zero=fin_zero,
+    )
+
+
+def design_schedule(
+    models: Models,
+    *,
+    controller: str = "p",
+    damping: float = 0.7071,
+    phase_margin: float = 45.0,
+    speeds: str | Sequence[float] | None = None,
+    fin_limit: float | None = None,
+    fin_rate: float | None = None,
+    fin_lag: float | None = None,
+    delay: float | None = None,
+    depth: bool = False,
+    law: str | Sequence[str] = (),
+    vehicle: Vehicle | File | None = None,
+) -> Schedule:
+    """Return gains per speed for heading or pitch, by the models' axis.
+
+    controller: p, pd, pi, pid or lqr. phase_margin: in deg. speeds: in m/s or as `1.0,1.5`, without them the models' own.
+    fin_limit (rad), fin_rate (rad/s): without them the vehicle's. fin_lag, delay (s): without them the models'. depth: the loop
+    above pitch. Raises UsageError for what cannot be meant, ModelError where no gain holds the loop.
+    """
+    from fieldsid.schedule import FinLimits, Wish
+    from fieldsid.schedule import design_schedule as design
+    from fieldsid.schedule.verify import STEP
+
+    own_effects()
+    source, known = source_of(models, law), vehicle_of(vehicle)
+    limit, rate = fin_limits_of(fin_limit, fin_rate, known, source, _say)
+    return design(
+        source,
+        limit,
+        speeds=speeds_of(speeds),
+        wish=Wish(controller, damping, phase_margin, STEP[source.axis]),
+        limits=FinLimits(fin_lag, delay, rate),
+        depth=depth,
+    )
+
+
+def verify_schedule(schedule: Schedule | File, models: Models | None = None) -> Verification:
+    """Return margins and steps of a schedule at its knots and between, over the errors of the models.
+
+    models: those to verify on, without them the files it was designed from. Raises ArtifactError where these are not there.
+    """
+    from fieldsid.schedule import Schedule, load_schedule
+    from fieldsid.schedule import verify_schedule as verify
+
+    own_effects()
+    known = schedule if isinstance(schedule, Schedule) else load_schedule(Path(schedule))
+    name = "SCHEDULE" if isinstance(schedule, Schedule) else str(schedule)
+    return verify(known, source_of(designed_from(known, name) if models is None else models))

@@ -1,0 +1,67 @@
+"""Models from whatever a user holds: files, patterns, models, and every record that has one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from fieldsid.errors import UsageError
+from fieldsid.face.runs import files_of
+from fieldsid.models.model import Model, load_model
+
+if TYPE_CHECKING:
+    from fieldsid.diagnosis import Diagnosis
+    from fieldsid.extension import Extension
+    from fieldsid.fitting.fit import Fit
+    from fieldsid.turning import Laws, Source
+
+OneModel: TypeAlias = "Model | Fit | Extension | Diagnosis | str | PathLike[str]"
+AnyModel: TypeAlias = "OneModel | Sequence[Model] | Sequence[Fit]"
+Models: TypeAlias = "OneModel | Laws | Iterable[OneModel]"
+
+
+def model_of(given: AnyModel) -> Model:
+    """Return the one model of a file, a record or a sequence of one; raises UsageError for several, ArtifactError for a file."""
+    models = list(_models(given))
+    if len(models) == 1:
+        return models[0]
+    found = f"{len(models)} models"
+    raise UsageError("this takes one model", found=found, hint="take one of them, `[0]`, or fit the runs together, `joint=True`")
+
+
+def source_of(given: Models, law: str | Sequence[str] = ()) -> Source:
+    """Return where the parameters at a speed come from: models, a table of parameters, a fit file, or laws.
+
+    law: laws of one's own, `NAME=c0[,c1]`, as the option. Raises UsageError, DataError and ArtifactError.
+    """
+    from fieldsid.turning import Laws
+    from fieldsid.turning.source import load_source, source_of_laws, source_of_models
+
+    own = (law,) if isinstance(law, str) else tuple(law)
+    items = [given] if isinstance(given, (str, PathLike, Model)) or not isinstance(given, Iterable) else list(given)
+    if len(items) == 1 and isinstance(items[0], Laws):
+        return source_of_laws(items[0], laws=own)
+    named = [item for item in items if isinstance(item, (str, PathLike))]
+    if len(named) == len(items):
+        return load_source([path for item in named for path in files_of(item, "model")], laws=own)
+    models = [model for item in items for model in _models(item)]
+    return source_of_models(models, [_name(m, i) for i, m in enumerate(models)], laws=own)
+
+
+def _models(given: Any) -> Iterator[Model]:
+    if isinstance(given, (str, PathLike)):
+        yield from (load_model(path) for path in files_of(given, "model"))
+    elif isinstance(given, Model):
+        yield given
+    elif isinstance(own := getattr(given, "model", None), Model):
+        yield own
+    elif isinstance(given, Iterable):
+        for item in given:
+            yield from _models(item)
+    else:
+        raise UsageError("that is no model", found=type(given).__name__, hint="give a model, a fit, or the file of a model")
+
+
+def _name(model: Model, index: int) -> str:
+    return "+".join(model.runs) or f"model {index + 1}"

@@ -1,0 +1,181 @@
+"""Runs from whatever a user holds: files, patterns, pandas tables, runs."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from glob import glob, has_magic
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeGuard, cast
+
+from fieldsid.errors import LogError, UsageError
+from fieldsid.face.given import File, signal_limits, vehicle_of
+from fieldsid.face.several import Several
+from fieldsid.logs import ChannelMap, Run, Source, load_run
+from fieldsid.logs.conditioning import MAX_GAP_S
+from fieldsid.logs.reader import neighbours
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from fieldsid.vehicle import Vehicle
+
+Log: TypeAlias = "Run | DataFrame | str | PathLike[str]"
+Logs: TypeAlias = "Log | Iterable[Log] | Mapping[str, DataFrame]"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How logs are read: mapping, single channels, message definitions, what is allowed, and the part that is taken in s."""
+
+    mapping: ChannelMap | Path | None = None
+    channels: Mapping[str, Source] = field(default_factory=dict)
+    msg_path: Path | None = None
+    salvage: bool = False
+    max_gap_s: float = MAX_GAP_S
+    fin_max_rad: Mapping[str, float] = field(default_factory=dict)
+    start: float | None = None
+    end: float | None = None
+
+    def of_file(self, path: Path) -> Run:
+        """Return the run of a file."""
+        run = load_run(
+            path, self.mapping, channels=self.channels, msg_path=self.msg_path, salvage=self.salvage, max_gap_s=self.max_gap_s,
+            fin_max_rad=self.fin_max_rad,
+        )  # fmt: skip
+        return self.part(run)
+
+    def of_table(self, table: DataFrame, name: str) -> Run:
+        """Return the run of a pandas table."""
+        from fieldsid.logs.frame import run_of_frame
+
+        run = run_of_frame(
+            table, name, self.mapping, channels=self.channels, salvage=self.salvage, max_gap_s=self.max_gap_s,
+            fin_max_rad=self.fin_max_rad,
+        )  # fmt: skip
+        return self.part(run)
+
+    def part(self, run: Run) -> Run:
+        """Return the part of a run that is asked for."""
+        if self.start is None and self.end is None:
+            return run
+        return run.between(-float("inf") if self.start is None else self.start, float("inf") if self.end is None else self.end)
+
+
+def load(
+    logs: Logs,
+    *,
+    mapping: ChannelMap | File | None = None,
+    channel: Sequence[str] = (),
+    msg_path: File | None = None,
+    vehicle: Vehicle | File | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    max_gap: float = MAX_GAP_S,
+    salvage: bool = False,
+) -> Several[Run]:
+    """Return the runs of logs, as `sysid import` reads them: files, patterns as `runs/*.parquet`, pandas tables.
+
+    A table has a row per sample; a dictionary of tables names their runs. channel: `SIGNAL=COLUMN:UNIT`, as the option. vehicle:
+    its fin limits are for the finding of saturation. start, end: the part of every run, in s. max_gap: the longest gap, in s.
+    salvage: take what is left of a damaged log. Raises LogError for a file that is missing or cannot be read and for a pattern
+    without a file, MappingError where no column is known, DataError where the part is empty, UsageError for what is no log.
+    """
+    from fieldsid.logs.mapping import channel_of
+
+    reading = Reading(
+        mapping=_mapping(mapping),
+        channels=dict(channel_of(text) for text in channel),
+        msg_path=None if msg_path is None else Path(msg_path),
+        salvage=salvage,
+        max_gap_s=max_gap,
+        fin_max_rad=signal_limits(vehicle_of(vehicle)),
+        start=start,
+        end=end,
+    )
+    return runs_of(logs, reading)
+
+
+def runs_of(logs: Logs, reading: Reading | None = None) -> Several[Run]:
+    """Return the runs of logs, each with a name of its own; raises as `load` does."""
+    return Several(_apart(list(_read(logs, reading or Reading()))))
+
+
+def runs_mapped(
+    logs: Logs, mapping: ChannelMap | File | None, start: float | None = None, end: float | None = None
+) -> Several[Run]:
+    """Return the runs of logs with a mapping, cut to start .. end s; raises as `load` does."""
+    return runs_of(logs, Reading(mapping=_mapping(mapping), start=start, end=end))
+
+
+def files_of(name: File, what: str = "log") -> list[Path]:
+    """Return the files that a path or a pattern names, in the order of their names; raises LogError where a pattern has none."""
+    path = Path(name).expanduser()
+    if path.exists() or not has_magic(str(path)):
+        return [path]
+    found = sorted(map(Path, glob(str(path), recursive=True)))  # noqa: PTH207 - pathlib's takes hidden files
+    if not found:
+        raise LogError(f"no {what} matches `{name}`", found=neighbours(_plain(path)), hint="check the folder and the pattern")
+    return found
+
+
+def _read(logs: Logs, reading: Reading) -> Iterator[Run]:
+    if isinstance(logs, Run):
+        yield reading.part(logs)
+    elif isinstance(logs, (str, PathLike)):
+        yield from (reading.of_file(path) for path in files_of(logs))
+    elif is_table(logs):
+        yield reading.of_table(logs, "")
+    elif isinstance(logs, Mapping):
+        yield from (reading.of_table(table, name) for name, table in _tables(logs))
+    elif isinstance(logs, Iterable):
+        for log in cast("Iterable[Log]", logs):
+            yield from _read(log, reading)
+    else:
+        raise _no_log(logs)
+
+
+def is_table(item: object) -> TypeGuard[DataFrame]:
+    """Whether something is a pandas table: who holds one has loaded pandas."""
+    return "pandas" in sys.modules and isinstance(item, sys.modules["pandas"].DataFrame)
+
+
+def _tables(logs: Mapping[Any, Any]) -> Iterator[tuple[str, DataFrame]]:
+    for name, item in logs.items():
+        if not is_table(item):
+            raise _no_log(item)
+        yield str(name), item
+
+
+def _no_log(item: Any) -> UsageError:
+    return UsageError(
+        "that is no log", found=type(item).__name__, hint="give a file, a pattern as `runs/*.parquet`, a pandas table or a run"
+    )
+
+
+def _mapping(mapping: ChannelMap | File | None) -> ChannelMap | Path | None:
+    return mapping if mapping is None or isinstance(mapping, ChannelMap) else Path(mapping)
+
+
+def _plain(pattern: Path) -> Path:
+    """Return a pattern up to the first part that is one: what stands before it is a folder."""
+    parts = pattern.parts
+    first = next(i for i, part in enumerate(parts) if has_magic(part))
+    return Path(*parts[: first + 1])
+
+
+def _apart(runs: Sequence[Run]) -> list[Run]:
+    """Put the folder's name before the names that several runs share, and a number behind those that still do."""
+    shared = Counter(run.name for run in runs)
+    names: list[str] = []
+    for run in runs:
+        folder = "" if run.source is None or shared[run.name] == 1 else f"{run.source.resolve().parent.name}_"
+        name, n = f"{folder}{run.name}", 1
+        while name in names:
+            n += 1
+            name = f"{folder}{run.name}_{n}"
+        names.append(name)
+    return [run if run.name == name else replace(run, name=name) for run, name in zip(runs, names, strict=True)]

@@ -1,0 +1,43 @@
+"""Speeds as a user writes them: numbers, `0.5:2.5:0.1` (low, high, step) or `1.0,1.5,2.0`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from fieldsid.errors import UsageError
+
+MOST = 2000
+
+
+def speeds_of(given: str | Iterable[float] | None) -> list[float]:
+    """Return the speeds in m/s, rising in a range; empty where nothing is given. Raises UsageError."""
+    if given is None:
+        return []
+    if not isinstance(given, str):
+        return [float(speed) for speed in given]
+    return _read(given) if given.strip() else []
+
+
+def _read(text: str) -> list[float]:
+    try:
+        if ":" in text:
+            low, high, step = (float(part) for part in text.split(":"))
+            if not (0 < low <= high and step > 0):
+                raise _wrong(text, "low, high and step must be above zero, low below high")
+            count = math.floor((high - low) / step + 1e-9) + 1
+            if count > MOST:
+                raise _wrong(text, f"{count} speeds, at most {MOST}")
+            return [round(low + i * step, 9) for i in range(count)]
+        speeds = [float(part) for part in text.split(",") if part.strip()]
+    except ValueError as error:
+        raise _wrong(text, str(error)) from error
+    if not speeds or not all(math.isfinite(s) and s > 0 for s in speeds):
+        raise _wrong(text, "every speed must be above zero")
+    return speeds
+
+
+def _wrong(text: str, found: str) -> UsageError:
+    return UsageError(
+        f"`--speeds {text}` is not a list of speeds", found=found, hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5,2.0`"
+    )

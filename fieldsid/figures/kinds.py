@@ -1,0 +1,31 @@
+"""The kinds of files a figure is written as, told by the suffix. Nothing heavy is imported: a command asks before it works."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from fieldsid.errors import UsageError
+
+TOOL = "fieldsid"
+KINDS: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
+    {
+        "png": {"Software": TOOL},
+        "svg": {"Creator": TOOL, "Date": None},
+        "pdf": {"Creator": TOOL, "Producer": TOOL, "CreationDate": None},
+    }
+)
+"""What each kind says of itself; no date, so that the same figure is the same file."""
+
+
+def kind_of(path: Path) -> str:
+    """Return the kind of file a figure is written as; raises UsageError for a suffix that is none of them."""
+    kind = path.suffix.removeprefix(".").lower()
+    if kind in KINDS:
+        return kind
+    raise UsageError(
+        f"a figure cannot be written as `{path.name}`",
+        found=path.suffix or "no suffix",
+        hint=f"name it `{path.with_suffix('.png')}`, or with " + ", ".join(f".{k}" for k in KINDS if k != "png"),
+    )

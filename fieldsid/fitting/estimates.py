@@ -1,0 +1,43 @@
+"""The estimates of a model: every parameter with its standard error, its 95 % interval and its unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fieldsid.fitting.offset import offset_of
+from fieldsid.models.model import Model
+
+TWO_SIDED_95 = 1.96
+"""Quantile 0.975 of the normal distribution."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A parameter's value and standard error in its unit; the error is NaN where it was not estimated."""
+
+    name: str
+    value: float
+    std_error: float
+    unit: str
+
+    @property
+    def interval95(self) -> tuple[float, float]:
+        """The 95 % interval under a normal error: value -+ 1.96 standard errors."""
+        half = TWO_SIDED_95 * self.std_error
+        return self.value - half, self.value + half
+
+
+def estimates(model: Model) -> tuple[Estimate, ...]:
+    """Return the estimates of a model at its law's reference speed: parameters and coefficients, the law's, the fin's offset."""
+    own = [Estimate(n, v, model.std_error(n), model.units.get(n, "")) for n, v in model.values.items()]
+    law = [
+        Estimate(n, _number(known["value"]), _number(known["std_error"]), "1/s^2" if "@" in n else "1")
+        for n, known in dict(model.info.get("law_parameters", {})).items()
+    ]
+    offset = offset_of(model)
+    return (*own, *law, Estimate(offset.name, offset.value, offset.std_error, "rad"))
+
+
+def _number(value: float | None) -> float:
+    """Return a number, NaN for one that a file could not hold."""
+    return float("nan") if value is None else value

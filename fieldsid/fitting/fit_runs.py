@@ -1,0 +1,31 @@
+"""The records of runs that are fitted together, those left that can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from fieldsid.copies import each
+from fieldsid.fitting.fit import check
+from fieldsid.logs.run import Run
+from fieldsid.logs.sifting import Refused, attempt, sifted
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import Record, record_of
+
+
+def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] | None = None) -> list[list[tuple[Run, Record]]]:
+    """Return the runs of several groups with their records, without those that no estimator can use.
+
+    unfit is told of each of these, as `sifted` does for each group; without it DataError is raised for the first.
+    """
+    runs = [run for group in groups for run in group]
+    if not runs:
+        check([], axis)
+    made = iter(each(partial(attempt, partial(_checked, axis=axis)), runs))
+    return [sifted(group, [next(made) for _ in group], unfit) for group in groups]
+
+
+def _checked(run: Run, *, axis: Axis) -> Record:
+    record = record_of(run, axis)
+    check([record], axis)
+    return record

@@ -1,0 +1,16 @@
+"""Which notes of a fit and its logs are warnings: what is wrong, not how it went, and with a signal that the axis uses."""
+
+from __future__ import annotations
+
+from fieldsid.logs.run import Note
+from fieldsid.models.axis import NAMES, Axis
+
+NO_WARNING = ("mapping", "noise_model", "fin_measured_used")
+"""Codes of notes that tell how it went."""
+
+
+def is_warning(note: Note, axis: Axis) -> bool:
+    """Whether a note is a warning, and about a signal that an axis uses where it is about a signal."""
+    names = NAMES[axis]
+    used = {names.angle, names.rate, names.fin, names.fin_measured, names.cross, "surge_m_s"}
+    return note.code not in NO_WARNING and note.data.get("signal", names.angle) in used

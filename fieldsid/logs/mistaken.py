@@ -1,0 +1,54 @@
+"""A log given where a file of this program is expected: what it is, and what to do with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import isfinite
+from pathlib import Path
+from shlex import quote
+
+from fieldsid.artifacts import read_yaml
+from fieldsid.errors import ArtifactError, LogError
+from fieldsid.logs.channels import TableForm
+from fieldsid.logs.reader import ReadOptions, reader_of
+
+
+@contextmanager
+def unless_log(path: Path, wanted: str) -> Iterator[None]:
+    """Raise for a file that cannot be read as what is wanted ("a model") that it is a log, where it is one."""
+    try:
+        yield
+    except ArtifactError as error:
+        raise (None if _has_keys(path) else if_log(path, wanted)) or error from error
+
+
+def _has_keys(path: Path) -> bool:
+    """Whether a file is YAML with keys, which lines of numbers are not."""
+    try:
+        read_yaml(path)
+    except ArtifactError:
+        return False
+    return True
+
+
+def if_log(path: Path, wanted: str) -> ArtifactError | None:
+    """Return the error that a file is a log and not what is wanted; None where it is no log.
+
+    A text that names no known signals and has no time in it may be anything: of that nothing is claimed.
+    """
+    try:
+        reader = reader_of(path)
+        known = reader.own_map(path, ReadOptions())
+        if known is None and not isfinite(reader.inventory(path, ReadOptions(), TableForm()).duration_s):
+            return None
+    except LogError:
+        return None
+    signals = known.sources if known is not None else {}
+    axis = next((axis for fin, axis in (("rudder", "yaw"), ("elevator", "pitch")) if any(s.startswith(fin) for s in signals)), "")
+    hint = f"identify it first: `sysid identify {quote(str(path))} --axis {axis} -o models/`"
+    return ArtifactError(
+        f"`{path}` is a log, not {wanted}",
+        found=f"signals {', '.join(signals)}" if signals else "no names that are known: it needs a mapping",
+        hint=hint if axis else f"see what is in it: `sysid inspect {quote(str(path))}`",
+    )

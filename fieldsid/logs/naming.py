@@ -1,0 +1,104 @@
+"""Names of runs: each log's own, told apart by folder and suffix where several share one, and no data twice."""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from hashlib import sha256
+from pathlib import Path
+
+from fieldsid.errors import UsageError
+from fieldsid.logs.run import Run
+
+
+def stem_of(path: Path) -> str:
+    """Return the name of the run in a log: that of a folder, or of a file without its suffix: run7 of `run7.csv.gz`."""
+    if str(path) == "-":
+        return "stdin"
+    name = path.name or path.resolve().name
+    if os.path.isdir(path):  # noqa: PTH112 - says no where a folder is closed, and does not raise
+        return name
+    for packed in (".gz", ".zstd"):
+        name = name.removesuffix(packed)
+    stem, dot, suffix = name.rpartition(".")
+    # The 4 of `pulses_1.4` is no suffix.
+    return stem if dot and stem and suffix[:1].isalpha() else name
+
+
+def _real(path: Path) -> Path:
+    """Return the file that a path leads to; a link that leads round and round stays what it is."""
+    return Path(os.path.realpath(path))
+
+
+def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
+    """Return the names of the runs of some files, those that several share with as many folders before them as it takes.
+
+    Files of one folder are told apart by their suffix. No two of the names are the same.
+    """
+    alike: dict[str, list[int]] = defaultdict(list)
+    for i, name in enumerate(names):
+        alike[name].append(i)
+    out = list(names)
+    for name, places in alike.items():
+        if len(places) > 1:
+            for i, own in zip(places, _told_apart(name, [_real(paths[i]) for i in places]), strict=True):
+                out[i] = own
+    return _numbered(out)
+
+
+def _told_apart(name: str, paths: Sequence[Path]) -> list[str]:
+    """Return the shortest labels that differ, or the longest there are."""
+    labels = [name] * len(paths)
+    for labels in _labels(name, paths):
+        if len(set(labels)) == len(labels):
+            break
+    return labels
+
+
+def _labels(name: str, paths: Sequence[Path]) -> Iterator[list[str]]:
+    deepest = max(len(p.parent.parts) for p in paths)
+    folders = [["_".join([*p.parent.parts[1:][-k:], name] if k else [name]) for p in paths] for k in range(deepest)]
+    yield from folders[1:]
+    for of in folders:
+        yield ["_".join([label, *p.suffixes[-1:]]).replace("_.", "_") for label, p in zip(of, paths, strict=True)]
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Return the names with a number behind each that an earlier one has already."""
+    out: list[str] = []
+    for name in names:
+        own, n = name, 1
+        while own in out:
+            n += 1
+            own = f"{name}_{n}"
+        out.append(own)
+    return out
+
+
+def refuse_twice(runs: Sequence[Run], paths: Sequence[Path]) -> None:
+    """Raise UsageError where two files hold the same data: a fit would count them twice, a check would have seen them."""
+    if len(runs) < 2:
+        return
+    seen: dict[str, int] = {}
+    for i, (run, path) in enumerate(zip(runs, paths, strict=True)):
+        place = seen.setdefault(_data_of(run), i)
+        if place == i:
+            continue
+        first = paths[place]
+        if _real(first) == _real(path):
+            raise UsageError(f"`{path}` is given twice", found=f"{len(runs)} logs", hint="give each log once")
+        raise UsageError(
+            f"`{path}` holds the same data as `{first}`: it is given twice",
+            found=f"{len(run)} samples of {', '.join(run.signals)}, equal in each number",
+            hint=f"leave `{path}` out",
+        )
+
+
+def _data_of(run: Run) -> str:
+    """Return the SHA-256 of a run's time and signals, whatever file they came in."""
+    digest = sha256(run.time.tobytes())
+    for name in sorted(run.signals):
+        digest.update(name.encode())
+        digest.update(run.signals[name].tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,192 @@
+"""The text of a table file as plain bytes: unzipped, and in an encoding in which a line ends in one byte.
+
+A plain file is read where it lies; any other is unpacked or transcoded into a temporary file, piece by piece, so that no
+table is in memory as text.
+"""
+
+from __future__ import annotations
+
+import codecs
+import io
+import zlib
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
+
+from fieldsid.errors import LogError
+from fieldsid.logs.strangers import COPY_AGAIN
+
+GZIP = b"\x1f\x8b"
+HEAD = 1 << 18
+"""Bytes at the start of a table that tell how it is written."""
+PIECE_BYTES = 1 << 20
+_SMALL_PIECE = 512
+"""Bytes of a gzip stream that are unpacked at once: what a damaged one still gives is known to as many."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlainText:
+    """A table's bytes, their encoding and number, and whether the gzip stream they came in ends early."""
+
+    stream: IO[bytes]
+    encoding: str
+    size: int
+    is_cut: bool
+
+    def head(self) -> str:
+        """Return the text at the start; a character that the cut splits is replaced."""
+        self.stream.seek(0)
+        return self.stream.read(HEAD).decode(self.encoding, errors="replace")
+
+    def offset_of_line(self, line: int) -> int:
+        """Return the byte at which a line starts, counted from 0."""
+        self.stream.seek(0)
+        return sum(len(self.stream.readline()) for _ in range(line))
+
+    def last_line(self) -> tuple[int, bytes]:
+        """Return the byte behind the last line end, and what follows there."""
+        behind, last = self.size, b""
+        while behind > 0 and b"\n" not in last:
+            start = max(0, behind - HEAD)
+            last = self._piece(start, behind - start) + last
+            behind = start
+        end = last.rfind(b"\n") + 1
+        return behind + end, last[end:]
+
+    def count(self, what: bytes, begin: int, end: int) -> int:
+        """Return how often a byte stands between two places."""
+        return sum(self._piece(at, min(PIECE_BYTES, end - at)).count(what) for at in range(begin, end, PIECE_BYTES))
+
+    def is_blank(self) -> bool:
+        """Whether there is nothing but white space."""
+        return not any(self._piece(at, PIECE_BYTES).strip() for at in range(0, self.size, PIECE_BYTES))
+
+    def between(self, begin: int, end: int) -> io.BufferedReader:
+        """Return the bytes between two places as a stream of their own."""
+        return io.BufferedReader(_Slice(self.stream, begin, end), PIECE_BYTES)
+
+    def _piece(self, start: int, size: int) -> bytes:
+        self.stream.seek(start)
+        return self.stream.read(size)
+
+
+class _Slice(io.RawIOBase):
+    """The bytes of a stream between two places."""
+
+    def __init__(self, stream: IO[bytes], begin: int, end: int) -> None:
+        self.stream = stream
+        self.at = begin
+        self.end = end
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
+        self.stream.seek(self.at)
+        piece = self.stream.read(min(len(buffer), self.end - self.at))
+        buffer[: len(piece)] = piece
+        self.at += len(piece)
+        return len(piece)
+
+
+@contextmanager
+def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -> Iterator[PlainText]:
+    """Yield the text of a file, of a packed one the first `limit` bytes only where that is given.
+
+    The encoding is the one asked for, else by byte order mark, else UTF-8, else Windows-1252. Raises LogError when nothing
+    can be unzipped, and when the bytes are no text.
+    """
+    with ExitStack() as stack:
+        stream: IO[bytes] = stack.enter_context(path.open("rb"))
+        is_cut = False
+        if stream.read(len(GZIP)) == GZIP:
+            stream.seek(0)
+            packed, stream = stream, stack.enter_context(TemporaryFile())
+            is_cut = _unzip(packed, stream, path, limit)
+        stream.seek(0)
+        head = stream.read(HEAD)
+        encoding = asked or _encoding(head)
+        try:
+            if _needs_transcoding(encoding, head):
+                stream.seek(0)
+                other, stream = stream, stack.enter_context(TemporaryFile())
+                _transcode(other, stream, encoding, "strict" if asked else "replace", limit)
+                encoding = "utf-8"
+            elif asked:
+                _check(stream, asked)
+        except (UnicodeDecodeError, LookupError) as error:
+            hint = "leave `encoding` out of the mapping: it is found out"
+            raise LogError(f"`{path}` is not text in {encoding}", found=str(error), hint=hint) from error
+        stream.seek(0)
+        if b"\x00" in stream.read(4096):
+            raise LogError(f"`{path}` is not a text table", found="zero bytes", hint="give a table of text, Parquet or a bag")
+        yield PlainText(stream, encoding, stream.seek(0, io.SEEK_END), is_cut)
+
+
+def _unzip(packed: IO[bytes], plain: IO[bytes], path: Path, limit: int | None) -> bool:
+    """Unpack gzip streams, as many as follow each other; return whether the last one ends early. Raises LogError for none."""
+    stream = zlib.decompressobj(wbits=31)
+    piece = b""
+    try:
+        while piece := piece or packed.read(_SMALL_PIECE):
+            if stream.eof:
+                if not piece.startswith(GZIP[: len(piece)]):
+                    return False
+                stream = zlib.decompressobj(wbits=31)
+            plain.write(stream.decompress(piece))
+            piece = stream.unused_data
+            if limit is not None and plain.tell() >= limit:
+                return False
+    except zlib.error as error:
+        if not plain.tell():
+            found = f"{path.stat().st_size} bytes"
+            raise LogError(f"`{path}` is not a readable gzip file: {error}", found=found, hint=COPY_AGAIN) from error
+        return True
+    return not stream.eof
+
+
+def _needs_transcoding(encoding: str, head: bytes) -> bool:
+    """Whether a line does not end in one byte, or ends in a carriage return alone; raises LookupError."""
+    if encoding != "utf-8-sig" and "\n".encode(encoding) != b"\n":
+        return True
+    return b"\n" not in head and b"\r" in head
+
+
+def _transcode(other: IO[bytes], plain: IO[bytes], encoding: str, errors: str, limit: int | None) -> None:
+    """Write a text as UTF-8 whose lines end in a line feed."""
+    decoder = codecs.getincrementaldecoder(encoding)(errors=errors)
+    has_line_feeds: bool | None = None
+    is_last = False
+    while not is_last and (limit is None or plain.tell() < limit):
+        piece = other.read(PIECE_BYTES)
+        is_last = not piece
+        text = decoder.decode(piece, final=is_last)
+        has_line_feeds = "\n" in text if has_line_feeds is None else has_line_feeds
+        plain.write((text if has_line_feeds else text.replace("\r", "\n")).encode("utf-8"))
+
+
+def _check(stream: IO[bytes], encoding: str) -> None:
+    """Raise UnicodeDecodeError where bytes are no text in an encoding."""
+    decoder = codecs.getincrementaldecoder(encoding)(errors="strict")
+    stream.seek(0)
+    while piece := stream.read(PIECE_BYTES):
+        decoder.decode(piece)
+    decoder.decode(b"", final=True)
+
+
+def _encoding(raw: bytes) -> str:
+    for mark, name in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
+        if raw.startswith(mark):
+            return name
+    head = raw[:512]
+    if head.count(b"\x00") > len(head) // 4:
+        return "utf-16-le" if head[1::2].count(b"\x00") > head[::2].count(b"\x00") else "utf-16-be"
+    try:
+        raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        # A piece of a file may end inside a character; anything else that is no UTF-8 is Windows text.
+        return "utf-8" if error.start >= len(raw) - 3 else "cp1252"
+    return "utf-8"

@@ -1,0 +1,73 @@
+"""Decompression of chunks and files by their libraries, as far as the data go.
+
+What a cut leaves of the last block of LZ4 or zstd data is not read: the libraries hand out whole blocks.
+"""
+
+from __future__ import annotations
+
+import bz2
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from fieldsid.logs.readers.bags.packets import UnknownFormError
+
+PIECE_BYTES = 1 << 20
+KNOWN = ("", "none", "bz2", "lz4", "zstd")
+
+
+def unpacked(data: bytes, compression: str) -> bytes | None:
+    """Return the plain bytes, or those of the blocks that are whole; None where the data are damaged.
+
+    Raises UnknownFormError for a compression that is not one of KNOWN.
+    """
+    if compression in ("", "none"):
+        return data
+    try:
+        if compression == "bz2":
+            return bz2.BZ2Decompressor().decompress(data)
+        if compression == "lz4":
+            return _decompressed(import_module("lz4.frame").LZ4FrameDecompressor(), data)
+    except (OSError, RuntimeError, EOFError, ValueError):
+        return None
+    if compression == "zstd":
+        return unzstd(data)
+    raise UnknownFormError(
+        f"the bag is compressed with {compression!r}", found=compression, hint="record or convert it with zstd or lz4"
+    )
+
+
+def unzstd(data: bytes) -> bytes | None:
+    """Return what zstd data hold, up to where they end; None where they are damaged."""
+    module = _zstd()
+    try:
+        return _decompressed(module.ZstdDecompressor(), data)
+    except (module.ZstdError, EOFError):
+        return None
+
+
+def _decompressed(decompressor: Any, data: bytes) -> bytes:
+    plain: bytes = decompressor.decompress(data)
+    return plain
+
+
+def unpack_file(packed: Path, plain: Path) -> str | None:
+    """Write what a zstd file holds, piece by piece; return `cut off` or `damaged` where it does not go to its end."""
+    module = _zstd()
+    decompressor = module.ZstdDecompressor()
+    with packed.open("rb") as source, plain.open("wb") as target:
+        try:
+            while piece := source.read(PIECE_BYTES):
+                while piece:
+                    if decompressor.eof:
+                        decompressor = module.ZstdDecompressor()
+                    target.write(decompressor.decompress(piece))
+                    piece = decompressor.unused_data
+        except module.ZstdError:
+            return "damaged"
+    return None if decompressor.eof else "cut off"
+
+
+def _zstd() -> Any:
+    return import_module("compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd")

@@ -1,0 +1,78 @@
+"""What metadata.yaml beside a ROS 2 bag states: how many messages were recorded by topic, and how they are serialized."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from fieldsid.artifacts import read_yaml
+from fieldsid.errors import FieldsidError
+from fieldsid.logs.readers.bags.packets import Collector
+from fieldsid.logs.run import Note
+
+NAME = "metadata.yaml"
+
+
+@dataclass(frozen=True, slots=True)
+class Metadata:
+    """Messages by topic, and the serialization of each."""
+
+    counts: Mapping[str, int]
+    serializations: Mapping[str, str]
+
+
+def check_against_metadata(path: Path, collector: Collector) -> None:
+    """Note where a bag holds fewer messages than metadata.yaml beside it, or than its own index, counts.
+
+    path: a bag's folder, or a file that is the only one of its bag.
+    """
+    stated: Mapping[str, int] = collector.expected
+    source = "the index of the bag"
+    file = (path if path.is_dir() else path.parent) / NAME
+    if file.is_file():
+        try:
+            metadata = _metadata_of(file, None if path.is_dir() else path.name)
+        except FieldsidError as error:
+            collector.notes.append(Note("metadata", f"`{file}` cannot be used: {error.what}", {"found": error.found}))
+            metadata = None
+        if metadata is not None:
+            stated, source = metadata.counts, NAME
+            collector.notes += _other_serializations(metadata, collector)
+    collector.notes += _share_read(stated, source, collector)
+
+
+def _metadata_of(file: Path, only: str | None) -> Metadata | None:
+    """Return what the file states, or None where it is about more files than the one that is read; raises FieldsidError."""
+    body = read_yaml(file)
+    try:
+        about = body["rosbag2_bagfile_information"]
+        names = [PurePosixPath(name).name for name in about["relative_file_paths"]]
+        topics: list[Any] = [(t["topic_metadata"], t["message_count"]) for t in about["topics_with_message_count"]]
+        counts = {str(t["name"]): int(count) for t, count in topics}
+        serializations = {str(t["name"]): str(t["serialization_format"]) for t, _ in topics}
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FieldsidError("it is no description of a bag", found=f"{type(error).__name__}: {error}") from error
+    return Metadata(counts, serializations) if only is None or names in ([only], [f"{only}.zstd"]) else None
+
+
+def _other_serializations(metadata: Metadata, collector: Collector) -> list[Note]:
+    """Note topics that metadata.yaml and the bag's file state different serializations of."""
+    notes = []
+    for topic, stated in metadata.serializations.items():
+        connection = collector.connections.get(topic)
+        if connection is not None and topic in collector.packets and connection.serialization != stated:
+            message = f"{topic}: {NAME} states messages in `{stated}`, the file itself in `{connection.serialization}`"
+            notes.append(Note("serialization", message, {"topic": topic, "stated": stated, "found": connection.serialization}))
+    return notes
+
+
+def _share_read(stated: Mapping[str, int], source: str, collector: Collector) -> list[Note]:
+    """Note the topics of which fewer messages were read than are stated."""
+    short = {t: (len(p.stamps), stated[t]) for t, p in collector.packets.items() if len(p.stamps) < stated.get(t, 0)}
+    if not short:
+        return []
+    shares = [f"{got} of {count} on {topic} ({100 * got / count:.1f} %)" for topic, (got, count) in sorted(short.items())]
+    message = f"fewer messages were read than {source} counts: {', '.join(shares)}"
+    return [Note("incomplete", message, {topic: {"read": got, "of": count} for topic, (got, count) in short.items()})]

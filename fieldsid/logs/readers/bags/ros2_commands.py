@@ -1,0 +1,68 @@
+"""Write fin commands as a ROS 2 bag: the fin as std_msgs/Float64, whether the autopilot has it as std_msgs/Bool.
+
+What must be watched while it is played comes first, as std_msgs/String.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from fieldsid.errors import ArtifactError
+from fieldsid.logs.run import FloatArray
+
+NANOSECONDS = 1_000_000_000
+
+
+def write_commands(
+    path: Path,
+    time: FloatArray,
+    fin: FloatArray,
+    autopilot: FloatArray,
+    *,
+    topic: str,
+    conditions: str,
+    force: bool = False,
+) -> Path:
+    """Write a bag folder (MCAP): fin (n,) rad about trim on `topic`, autopilot (n,) 0 or 1 on `/autopilot`, times (n,) s.
+
+    conditions stand on `/abort_conditions` before the first of them.
+
+    Raises ArtifactError when the folder exists and `force` is false, or cannot be written.
+    """
+    if path.exists() and not force:
+        raise ArtifactError(f"`{path}` exists", found="a bag folder", hint="add `--force`, or name another output")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    except OSError as error:
+        raise ArtifactError(
+            f"`{path}` cannot be written: {error.strerror}", hint="choose a folder that can be written"
+        ) from error
+    try:
+        _fill(work / path.name, time, fin, autopilot, (topic, conditions))
+        if path.exists():
+            shutil.rmtree(path)
+        (work / path.name).replace(path)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    return path
+
+
+def _fill(path: Path, time: FloatArray, fin: FloatArray, autopilot: FloatArray, named: tuple[str, str]) -> None:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    float64, boolean, string = (store.types[f"std_msgs/msg/{name}"] for name in ("Float64", "Bool", "String"))
+    topic, conditions = named
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        command = writer.add_connection(topic, float64.__msgtype__, typestore=store)
+        pilot = writer.add_connection("/autopilot", boolean.__msgtype__, typestore=store)
+        watched = writer.add_connection("/abort_conditions", string.__msgtype__, typestore=store)
+        writer.write(watched, 0, bytes(store.serialize_cdr(string(data=conditions), string.__msgtype__)))
+        for t, angle, steered in zip(time.tolist(), fin.tolist(), autopilot.tolist(), strict=True):
+            stamp = round(t * NANOSECONDS)
+            writer.write(command, stamp, bytes(store.serialize_cdr(float64(data=angle), float64.__msgtype__)))
+            writer.write(pilot, stamp, bytes(store.serialize_cdr(boolean(data=bool(steered)), boolean.__msgtype__)))

@@ -1,0 +1,116 @@
+"""The mapped signals of a bag: stamps of the header or of the recorder, in seconds from the first one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fieldsid.errors import LogError, MappingError
+from fieldsid.logs.channels import ChannelMap, Source, Stamp
+from fieldsid.logs.reader import RawLog, ReadOptions
+from fieldsid.logs.readers.bags.definitions import DefinitionSearch
+from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection
+from fieldsid.logs.readers.bags.stores import collected
+from fieldsid.logs.readers.bags.topic import TopicDecoding, TopicSeries
+from fieldsid.logs.run import Note
+from fieldsid.registry import near
+
+LATE_S = 1.0
+"""Header and receive stamps further apart than this are two clocks, not a delay."""
+
+
+def read_signals(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the series that a mapping names; raises MappingError for an unknown topic or field, LogError for an empty bag."""
+    decoding: dict[str, TopicDecoding] = {}
+    for topic in dict.fromkeys(s.topic for s in mapping.sources.values() if s.topic is not None):
+        sources = {signal: s for signal, s in mapping.sources.items() if s.topic == topic}
+        decoding[topic] = TopicDecoding(sources, DefinitionSearch(path, options.msg_path))
+    collector = collected(path, decoding.keys(), lambda c, packets: decoding[c.topic].settle(c, packets), options.progress)
+    if not decoding and mapping.sources:
+        _topic(path, collector, *next(iter(mapping.sources.items())))
+    check_not_empty(path, collector)
+    for signal, source in mapping.sources.items():
+        _topic(path, collector, signal, source)
+    topics = [d.joined(collector.connections[t], collector.packets[t]) for t, d in decoding.items()]
+    return _raw_log(path, collector, mapping, topics)
+
+
+def _raw_log(path: Path, collector: Collector, mapping: ChannelMap, topics: list[TopicSeries]) -> RawLog:
+    notes = [*collector.notes, *(n for t in topics for n in t.notes), *_two_clocks(topics, mapping.stamp)]
+    stamps = {signal: (t, t.stamps(source, mapping.stamp)) for t in topics for signal, source in t.sources.items()}
+    origin = min(int(s[0]) for _, s in stamps.values())
+    series = {signal: t.series(signal, s, origin) for signal, (t, s) in stamps.items()}
+    notes.append(Note("time_origin", f"time 0 is {origin / 1e9:.9f} s of the bag's clock", {"origin_ns": origin}))
+    return RawLog(path.name if path.is_dir() else path.stem, series, tuple(notes), one_clock=False)
+
+
+def check_not_empty(path: Path, collector: Collector) -> None:
+    """Raise LogError for a bag without messages."""
+    if not collector.connections:
+        cut = next((n.message for n in collector.notes if n.code in ("truncated", "damaged")), "no topics")
+        raise LogError(f"`{path}` has no messages", found=cut, hint="copy it from the vehicle again")
+    if any(packets.stamps for packets in collector.packets.values()) or (
+        collector.wanted is not None and collector.wanted - collector.connections.keys()
+    ):
+        return
+    topics = ", ".join(sorted(collector.connections)) or "no topics"
+    what = "has no messages" if collector.wanted is None else "has no messages on the mapped topics"
+    raise LogError(
+        f"`{path}` {what}",
+        found=topics,
+        hint="check that the recorder ran: its topics and their types are all that is in the file",
+    )
+
+
+def _topic(path: Path, collector: Collector, signal: str, source: Source) -> None:
+    if source.topic is None:
+        raise MappingError(
+            f"`{signal}` is mapped to a {source.label}, but `{path}` is a bag",
+            found=source.label,
+            hint="name a `topic` and a `field`",
+        )
+    if source.topic not in collector.connections:
+        raise MappingError(
+            f"`{path}` has no topic `{source.topic}` for `{signal}`",
+            found=", ".join(sorted(collector.connections)) or "no topics",
+            hint=near(source.topic, list(collector.connections)),
+        )
+    if not collector.packets[source.topic].stamps:
+        raise LogError(f"topic `{source.topic}` has no messages", found="0 messages", hint=f"map `{signal}` to another topic")
+    connection = collector.connections[source.topic]
+    if not connection.is_decodable or source.topic in collector.mixed:
+        if source.topic in collector.mixed:
+            found, hint = "messages of two types", f"map `{signal}` to another topic"
+        else:
+            found = not_decodable(connection)
+            hint = "convert it with `ros2 bag convert` where that format is installed, or record with `rmw_fastrtps_cpp`"
+        raise LogError(f"topic `{source.topic}` cannot be decoded", found=found, hint=hint)
+
+
+def not_decodable(connection: Connection) -> str:
+    """Say why messages cannot be decoded."""
+    return f"its messages are serialized as `{connection.serialization}`, and only `{CDR}` and `{ROS1}` are known"
+
+
+def _two_clocks(topics: list[TopicSeries], asked: Stamp | None) -> list[Note]:
+    """Refuse header stamps of one clock beside receive stamps of another; note a plain delay."""
+    late: dict[str, float] = {}
+    receive = False
+    for topic in topics:
+        for source in topic.sources.values():
+            by_header = topic.header is not None and topic.stamps(source, asked) is topic.header
+            receive |= not by_header
+            if topic.header is not None and by_header:
+                late[topic.connection.topic] = float(np.median(topic.received - topic.header)) / 1e9
+    if not late or not receive:
+        return []
+    worst = max(late, key=lambda t: abs(late[t]))
+    if abs(late[worst]) > LATE_S:
+        raise MappingError(
+            f"header stamps of `{worst}` are on another clock than the recorder's: {late[worst]:.3f} s (limit {LATE_S:g} s)",
+            found="topics without a header, which have receive stamps only",
+            hint="write `stamp: receive` at the top of the mapping",
+        )
+    message = f"header stamps of {worst} are {late[worst] * 1e3:.1f} ms before the recorder's, which other topics go by"
+    return [Note("stamp_latency", message, {"seconds": late[worst], "topic": worst})] if abs(late[worst]) > 1e-3 else []

@@ -1,0 +1,111 @@
+"""What a file is that no reader takes: one of this program's own, a format without a reader, damaged, or a folder of logs."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from shlex import quote
+from types import MappingProxyType
+
+from fieldsid.artifacts import inputs_of
+from fieldsid.errors import LogError
+
+COPY_AGAIN = "where the vehicle's own file is larger, copy it again"
+"""What helps where a log holds less than it should, and is true of any."""
+
+ULOG = b"ULog\x01\x12\x35"
+ULOG_HEADER = 16
+"""Bytes of a ULog file's header: signature, version and time of the start."""
+FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
+    {
+        ULOG: ("a ULog file (PX4)", "`ulog2csv {path}`, of pyulog, writes a table of each topic: put the columns into one"),
+        b"\xa3\x95\x80": ("a DataFlash log (ArduPilot)", "make one table of its messages, with pymavlink's `mavlogdump.py`"),
+        b"MATLAB 5.0": ("a MATLAB file", "write a table from it: `writetable`"),
+        b"\x89HDF": ("an HDF5 file, as MATLAB 7.3 writes them too", "write a table from it"),
+        b"PK\x03\x04": ("a ZIP file, as .xlsx and .npz are too", "unpack it, or write a table from it"),
+        b"BZh": ("a bzip2 file", "unpack it: `bunzip2 -k {path}`"),
+        b"\xfd7zXZ\x00": ("an xz file", "unpack it: `unxz -k {path}`"),
+        b"\x28\xb5\x2f\xfd": ("a zstd file", "unpack it: `unzstd {path}`"),
+        b"\x93NUMPY": ("a NumPy array", "write a table with a header from it"),
+    }
+)
+"""Binary formats by their signature: what they are, and how to make a log of them where there is a way."""
+NO_LOG = MappingProxyType({b"\x89PNG": "a picture", b"%PDF": "a document", b"\x7fELF": "a program"})
+READ_ELSEWHERE = (b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
+"""How files start that another reader takes."""
+
+_OWN = re.compile(rb"^\s*\{?\s*[\"']?schema[\"']?\s*:\s*[\"']?(fieldsid/([a-z-]+)/\d+)", re.MULTILINE)
+_HEAD = 4096
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file may hold a table of text: no known format, and no zero bytes, or as many as UTF-16 has."""
+    head = _head_of(path)
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return True
+    if head.startswith((*FOREIGN, *NO_LOG, *READ_ELSEWHERE)) or _OWN.search(head):
+        return False
+    return b"\x00" not in head[:512] or head[:512].count(b"\x00") > len(head[:512]) // 4
+
+
+def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
+    """Return the error of a file or folder that no reader takes; suffixes are those of the logs that are read."""
+    give = f"give a log: {', '.join(suffixes)}"
+    if path.is_dir():
+        return _of_folder(path, suffixes, give)
+    head, size = _head_of(path), f"{path.stat().st_size} bytes"
+    own = _OWN.search(head)
+    if own is not None:
+        return _of_own(path, own[1].decode(), own[2].decode(), give)
+    if head.startswith(READ_ELSEWHERE):
+        return LogError(f"`{path}` starts as a bag or a Parquet file does, and is none", found=size, hint=COPY_AGAIN)
+    for signature, (what, way) in FOREIGN.items():
+        if head.startswith(signature):
+            return _of_foreign(path, signature, what, way.format(path=quote(str(path))))
+    for signature, what in NO_LOG.items():
+        if head.startswith(signature):
+            return LogError(f"`{path}` is {what}, not a log", found=size, hint=give)
+    return LogError(f"`{path}` is no log this program reads", found=f"{size} with no known signature", hint=give)
+
+
+def _of_foreign(path: Path, signature: bytes, what: str, way: str) -> LogError:
+    size = path.stat().st_size
+    if signature == ULOG and size <= ULOG_HEADER:
+        return LogError(f"`{path}` is {what} without data", found=f"{size} bytes: its header", hint="take another log")
+    return LogError(f"`{path}` is {what}, for which no reader is installed", found=f"{size} bytes", hint=way)
+
+
+def own_kind(path: Path) -> str | None:
+    """Return which file of this program a file is, by its schema: "model", "fit" and so on; None for any other."""
+    try:
+        found = _OWN.search(_head_of(path)) if path.is_file() else None
+    except OSError:  # who reads it says why it cannot be read
+        return None
+    return None if found is None else found[2].decode()
+
+
+def _of_own(path: Path, schema: str, kind: str, give: str) -> LogError:
+    hints = {"mapping": f"give it beside the log: `--mapping {quote(str(path))}`", "model": _logs_of(path) or give}
+    article = "an" if kind[0] in "aeiou" else "a"
+    what = f"`{path}` is {article} {kind} file of this program, not a log"
+    return LogError(what, found=f"schema: {schema}", hint=hints.get(kind, give))
+
+
+def _logs_of(path: Path) -> str:
+    logs = " ".join(quote(str(p)) for p in inputs_of(path))
+    return f"give logs, such as those it was made from: `{logs}`" if logs else ""
+
+
+def _of_folder(path: Path, suffixes: Sequence[str], give: str) -> LogError:
+    names = sorted(p.name for p in path.iterdir())
+    known = Counter(s for name in names for s in suffixes if name.endswith(s)).most_common(1)
+    shown = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+    hint = f"give the logs in it: `{quote(str(path))}/*{known[0][0]}`" if known else give
+    return LogError(f"`{path}` is a folder, and no bag", found=f"it holds {shown or 'nothing'}", hint=hint)
+
+
+def _head_of(path: Path) -> bytes:
+    with path.open("rb") as stream:
+        return stream.read(_HEAD)

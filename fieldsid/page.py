@@ -1,0 +1,106 @@
+"""A page: what a record has to say, as plain words in blocks; the same page as fixed text and as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from textwrap import fill
+
+INDENT = "  "
+GAP = "  "
+WIDTH = 100
+"""Columns from which on a sentence goes on in the next line."""
+LONGEST_WORD = 60
+"""Characters of a name or a path in a line, beyond which its middle is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block of a page: its title, the heads of its columns (none where they need none) and its rows, all as words.
+
+    The first `left` columns are words and stand at the left, the others are numbers and stand at the right.
+    """
+
+    title: str
+    rows: tuple[tuple[str, ...], ...]
+    columns: tuple[str, ...] = ()
+    left: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What a record says: a title, what must be read before any number, blocks in their order, and closing sentences."""
+
+    title: str
+    warnings: tuple[str, ...] = ()
+    blocks: tuple[Block, ...] = ()
+    closing: tuple[str, ...] = ()
+
+
+def facts(title: str, pairs: Iterable[tuple[str, str]]) -> Block:
+    """Return a block of names and what they are, without those that nothing is known of."""
+    return Block(title, tuple(pair for pair in pairs if pair[1]), left=2)
+
+
+def text_of(page: Page) -> str:
+    """Return a page as text: title and warnings first, then its blocks; sentences are folded, tables are not."""
+    head = [_folded(line) for line in (page.title, *(f"warning: {w}" for w in page.warnings))]
+    parts = ["\n".join(head), *(_block_text(b) for b in page.blocks if b.rows)]
+    return "\n\n".join([*parts, *(["\n".join(map(_folded, page.closing))] if page.closing else [])])
+
+
+def html_of(page: Page) -> str:
+    """Return a page as a fragment of HTML that is well-formed XML too; every word of the record is escaped."""
+    warnings = "".join(f"<li>{escape(w)}</li>" for w in page.warnings)
+    parts = [f"<p><b>{escape(page.title)}</b></p>", f"<ul>{warnings}</ul>" if warnings else ""]
+    parts += [_block_html(b) for b in page.blocks if b.rows]
+    parts += [f"<p>{escape(line)}</p>" for line in page.closing]
+    return f'<div class="fieldsid">{"".join(parts)}</div>'
+
+
+def cut(text: str, longest: int) -> str:
+    """Return a text on one line, its end left out where it is longer than so many characters."""
+    line = " ".join(text.split())
+    return line if len(line) <= longest else f"{line[: longest - 3]}..."
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """Return names joined by commas, only their count for those beyond the first few."""
+    shown = ", ".join(cut(n, LONGEST_WORD) for n in names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def _folded(line: str, indent: int = len(INDENT)) -> str:
+    """Return a line as several of a page's width, all but the first indented, words and names unbroken."""
+    return fill(line, WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
+
+
+def _block_text(block: Block) -> str:
+    if not block.columns and block.left == 2:
+        return "\n".join([block.title, *_fact_lines(block.rows)])
+    rows = [block.columns, *block.rows] if block.columns else list(block.rows)
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = [
+        GAP.join(w.ljust(n) if i < block.left else w.rjust(n) for i, (w, n) in enumerate(zip(row, widths, strict=True))).rstrip()
+        for row in rows
+    ]
+    return "\n".join([block.title, *(f"{INDENT}{line}" for line in lines)])
+
+
+def _fact_lines(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    width = max(len(name) for name, _ in rows)
+    indent = len(INDENT) + width + len(GAP)
+    return [_folded(f"{INDENT}{name.ljust(width)}{GAP}{said}", indent) for name, said in rows]
+
+
+def _block_html(block: Block) -> str:
+    head = f"<tr>{_cells('th', block.columns, block.left)}</tr>" if block.columns else ""
+    rows = "".join(f"<tr>{_cells('td', row, block.left)}</tr>" for row in block.rows)
+    return f"<table><caption>{escape(block.title)}</caption>{head}{rows}</table>"
+
+
+def _cells(tag: str, words: Sequence[str], left: int) -> str:
+    return "".join(
+        f'<{tag} style="text-align: {"left" if i < left else "right"}">{escape(word)}</{tag}>' for i, word in enumerate(words)
+    )

@@ -1,0 +1,132 @@
+"""What a verification comes to: the gates that were asked for, the verdict with its number, and what it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, isfinite
+from typing import Any
+
+from fieldsid.rounding import number
+from fieldsid.schedule.make import actuator_of
+from fieldsid.schedule.plant import not_counted
+from fieldsid.schedule.record import Schedule
+from fieldsid.schedule.verify import DEPTH_STEP_M, DEPTH_STEP_S, READ_OFF, STEP, STEP_S, Verification, stated_limits
+from fieldsid.turning.source import Source
+
+MOST_NAMED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """One number that was asked for: its name with unit, the limit, what was found and at which speed (m/s)."""
+
+    name: str
+    wanted: float
+    found: float
+    speed: float
+    at_least: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether the number is on the right side of its limit."""
+        return self.found >= self.wanted if self.at_least else self.found <= self.wanted
+
+    @property
+    def says(self) -> str:
+        """The gate in words."""
+        side = "least" if self.at_least else "most"
+        return f"{self.name} {number(self.found, 3)} at {number(self.speed, 3)} m/s, wanted at {side} {self.wanted:.3g}"
+
+    def record(self) -> dict[str, Any]:
+        """Return the gate as `--json` prints it."""
+        return {
+            "gate": self.name,
+            "wanted": self.wanted,
+            "found": self.found,
+            "speed_m_s": self.speed,
+            "passed": self.passed,
+        }
+
+
+def gates_of(checked: Verification, wanted: Mapping[str, float | None]) -> tuple[Gate, ...]:
+    """Return the gates among the names of `Verification.worst` that have a limit."""
+    gates = []
+    for name, limit in wanted.items():
+        if limit is not None:
+            weakest, (sign, read) = checked.weakest(name), READ_OFF[name]
+            gates.append(Gate(name, limit, read(weakest), weakest.speed, sign > 0))
+    return tuple(gates)
+
+
+def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...]) -> tuple[str, str]:
+    """Return the verdict, `passed` or FAILED by the gates, `holds` or `does not hold` without, and its numbers in words."""
+    faults = _faults(checked, schedule)
+    failed = [g.says for g in gates if not g.passed]
+    if failed:
+        return "FAILED", "; ".join([*failed, *faults])
+    if gates:
+        return "passed", "; but ".join(["; ".join(g.says for g in gates), *faults])
+    if faults:
+        return "does not hold", "; ".join(faults)
+    weakest = checked.weakest("phase_margin_deg")
+    margin = f"least phase margin {number(weakest.phase_least_deg, 3)} deg at {number(weakest.speed, 3)} m/s"
+    return "holds", f"{margin}; {_settles(checked, degrees(STEP[schedule.axis]))}"
+
+
+def _settles(checked: Verification, step: float) -> str:
+    """Return how long a step (deg) takes to settle where it takes longest, by the estimate and over the draws."""
+    slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
+    by_draws = f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {STEP_S:.0f} s"
+    return f"a {step:.0f} deg step settles within {slowest:.1f} s at every speed" + (f", {by_draws}" if checked.spread else "")
+
+
+def _faults(checked: Verification, schedule: Schedule) -> list[str]:
+    """Return why the loop does not hold, whatever was asked for."""
+    weakest, slowest = checked.weakest("phase_margin_deg"), max(checked.scheduled, key=lambda c: c.settling)
+    step, found = degrees(STEP[schedule.axis]), []
+    if weakest.phase_least_deg <= 0.0:
+        found.append(f"unstable at {number(weakest.speed, 3)} m/s, phase margin {number(weakest.phase_least_deg, 3)} deg")
+    if not isfinite(slowest.settling):
+        found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {STEP_S:.0f} s")
+    deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
+    if deepest is not None and not isfinite(deepest.depth_settling):
+        where = f"at {number(deepest.speed, 3)} m/s a {DEPTH_STEP_M:.0f} m depth step"
+        found.append(f"{where} is not within 5 % after {DEPTH_STEP_S:.0f} s")
+    return found
+
+
+def rests_on(checked: Verification, schedule: Schedule, source: Source) -> str:
+    """Return what a verification rests on: the models, their errors, the speeds, the fin."""
+    names = source.names or tuple(p.name for p in source.paths)
+    named = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
+    effects = sorted({e for m in source.models for e in m.effects})
+    errors = f"{checked.draws} draws of their errors" if checked.spread else "no errors stated, the estimate alone"
+    speeds = [c.speed for c in checked.scheduled]
+    beyond = sum(not c.supported for c in checked.scheduled)
+    limit = number(min(r.fin_limit for r in schedule.rows), 3)
+    return "; ".join(
+        (
+            f"rests on {named} with {', '.join(effects) or 'no effects'}",
+            errors,
+            f"{len(speeds)} speeds, {number(min(speeds), 3)} .. {number(max(speeds), 3)} m/s"
+            + (f", {beyond} of them beyond the data" if beyond else ""),
+            f"fin {limit} rad, {fin_of(actuator_of(source, stated_limits(schedule)))}",
+            *lost(source),
+        )
+    )
+
+
+def fin_of(actuator: Mapping[str, float | None]) -> str:
+    """Return lag, delay and rate limit in words."""
+    lag, delay, rate = (actuator[name] for name in ("lag_s", "delay_s", "fin_rate_rad_s"))
+    fastest = "no rate limit" if rate is None or not isfinite(rate) else f"at most {number(rate, 3)} rad/s"
+    return f"lag {number(lag, 3)} s, delay {number(delay, 3)} s, {fastest}"
+
+
+def lost(source: Source) -> tuple[str, ...]:
+    """Return what a source knows of the path from fin to motion that gains are not made for, or that it cannot know."""
+    if not source.models:
+        return ("a table carries no effects",)
+    left = not_counted(source.models)
+    return (f"not counted in full: {', '.join(left)}",) if left else ()

@@ -1,0 +1,166 @@
+"""Words that several views share: numbers with their errors, errors beside the noise, warnings, rows as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.page import Block, cut, facts
+from fieldsid.rounding import interval, number, with_error
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from fieldsid.diagnosis import Pair
+    from fieldsid.fitting.estimates import Estimate
+    from fieldsid.fitting.merit import Merit
+    from fieldsid.logs import Note
+    from fieldsid.models.model import Model, Noise
+
+BETWEEN = " +/- "
+MANY = 100.0
+"""Times the noise floor from which on decimals say nothing."""
+
+
+def warned(notes: Iterable[Note]) -> tuple[str, ...]:
+    """Return notes as warnings, each with its code."""
+    return tuple(f"{n.message} [{n.code}]" for n in notes)
+
+
+def counted(count: int, word: str) -> str:
+    """Return `1 warning`, `2 warnings`; empty for none."""
+    return "" if count == 0 else f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
+def joined(*parts: str) -> str:
+    """Return the parts that say something, joined by commas."""
+    return ", ".join(p for p in parts if p)
+
+
+def speed_words(speed: float) -> str:
+    """Return a speed, empty where it is not known."""
+    return f"{speed:.2f} m/s" if isfinite(speed) else ""
+
+
+def estimate_words(e: Estimate) -> str:
+    """Return `a22 = 1.104 +/- 0.013 1/s`."""
+    return f"{e.name} = {with_error(e.value, e.std_error)} {e.unit}".rstrip()
+
+
+def base_words(model: Model) -> str:
+    """Return the base parameters of a model with their errors."""
+    from fieldsid.fitting.estimates import estimates
+    from fieldsid.models.axis import NAMES
+
+    base = NAMES[model.axis].base
+    return ", ".join(estimate_words(e) for e in estimates(model) if e.name in base)
+
+
+def parameter_block(model: Model) -> Block:
+    """Return the parameters of a model: value, standard error, 95 % interval, unit."""
+    from fieldsid.fitting.estimates import estimates
+
+    rows = []
+    for e in estimates(model):
+        value, _, error = with_error(e.value, e.std_error).partition(BETWEEN)
+        rows.append((e.name, value, error or "-", interval(*e.interval95), e.unit))
+    at = f" at {model.law.reference:.2f} m/s" if isfinite(model.law.reference) else ""
+    return Block(f"Parameters{at}", tuple(rows), ("", "value", "std error", "95 % interval", "unit"))
+
+
+def parameter_rows(model: Model) -> list[dict[str, Any]]:
+    """Return the parameters of a model as rows of a table."""
+    from fieldsid.fitting.estimates import estimates
+
+    return [
+        {"parameter": e.name, "value": e.value, "std_error": e.std_error, "low95": low, "high95": high, "unit": e.unit}
+        for e in estimates(model)
+        for low, high in [e.interval95]
+    ]
+
+
+def error_facts(m: Merit, floor: Noise) -> list[tuple[str, str]]:
+    """Return the free-run error of angle and rate beside the noise, nothing of a channel that was not measured."""
+    channels = (
+        ("angle error", "rad", m.angle_rms, floor.angle, m.angle_fit),
+        ("rate error", "rad/s", m.rate_rms, floor.rate, m.rate_fit),
+    )
+    return [
+        (name, f"rms {number(rms, 3)} {unit} (noise {number(noise, 3)}), fit {number(fit, 3)} %")
+        for name, unit, rms, noise, fit in channels
+        if isfinite(rms)
+    ]
+
+
+def merit_row(m: Merit) -> dict[str, float]:
+    """Return errors and fits of a free run by the names that JSON gives them."""
+    return {
+        "angle_rms_rad": m.angle_rms,
+        "rate_rms_rad_s": m.rate_rms,
+        "angle_fit_percent": m.angle_fit,
+        "rate_fit_percent": m.rate_fit,
+    }
+
+
+def pair_row(pair: Pair) -> dict[str, float]:
+    """Return errors on fitted and on unseen runs as columns of a row."""
+    sides = (("fitted", pair.train), ("unseen", pair.validation))
+    return {f"{side}_{name}": getattr(errors, name) for side, errors in sides for name in ("angle_rms_rad", "rate_rms_rad_s")}
+
+
+def times(ratio: float) -> str:
+    """Return an error over the noise floor, `-` where there is none."""
+    return f"{ratio:.2f}" if abs(ratio) < MANY else number(ratio, 3)
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent."""
+    return f"{100 * share:.0f} %"
+
+
+def where_block(title: str, where: Iterable[Any], most: int = 6) -> Block:
+    """Return where a model fails: condition, share of the squared error, rms over the whole run's, the worst time."""
+    rows = [
+        (p.condition, percent(p.share_of_error), f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
+        for p in list(where)[:most]
+    ]
+    return Block(title, tuple(rows), ("", "of error", "rms ratio", "worst, s"))
+
+
+def where_rows(where: Iterable[Any]) -> list[dict[str, Any]]:
+    """Return where a model fails as rows of a table."""
+    return [
+        {
+            "condition": p.condition,
+            "share_of_error": p.share_of_error,
+            "share_of_samples": p.share_of_samples,
+            "rms_ratio": p.rms_ratio,
+            "start_s": p.start_s,
+            "end_s": p.end_s,
+        }
+        for p in where
+    ]
+
+
+def table(rows: Iterable[Mapping[str, Any]], index: str | None = None) -> DataFrame:
+    """Return rows as a pandas table, by one of their columns where named."""
+    import pandas as pd
+
+    made = pd.DataFrame.from_records(list(rows))
+    return made if index is None or made.empty else made.set_index(index)
+
+
+def fact_block(title: str, row: Mapping[str, Any]) -> Block:
+    """Return one row of a table as names and values."""
+    return facts(title, ((name.replace("_", " "), _cell(value)) for name, value in row.items()))
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return number(value)
+    if isinstance(value, (list, tuple)):
+        return " .. ".join(_cell(v) for v in value) if all(isinstance(v, float) for v in value) else "; ".join(map(str, value))
+    return cut(str(value), 200)

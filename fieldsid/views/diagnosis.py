@@ -1,0 +1,100 @@
+"""A diagnosis: the verdict in its own words, the candidates with their errors, where the model fails, what to fly next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.display import View
+from fieldsid.page import Block, Page, cut, facts, listed
+from fieldsid.rounding import number
+from fieldsid.views._words import (
+    counted,
+    joined,
+    pair_row,
+    parameter_rows,
+    percent,
+    table,
+    times,
+    warned,
+    where_block,
+    where_rows,
+)
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from fieldsid.diagnosis import Candidate, Diagnosis
+
+
+def line(found: Diagnosis) -> str:
+    """Return axis, verdict and its sentence."""
+    return f"{found.axis.value}, {found.verdict}: {joined(cut(found.says, 280), counted(len(found.notes), 'note'))}"
+
+
+def page(found: Diagnosis) -> Page:
+    """Return the verdict, the candidates after the model as it is, where that fails, and what to fly next."""
+    floor = found.noise_floor
+    errors = found.base.train.over(floor), found.base.validation.over(floor)
+    rows = [("model as it is", "", times(errors[0]), times(errors[1]), "", ""), *(_row(c, found) for c in found.candidates)]
+    heads = ("", "probability", "fitted", "unseen", "explained", "log evidence")
+    next_ = found.next_maneuver
+    known = facts(
+        "Statistics",
+        (
+            ("verdict", found.verdict),
+            ("effects", listed(found.effects) or "none"),
+            ("noise floor", f"{number(floor.angle, 3)} rad and {number(floor.rate, 3)} rad/s"),
+            ("not tried", "; ".join(f"{n}: {why}" for n, why in found.skipped.items())),
+            ("fly next", f"{next_['maneuver']}, {next_['why']}" if next_ else ""),
+        ),
+    )
+    blocks = (
+        known,
+        Block("Candidates (fitted, unseen: free-run error of those runs over the noise floor)", tuple(rows), heads),
+        where_block("Where the model as it is fails", found.where),
+    )
+    return Page(f"Diagnosis of the {found.axis.value} axis: {found.says}", warned(found.notes), blocks)
+
+
+def frames(found: Diagnosis) -> Mapping[str, Callable[[], DataFrame]]:
+    """Return the candidates, where the model as it is fails, and the parameters of the model with the named effects."""
+    return {
+        "candidates": lambda: table(map(candidate_row, found.candidates), "effect"),
+        "where": lambda: table(where_rows(found.where)),
+        "parameters": lambda: table(parameter_rows(found.model), "parameter"),
+    }
+
+
+def figures(found: Diagnosis) -> Mapping[str, Callable[[], Any]]:
+    """Return the candidates' errors beside where the model fails."""
+    from fieldsid.figures.diagnose import figure
+
+    return {"candidates": lambda: figure(found)}
+
+
+def candidate_row(c: Candidate) -> dict[str, Any]:
+    """Return a candidate as a row of a table."""
+    return {
+        "effect": c.effect,
+        "probability": c.probability,
+        **pair_row(c.errors),
+        "explained": c.explained,
+        "log_evidence": c.score,
+        "evidence": c.evidence,
+        "confusable_with": ", ".join(c.confusable_with),
+    }
+
+
+def _row(c: Candidate, found: Diagnosis) -> tuple[str, ...]:
+    floor = found.noise_floor
+    errors = times(c.errors.train.over(floor)), times(c.errors.validation.over(floor))
+    return (c.effect, chance(c.probability), *errors, percent(c.explained), f"{c.score:+.0f}")
+
+
+def chance(p: float) -> str:
+    """Return a probability to three decimals."""
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+VIEW = View("diagnosis", line, page, frames, lambda found: found.axis.value, figures)

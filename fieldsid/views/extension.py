@@ -1,0 +1,86 @@
+"""An extension: the effects added, the error before and after beside the noise floor, and the model with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.display import View
+from fieldsid.page import Block, Page, facts, listed
+from fieldsid.rounding import number
+from fieldsid.views._words import parameter_block, parameter_rows, table, times, warned
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from fieldsid.extension import Extension
+
+
+def line(found: Extension) -> str:
+    """Return what was added, what that did to the error, and whether it pays."""
+    return f"{'+'.join(found.gain.added)}: {_fall(found)}, {_verdict(found)}"
+
+
+def page(found: Extension) -> Page:
+    """Return the errors before and after, and the parameters of the extended model."""
+    gain = found.gain
+    rows = [
+        (f"{r['channel']}, {r['runs']}", *(number(r[k], 3) for k in ("before", "after", "noise_floor"))) for r in _rows(found)
+    ]
+    known = facts(
+        "Statistics",
+        (
+            ("effects", listed(found.model.effects)),
+            ("log evidence", f"{found.evidence:+.1f}"),
+            ("fitted to", listed(gain.learned_on)),
+            ("judged on", listed(gain.judged_on) + ("" if gain.unseen else ", which were fitted")),
+        ),
+    )
+    blocks = (known, Block("Errors, rms", tuple(rows), ("", "before", "after", "noise floor")), parameter_block(found.model))
+    title = f"Extension by {' and '.join(gain.added)}: {_fall(found)}, {_verdict(found)}"
+    return Page(title, warned(found.notes), blocks)
+
+
+def frames(found: Extension) -> Mapping[str, Callable[[], DataFrame]]:
+    """Return the errors before and after, and the parameters of the extended model."""
+    return {
+        "errors": lambda: table(_rows(found)),
+        "parameters": lambda: table(parameter_rows(found.model), "parameter"),
+    }
+
+
+def figures(found: Extension) -> Mapping[str, Callable[[], Any]]:
+    """Return the fall of the error towards the noise floor."""
+    from fieldsid.figures.history import fall_figure
+
+    before = tuple(e for e in found.model.effects if e not in found.gain.added)
+    return {"errors": lambda: fall_figure([found.gain], before, "the extension")}
+
+
+def _fall(found: Extension) -> str:
+    before, after = found.gain.over_floor
+    where = "unseen data" if found.gain.unseen else "the runs fitted to"
+    return f"the error on {where} goes from {times(before)} to {times(after)} x the noise floor"
+
+
+def _verdict(found: Extension) -> str:
+    return "which pays" if found.pays else "which does not pay"
+
+
+def _rows(found: Extension) -> Iterator[dict[str, Any]]:
+    gain = found.gain
+    for channel, name, floor in (
+        ("angle, rad", "angle_rms_rad", gain.noise_floor.angle),
+        ("rate, rad/s", "rate_rms_rad_s", gain.noise_floor.rate),
+    ):
+        for runs, before, after in (
+            ("unseen", gain.before.validation, gain.after.validation),
+            ("fitted", gain.before.train, gain.after.train),
+        ):
+            if isfinite(getattr(before, name)):
+                values = {"before": getattr(before, name), "after": getattr(after, name), "noise_floor": floor}
+                yield {"channel": channel, "runs": runs, **values}
+
+
+VIEW = View("extension", line, page, frames, lambda found: "+".join(found.gain.added), figures)

@@ -1,0 +1,72 @@
+"""A measured circle: its radius with error, what it was flown with, and the track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.display import View
+from fieldsid.page import Page, cut, facts
+from fieldsid.rounding import interval, number, with_error
+from fieldsid.views._words import speed_words, table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from fieldsid.turning import MeasuredTurn
+
+
+def line(turn: MeasuredTurn) -> str:
+    """Return run, side, radius, fin and speed."""
+    circle = turn.circle
+    radius = f"radius {with_error(circle.radius, circle.radius_std_error)} m"
+    return f"{cut(turn.run, 60)}, {turn.side}: {radius}, fin {number(turn.fin, 3)} rad, {turn.path_speed:.2f} m/s along the path"
+
+
+def page(turn: MeasuredTurn) -> Page:
+    """Return the circle and what it was flown with."""
+    circle = turn.circle
+    known = facts(
+        "Statistics",
+        (
+            ("radius", f"{with_error(circle.radius, circle.radius_std_error)} m, 95 % {interval(*circle.interval95)}"),
+            ("settled", f"{turn.start_s:.1f} .. {turn.end_s:.1f} s"),
+            ("fin", f"{number(turn.fin, 3)} rad"),
+            ("speed before", speed_words(turn.entry_speed)),
+            ("speed in turn", speed_words(turn.path_speed)),
+            ("current", f"{number(circle.current[0], 2)} north, {number(circle.current[1], 2)} east, m/s"),
+        ),
+    )
+    return Page(f"Circle of {cut(turn.run, 60)} to {turn.side}", (), (known,))
+
+
+def frames(turn: MeasuredTurn) -> Mapping[str, Callable[[], DataFrame]]:
+    """Return the circle in one row, and the track."""
+    circle = turn.circle
+    row = {
+        "run": turn.run,
+        "side": turn.side,
+        "radius_m": circle.radius,
+        "radius_std_error_m": circle.radius_std_error,
+        "fin_rad": turn.fin,
+        "entry_speed_m_s": turn.entry_speed,
+        "path_speed_m_s": turn.path_speed,
+    }
+    return {"circle": lambda: table([row], "run"), "track": lambda: _track(turn)}
+
+
+def figures(turn: MeasuredTurn) -> Mapping[str, Callable[[], Any]]:
+    """Return the track with its circle."""
+    from fieldsid.figures.turn import track_figure
+
+    return {"track": lambda: track_figure(turn)}
+
+
+def _track(turn: MeasuredTurn) -> DataFrame:
+    import pandas as pd
+
+    x, y = turn.track
+    return pd.DataFrame({"x_m": x, "y_m": y})
+
+
+VIEW = View("measured_turn", line, page, frames, lambda turn: turn.run, figures)

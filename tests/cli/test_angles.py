@@ -1,0 +1,62 @@
+"""One way to type an angle in every command that takes one: with its unit, or in rad where the number can be."""
+
+from __future__ import annotations
+
+import pytest
+from cli import trial
+from cli.test_fit import table
+
+
+@pytest.fixture
+def asked(tmp_path):
+    """Every option that takes an angle, as the words before its value."""
+    made = table(tmp_path)
+    model = trial.model_file(tmp_path)
+    plan = ("plan", "--speeds", "1.4", "--window", "22")
+    return {
+        "--max-heading": (*plan, "--max-heading"),
+        "--max-pitch": (*plan, "--max-pitch"),
+        "--max-roll": (*plan, "--max-roll"),
+        "--fin-max": (*plan, "--fin-max"),
+        "--fin-rate": (*plan, "--fin-rate"),
+        "--rudder-max": ("turn-radius", made, "--rudder-max"),
+        "--fin-zero": ("turn-radius", made, "--rudder-max", "15deg", "--fin-zero"),
+        "--fin-limit": ("schedule", "design", made, "--fin-limit"),
+        "schedule --fin-rate": ("schedule", "design", made, "--fin-limit", "15deg", "--fin-rate"),
+        "simulate --fin-max": ("simulate", model, "--maneuver", "doublet", "--fin-max"),
+    }
+
+
+OPTIONS = (
+    "--max-heading", "--max-pitch", "--max-roll", "--fin-max", "--fin-rate", "--rudder-max", "--fin-zero", "--fin-limit",
+    "schedule --fin-rate", "simulate --fin-max",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_a_bare_number_that_cannot_be_rad_is_refused_with_both_readings(run_cli, asked, option):
+    answer = run_cli(*asked[option], "60")
+    assert (answer.code, answer.out) == (2, "")
+    assert "60deg`, or `60rad` where that is meant" in answer.err
+    assert "60 deg is 1.047 rad, 60 rad is 3438 deg" in answer.err
+
+
+def test_degrees_and_radians_mean_the_same(run_cli, asked):
+    for option in ("--fin-limit", "--rudder-max", "simulate --fin-max"):
+        one, two, three = (
+            run_cli(*asked[option], a, "--json").json for a in ("0.2617993877991494", "15deg", "0.2617993877991494rad")
+        )
+        assert str(one) == str(two) == str(three)
+
+
+def test_an_angle_inside_a_maneuver_is_typed_the_same_way(run_cli, tmp_path):
+    said = ("simulate", trial.model_file(tmp_path), "--maneuver")
+    assert run_cli(*said, "zigzag:amplitude=0.2rad,turn=10deg").code == 0
+    answer = run_cli(*said, "zigzag:turn=20")
+    assert answer.code == 2
+    assert "20deg`, or `20rad` where that is meant" in answer.err
+    assert run_cli(*said, "square_pulses:width=2deg").code == 2
+
+
+def test_a_negative_tolerance_is_refused(run_cli, asked):
+    assert "a tolerance is not negative" in run_cli(*asked["--fin-zero"], "-1deg").err

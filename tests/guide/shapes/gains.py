@@ -1,0 +1,198 @@
+"""Gains: schedule design, verify, export."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from guide.shapes.common import AxisName, Number, Shape, schema_field
+
+
+class Row(Shape):
+    """Gains at one speed."""
+
+    speed_m_s: float
+    """Speed through the water."""
+    kp: float
+    """rad of fin per rad of error."""
+    ki: float
+    """rad of fin per rad s."""
+    kd: float
+    """rad of fin per rad/s."""
+    feed_forward_rad: float
+    """Fin that cancels the trim."""
+    reference_gain: float
+    """rad of fin per rad of reference: cancels the stiffness of pitch."""
+    fin_limit_rad: float
+    """Largest fin."""
+    depth_gain: float
+    """rad of pitch per m of depth; zero without `--depth`."""
+    supported: bool
+    """Whether the data were taken at this speed."""
+    slowed: float
+    """Share of the formula's speed that is left for the fin's lag, delay and the margin; 1 is not slowed."""
+    phase_margin_deg: Number
+    """Phase margin."""
+    gain_margin_db: Number
+    """Gain margin; null where the loop never crosses."""
+    delay_margin_s: Number
+    """Delay margin."""
+
+
+class Actuator(Shape):
+    """The fin that the design counted with."""
+
+    lag_s: Number
+    """Time constant."""
+    delay_s: Number
+    """Dead time."""
+    fin_rate_rad_s: Number
+    """Fastest rate; null where it is not limited."""
+
+
+class Schedule(Shape):
+    """Gains per speed."""
+
+    schema_: Literal["fieldsid/schedule/1"] = schema_field("fieldsid/schedule/1")
+    axis: AxisName
+    """The plane."""
+    controller: Literal["p", "pd", "pi", "pid", "lqr"]
+    """The controller."""
+    damping_ratio: float
+    """Damping ratio asked for."""
+    phase_margin_wanted_deg: float
+    """Phase margin asked for."""
+    depth: bool
+    """Whether a depth loop is added."""
+    actuator: Actuator
+    """The fin."""
+    rows: list[Row]
+    """One for each speed."""
+    stated: dict[str, Any]
+    """What was said of the fin when it was designed."""
+    provenance: dict[str, Any]
+    """Models, runs, sign convention, what holds between and outside the rows."""
+    file: str | None
+    """The file that was written."""
+
+
+class Check(Shape):
+    """One speed under one set of gains."""
+
+    speed_m_s: float
+    """The speed."""
+    knot: bool
+    """Whether it is a row's own; else it lies between two."""
+    supported: bool
+    """Whether the data were taken there."""
+    constant_gain: bool
+    """Whether the gains are the constant ones."""
+    phase_margin_deg: Number
+    """Phase margin of the estimate."""
+    gain_margin_db: Number
+    """Its gain margin."""
+    delay_margin_s: Number
+    """Its delay margin."""
+    phase_margin_least_deg: Number
+    """Smallest over the draws of the parameters."""
+    gain_margin_least_db: Number
+    """Smallest over the draws."""
+    delay_margin_least_s: Number
+    """Smallest over the draws."""
+    overshoot_percent: Number
+    """Overshoot of a step."""
+    overshoot_most_percent: Number
+    """Largest over the draws."""
+    settling_s: Number
+    """Time to stay within 5 % of the step; null if never."""
+    settling_most_s: Number
+    """Longest over the draws."""
+    fin_offset_error_rad: Number
+    """Steady error with a fin 3 deg off that the feed-forward knows."""
+    fin_offset_error_unknown_rad: Number
+    """The same with one it does not."""
+    depth_overshoot_percent: Number
+    """Overshoot of a step of depth."""
+    depth_settling_s: Number
+    """Its settling time."""
+
+
+class Worst(Shape):
+    """The least margins and the most overshoot, over speeds and draws."""
+
+    phase_margin_deg: Number
+    """Phase margin."""
+    gain_margin_db: Number
+    """Gain margin."""
+    delay_margin_s: Number
+    """Delay margin."""
+    overshoot_percent: Number
+    """Overshoot."""
+
+
+class Gate(Shape):
+    """A limit that was asked for."""
+
+    gate: str
+    """Its name."""
+    wanted: float
+    """The limit."""
+    found: Number
+    """What was found."""
+    speed_m_s: Number
+    """The speed it was found at."""
+    passed: bool
+    """Whether it holds."""
+
+
+class Verification(Shape):
+    """A schedule checked over the identified set."""
+
+    schema_: Literal["fieldsid/verification/1"] = schema_field("fieldsid/verification/1")
+    verdict: str
+    """The verdict in a word."""
+    says: str
+    """The same in a sentence, with its number."""
+    rests_on: str
+    """What it rests on."""
+    axis: AxisName
+    """The plane."""
+    controller: str
+    """The controller."""
+    worst: Worst
+    """The worst of all."""
+    scheduled: list[Check]
+    """The schedule, at its rows and between."""
+    constant: list[Check]
+    """One constant gain, at the same speeds."""
+    gates: list[Gate]
+    """The limits that were asked for."""
+    passed: bool
+    """Whether all hold; where not, the exit code is 1."""
+    figure: str | None
+    """The figure that was drawn."""
+
+
+class Export(Shape):
+    """The gains in the vehicle's own format."""
+
+    schema_: Literal["fieldsid/export/1"] = schema_field("fieldsid/export/1")
+    target: str
+    """The format."""
+    text: str
+    """The file's text."""
+    file: str | None
+    """The file that was written."""
+
+
+class Patch(Shape):
+    """The gains put into a file that exists, with `--into`."""
+
+    schema_: Literal["fieldsid/export/1"] = schema_field("fieldsid/export/1")
+    target: Literal["into"]
+    """Always `into`."""
+    difference: str
+    """What changes, as a unified difference."""
+    file: str
+    """The file."""
+    backup: str | None
+    """The file as it was; null where nothing was changed."""

@@ -1,0 +1,156 @@
+"""From log to run: init, inspect, import, simulate."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from guide.shapes.common import Number, RemarkWithData, Shape, Skipped, schema_field
+
+
+class Init(Shape):
+    """The trial folder that `sysid init` made."""
+
+    schema_: Literal["fieldsid/init/1"] = schema_field("fieldsid/init/1")
+    folder: str
+    """The folder."""
+    template: str
+    """The kind of vehicle it was made for."""
+    files: list[str]
+    """The files in it."""
+
+
+class FieldInfo(Shape):
+    """One field of a channel."""
+
+    path: str
+    """Its path in a message; empty for the column of a table."""
+    type: str
+    """`number`, `text` or the message's own type."""
+    first: list[Any]
+    """Its first values."""
+    span: list[Number] | None
+    """Smallest and largest value; null where it is not a number."""
+
+
+class Channel(Shape):
+    """A column of a table, or a topic of a bag."""
+
+    name: str
+    """Its name."""
+    type: str
+    """Its type."""
+    count: int
+    """Number of samples."""
+    rate_hz: Number
+    """Samples per second; null for the columns of a table, which share one clock."""
+    fields: list[FieldInfo]
+    """What it holds."""
+
+
+class Shown(Shape):
+    """A channel as the page shows it."""
+
+    name: str
+    """Its name."""
+    type: str
+    """Its type."""
+    count: int
+    """Number of samples."""
+    rate: str
+    """Samples per second, in words."""
+    holds: str
+    """Its range, or its first fields."""
+
+
+class Inspection(Shape):
+    """What is in a log, the mapping proposed for it, and the import doctor's findings."""
+
+    schema_: Literal["fieldsid/inspection/1"] = schema_field("fieldsid/inspection/1")
+    path: str
+    """The log."""
+    format: str
+    """Its format, such as `text table`, `ROS 2 bag`."""
+    span: str
+    """Its length, in words."""
+    duration_s: Number
+    """Its length."""
+    channels: list[Channel]
+    """Everything in it."""
+    shown: list[Shown]
+    """The same as the page shows it."""
+    mapping_needed: bool
+    """False where the columns have the canonical names."""
+    mapping: dict[str, Any]
+    """The proposed mapping, as `mapping.yaml` has it."""
+    mapping_file: str | None
+    """Where it was written."""
+    signals: list[str]
+    """The signals that the mapping gives."""
+    problem: str | None
+    """Why no run can be made of it, where none can."""
+    findings: list[RemarkWithData]
+    """The import doctor's findings."""
+
+
+class ImportedRun(Shape):
+    """One run that was imported."""
+
+    run: str
+    """Its name."""
+    file: str
+    """The file that was written."""
+    log: str | None
+    """The log it came from."""
+    samples: int
+    """Number of samples."""
+    start_s: float
+    """Time of the first sample."""
+    end_s: float
+    """Time of the last sample."""
+    duration_s: float
+    """Length."""
+    rate_hz: float
+    """Samples per second, by the median step."""
+    signals: dict[str, int]
+    """Number of measured samples of each signal."""
+    notes: list[RemarkWithData]
+    """What was done and what was found."""
+
+
+class Import(Shape):
+    """The runs that `sysid import` wrote."""
+
+    schema_: Literal["fieldsid/import/1"] = schema_field("fieldsid/import/1")
+    runs: list[ImportedRun]
+    """One for each log."""
+    skipped_runs: list[Skipped]
+    """Logs that could not be used, and why; where there are any, the exit code is 1."""
+
+
+class SignalRange(Shape):
+    """Smallest, largest and last value of a signal, in the unit its name has."""
+
+    low: float
+    """Smallest value."""
+    high: float
+    """Largest value."""
+    end: float
+    """Last value."""
+
+
+class Simulation(Shape):
+    """A model's own prediction, kept as a run."""
+
+    schema_: Literal["fieldsid/simulation/1"] = schema_field("fieldsid/simulation/1")
+    model: str
+    """The model's file."""
+    run: str
+    """Name of the run."""
+    file: str | None
+    """Where it was written."""
+    samples: int
+    """Number of samples."""
+    seconds: float
+    """Length."""
+    signals: dict[str, SignalRange]
+    """Range of each signal."""

@@ -1,0 +1,58 @@
+"""A figure is written as what its name says, and the same figure is always the same file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fieldsid.errors import UsageError
+from fieldsid.figures import canvas
+from fieldsid.figures.kinds import KINDS
+
+FIRST = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF-"}
+DRAWN = """
+import sys
+from pathlib import Path
+import numpy as np
+from fieldsid.figures import canvas
+x = np.linspace(0.0, 1.0, 50)
+def draw(ax):
+    canvas.dress(ax, x="time [s]", y="rate", title="rate")
+    canvas.dots(ax, x, x**2)
+    ax.plot(x, x**3, label="model")
+    ax.fill_between(x, x, x**2, hatch="//", clip_on=True)
+    canvas.legend_above(ax)
+canvas.one(draw, Path(sys.argv[1]))
+"""
+
+
+def drawn(path: Path, seed: str) -> bytes:
+    """Return what another process, whose hashes are its own, writes."""
+    environment = {"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(canvas.__file__).parents[2])}
+    subprocess.run([sys.executable, "-c", DRAWN, path], check=True, env=environment)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("suffix", FIRST)
+def test_the_suffix_is_the_kind_of_file_and_the_same_figure_the_same_bytes(tmp_path, suffix):
+    one, other = (drawn(tmp_path / f"f{seed}{suffix}", seed) for seed in ("1", "2"))
+    assert one.startswith(FIRST[suffix])
+    assert one == other
+    assert b"CreationDate" not in one
+    assert b"<dc:date>" not in one
+
+
+def test_capital_letters_are_a_suffix_too(tmp_path):
+    path = canvas.one(lambda ax: ax.plot([0.0, 1.0]), tmp_path / "F.SVG")
+    assert path.read_bytes().startswith(b"<?xml")
+
+
+@pytest.mark.parametrize("name", ["f.jpg", "f", "f.", "f.png.txt"])
+def test_another_suffix_is_refused_with_one_that_is_drawn(tmp_path, name):
+    with pytest.raises(UsageError) as caught:
+        canvas.save(canvas.sheet(), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+    assert all(f".{kind}" in caught.value.hint for kind in KINDS)
