@@ -13,9 +13,11 @@ def usable(catalogue: Iterable[Effect], records: Sequence[Record]) -> tuple[tupl
     """Return the effects whose signals every run has, with the forms that can be tried, and why each other one is skipped."""
     kept, skipped = [], {}
     for effect in catalogue:
-        missing = _missing(effect.needs, records)
+        missing, columns = _missing(effect.needs, records), sorted({r.thrust_column for r in records if r.thrust_column})
         if missing:
             skipped[effect.name] = f"needs {', '.join(missing)}, which the log lacks"
+        elif "thrust" in effect.needs and len(columns) > 1:
+            skipped[effect.name] = f"needs one thrust for all runs, and they log it as {' and as '.join(columns)}"
         else:
             forms = [f for f in effect.forms if not _missing(f.needs, records) and all(r.axis in f.axes for r in records)]
             kept.append(effect if len(forms) == len(effect.forms) else replace(effect, forms=tuple(forms)))

@@ -26,6 +26,8 @@ from fieldsid.models.surge import causes_of, surge_behind
 UNDER_WAY_M_S = (0.05, 50.0)
 """Speeds between which a vehicle goes through water: below no fin steers, above is another unit."""
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
+THRUST_COLUMNS = ("thrust", "thrust_ratio", "propeller_rpm")
+"""What a log may know of its propeller, the nearest to a force first; a model's numbers are per unit of what its log has."""
 FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 """What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
 
@@ -36,7 +38,8 @@ class Record(Brief):
 
     `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which).
     `angle_ok` and `rate_ok` mark samples that were measured, spikes left out. `signals` holds helpers without gaps and noise
-    by role (surge, thrust, roll, depth, cross). `speed` is the median of that surge in m/s, NaN when not measured.
+    by role (surge, thrust, roll, depth, cross), `thrust_column` the column that the thrust is from, empty where there is
+    none. `speed` is the median of that surge in m/s, NaN when not measured.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Record(Brief):
     rate_ok: npt.NDArray[np.bool_]
     signals: Mapping[str, FloatArray]
     speed: float
+    thrust_column: str = ""
     early: FloatArray | None = None
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
     steps: FloatArray = field(init=False)
@@ -170,9 +174,11 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     angle_ok, rate_ok = _without_spikes(angle, angle_ok), _without_spikes(rate, rate_ok)
     held = _held_fin(run.signals[column])
     along = axis is Axis.PITCH and run.has(ROLES["depth"]) and bool(angle_ok.any())
+    thrust_column = next((c for c in THRUST_COLUMNS if run.has(c)), "")
+    columns = {**ROLES, "thrust": thrust_column}
     signals = {
         role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0))
-        for role, c in ROLES.items()
+        for role, c in columns.items()
         if run.has(c) and role != "surge" and not (along and role == "depth")
     }
     if knows_speed(run):
@@ -197,6 +203,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         angle_ok=angle_ok,
         rate_ok=rate_ok,
         signals=MappingProxyType(signals),
+        thrust_column=thrust_column,
         # of the smoothed speed: where it swings between two levels, noise would throw the median from one to the other
         speed=float(np.median(signals["surge"])) if "surge" in signals else float("nan"),
     )

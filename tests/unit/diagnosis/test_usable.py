@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -50,3 +51,10 @@ def test_each_form_has_its_own_numbers():
 def test_an_effect_all_of_whose_forms_can_be_tried_is_the_one_declared():
     (kept,), _ = usable([PROP], [run(Axis.YAW, "thrust", "surge")])
     assert kept is PROP
+
+
+def test_runs_that_log_their_thrust_in_different_units_do_not_show_one_moment_of_it():
+    mixed = [replace(run(Axis.YAW, "thrust"), thrust_column=c) for c in ("thrust", "propeller_rpm")]
+    kept, skipped = usable([PROP], mixed)
+    assert kept == ()
+    assert skipped == {"prop_moment": "needs one thrust for all runs, and they log it as propeller_rpm and as thrust"}

@@ -70,3 +70,23 @@ def test_a_log_without_a_usual_step_has_lost_nothing_that_could_be_told():
     zero, fin = np.zeros(80), 0.3 * np.sin(time)
     path = record_of(Run("a", time, {"yaw_rad": zero, "yaw_rate_rad_s": zero, "rudder_rad": fin}), Axis.YAW).commanded
     np.testing.assert_array_equal(path.start, path.end)
+
+
+@pytest.mark.parametrize(
+    ("logged", "taken"),
+    [
+        (("propeller_rpm",), "propeller_rpm"),
+        (("thrust_ratio", "propeller_rpm"), "thrust_ratio"),
+        (("propeller_rpm", "thrust_ratio", "thrust"), "thrust"),
+        ((), ""),
+    ],
+)
+def test_the_thrust_is_taken_from_the_column_nearest_to_a_force(logged, taken):
+    run = run_of(np.full(400, 1.5))
+    levels = {name: np.where(run.time < 9.0, 1.0 + i, 2.0 + i) for i, name in enumerate(logged)}
+    record = record_of(replace(run, signals={**run.signals, **levels}), Axis.YAW)
+    assert record.thrust_column == taken
+    if logged:
+        assert np.median(np.abs(record["thrust"] - levels[taken])) < 1e-9
+    else:
+        assert "thrust" not in record.signals
