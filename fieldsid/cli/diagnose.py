@@ -172,7 +172,7 @@ def _render_words(to: Console, found: Diagnosis) -> None:
 
     from fieldsid.diagnosis.verdict import LIKELY
 
-    if found.verdict == "sufficient":
+    if found.verdict in ("sufficient", "disturbed"):
         return
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < LIKELY:

@@ -150,27 +150,30 @@ def _said(end: _Ending, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> 
 
 
 def _leading(work: Search, found: Hypothesis) -> list[Hypothesis]:
-    """Return all hypotheses but the base, the one found first, then by evidence, those not worth having last."""
-    base = work.base()
+    """Return all hypotheses but the base, the one found first, then by evidence, those with effects that do not pay last."""
+    base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
-    others.sort(key=lambda h: not work.admissible(h))
+    others.sort(key=lambda h: -sums.get(frozenset(h.names), -np.inf))
     return [*([found] if found is not base else []), *others]
 
 
 def _candidates(end: _Ending, floor: Noise) -> tuple[Candidate, ...]:
     """Return the leading hypotheses."""
-    work, base = end.work, end.work.base()
-    fair = [h for h in (*end.shown, base) if h is end.found or h is base or work.admissible(h)]
-    p = dict(zip(map(id, fair), probabilities(fair), strict=True))
+    work, sums = end.work, end.work.evidences()
+    p = probabilities(sums)
+
+    def gain(h: Hypothesis) -> float:
+        return sums.get(frozenset(h.names), h.score) - sums[work.root]
+
     return tuple(
         Candidate(
             effects=added(work, h),
-            probability=p.get(id(h), 0.0),
+            probability=p.get(frozenset(h.names), 0.0),
             parameters=dict(h.model.values),
             errors=pair,
             explained=explained(work, h, floor),
-            score=h.score - base.score,
-            evidence=evidence(work, h, pair, floor),
+            score=gain(h),
+            evidence=evidence(work, h, pair, floor, gain(h)),
             confusable_with=confusable(work, h, end.shown, p, floor),
             worse=worsens(work, h, floor),
         )
@@ -179,16 +182,16 @@ def _candidates(end: _Ending, floor: Noise) -> tuple[Candidate, ...]:
 
 
 def confusable(
-    work: Search, h: Hypothesis, others: Sequence[Hypothesis], p: Mapping[int, float], floor: Noise
+    work: Search, h: Hypothesis, others: Sequence[Hypothesis], p: Mapping[frozenset[str], float], floor: Noise
 ) -> tuple[str, ...]:
     """Return the other hypotheses of the same size that take away nearly as much of the error, and are as good as likely.
 
-    p are probabilities by the hypotheses' id: what the evidence tells from one is no rival of it.
+    p are probabilities by sets of effects: what the evidence tells from one is no rival of it.
     """
-    mine, own = explained(work, h, floor), p.get(id(h), 0.0)
+    mine, own = explained(work, h, floor), p.get(frozenset(h.names), 0.0)
 
     def as_likely(other: Hypothesis) -> bool:
-        its = p.get(id(other), 0.0)
+        its = p.get(frozenset(other.names), 0.0)
         return min(own, its) > 0.0 and min(own, its) >= LIKELY * max(own, its)
 
     return tuple(

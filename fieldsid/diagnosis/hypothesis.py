@@ -1,7 +1,8 @@
 """A judged hypothesis with its errors on training and on unseen runs, and the score hypotheses are ranked by.
 
-    score = gain in log likelihood, training (fitted) + validation (not fitted) - 1/2 k log N
-the Schwarz approximation of the evidence of the training runs times the predictive density of the unseen ones.
+    score = gain in log likelihood, training (fitted) + validation (not fitted) - 1/2 k log N - prior log odds
+the Schwarz approximation of the evidence of the training runs times the predictive density of the unseen ones, and the prior
+odds against each effect and each form other than the textbook's.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ from fieldsid.logs.run import FloatArray
 from fieldsid.models.effect import Effect, definitions_of
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
+
+PRIOR_ODDS = 6.0
+"""Prior log odds against one effect of the catalogue being there, and against a form other than the textbook's: 400 to 1, for
+the dozens of both that are tried."""
 
 Flown = tuple[tuple[Problem, FloatArray], ...]
 
@@ -193,7 +198,9 @@ def training_errors(trial: Trial) -> Errors:
 
 
 def price(judged: Judged, validation: Sequence[Record]) -> float:
-    """Return 1/2 k log N: shared coefficients and authorities beyond the first once, nuisances once for every run they fit.
+    """Return the prior log odds and 1/2 k log N.
+
+    Shared coefficients and authorities beyond the first count once, nuisances once for every run they fit.
 
     The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
     """
@@ -201,7 +208,7 @@ def price(judged: Judged, validation: Sequence[Record]) -> float:
     own = sum(len(e.nuisance) for e in layout.effects)
     hidden = sum(1 for e in layout.effects if e.extra_states)
     count = sum(len(e.shared) for e in layout.effects) + (0 if layout.groups.by_law else len(layout.groups.speeds) - 1)
-    total = sum(e.handicap for e in layout.effects) + 0.5 * count * np.log(samples(records))
+    total = sum(PRIOR_ODDS * (1 + e.is_formed) + e.handicap for e in layout.effects) + 0.5 * count * np.log(samples(records))
     for record in (*records, *validation):
         total += 0.5 * own * np.log(max(samples([record]), 2)) + hidden
     return float(total)

@@ -17,9 +17,9 @@ from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, price, with
 from fieldsid.diagnosis.laws import Trims, base_trial, error_by_law, law_of, speed_laws, under_other_law
 from fieldsid.diagnosis.remainder import is_odd
 from fieldsid.diagnosis.trial import SETTLED, Judged, Trial, judge, refine, smaller_twin
-from fieldsid.diagnosis.ways import PROMISING, PROMISING_INSTEAD, PROMISING_LATER, Way, brought, by_effect, ways
+from fieldsid.diagnosis.ways import PROMISING, PROMISING_LATER, Way, brought, by_effect, ways
 from fieldsid.diagnosis.weather import base_judged, other_noise, sensors
-from fieldsid.diagnosis.worth import ALIKE, FAR, HOPE, MUCH, WORTH, asks_for_more, fits, helps, likelier, pays
+from fieldsid.diagnosis.worth import FAR, MATTERS, MUCH, asks_for_more, fits, helps, pays
 from fieldsid.fitting.colour import residuals_of
 from fieldsid.fitting.noise import floor_below, floor_of
 from fieldsid.fitting.problem import Problem
@@ -111,12 +111,12 @@ class Search:
             self.tried[key] = found if known is None or found.score > known.score else known
         return self.tried[key]
 
-    def grow(self, parent: Hypothesis, *, most: int | None = None, forced: bool = False) -> list[Hypothesis]:
+    def grow(self, parent: Hypothesis, *, forced: bool = False) -> list[Hypothesis]:
         """Return the parent with each promising effect added, or with every one when forced, judged, best first."""
         key = frozenset(parent.names)
         if key not in self.grown_from:
             self.grown_from.add(key)
-            most = most or (PROMISING if key == self.root else PROMISING_LATER)
+            most = PROMISING if key == self.root else PROMISING_LATER
             left = [e for e in self.catalogue if e.name not in key]
             found = ways(parent, left, None if forced else most, self.beside, anew=key == self.root, flown=key in self.flown_from)
             self._flown_before(parent)
@@ -261,51 +261,60 @@ class Search:
             self.tried[frozenset(h.names)], self.shaped[frozenset(h.names)] = h, h.score
 
     def best(self) -> Hypothesis:
-        """Return the hypothesis the search ends at, one that all its additions were tried on where something is left."""
-        best = self._grown(self.base())
-        nothing = frozenset(best.names) == self.root  # the textbook's forms may promise nothing
-        if self.error(best) > MUCH and self.allowance.lasts() and (nothing or is_odd(best.judged, self.beside)):
+        """Return the hypothesis of most evidence, without the effects of it that do not matter."""
+        self._expand()
+        found = self._likeliest()
+        nothing = frozenset(found.names) == self.root  # the textbook's forms may promise nothing
+        if self.error(found) > MUCH and self.allowance.lasts() and (nothing or is_odd(found.judged, self.beside)):
             untried = [e for e in self.catalogue if nothing and e.forms and self.root | {e.name} not in self.tried]
             self._gone(self.base(), by_effect(ways(self.base(), untried, None, self.beside, anew=False, flown=True)))
             self._improve(self.root, [], every=True)
-            best = self._grown(self._likeliest())
-        if self.error(best) > DOUBTFUL and self.allowance.lasts():
-            best = begun_again(best, self.known, self.told, self.family, sensors(self.floor, self.base()), self.beside)
-            self.tried[frozenset(best.names)] = best
-        return best
+            self._expand()
+            found = self._likeliest()
+        if self.error(found) > DOUBTFUL and self.allowance.lasts():
+            found = begun_again(found, self.known, self.told, self.family, sensors(self.floor, self.base()), self.beside)
+            self.tried[frozenset(found.names)] = found
+        return self._likeliest()
 
-    def _grown(self, best: Hypothesis) -> Hypothesis:
-        """Return where a hypothesis leads to, itself where all its additions were tried."""
-        anew = False
-        while anew or (frozenset(best.names) not in self.grown_from and len(best.names) < len(self.known) + LARGEST):
-            if best is not self.base() and not self.allowance.lasts():
-                break
-            current = self._climbed(best)
-            if anew := current is None:
-                best = self.base()
-                continue
-            self._thinned(current)
-            best = self._likeliest()
-            if not asks_for_more(best, self.floor):
-                break
-        return best
-
-    def _climbed(self, current: Hypothesis) -> Hypothesis | None:
-        """Return where the additions that pay lead to from a hypothesis, None where all has to begin anew."""
-        for size in range(len(current.names) - len(self.known), LARGEST):
-            children = self.grow(current)
-            current = self.tried[frozenset(current.names)]
-            paying = next((c for c in children if pays(current, c)), None)
-            lost = paying is None and size + 2 <= LARGEST
-            if size == 0 or (lost and FAR < self.error(current) < HOPE * self.error(self.base())):
-                paying = self._two_at_once(current, children, paying) or paying
-            current = (self._swapped(paying) if size else paying) if paying else current
-            self.hear(current.judged.trial)
+    def _expand(self) -> None:
+        """Grow what leads, best first, until all that leads has been grown or predicts as well as the sensors allow."""
+        self.base()
+        while (leading := self._next()) is not None:
+            self.grow(leading)
+            self._drop_each()
+            self.hear(self._likeliest().judged.trial)
             if self._turn():
-                return None
-            if paying is None or not asks_for_more(current, self.floor) or not self.allowance.lasts():
-                break
-        return current
+                self.base()
+
+    def _next(self) -> Hypothesis | None:
+        """Return what to grow next of what leads, None where all was.
+
+        What leads: the base; the hypothesis of most evidence; what it is without each of its effects, for another to take that
+        one's place; and those that predict better than it, whatever their evidence: a small effect that they lack may have
+        paid for a wrong one.
+        """
+        if self.root not in self.grown_from:
+            return self.base()
+        if not self.allowance.lasts():
+            return None
+        best = max(self.tried.values(), key=lambda h: h.score)
+        front = [h for h in self.ranked() if h.judging.mean < MATTERS * best.judging.mean]
+        parts = [self.tried[k] for e in best.names if (k := frozenset(best.names) - {e}) in self.tried]
+        leading = [best, *front, *parts] if asks_for_more(best, self.floor) else front
+        return next((h for h in leading if self._is_to_grow(h)), None)
+
+    def _is_to_grow(self, h: Hypothesis) -> bool:
+        """Whether additions to a hypothesis are still to be tried, and leave it of a size that can be told."""
+        is_new = frozenset(h.names) not in self.grown_from and len(h.names) < len(self.known) + LARGEST
+        return is_new and asks_for_more(h, self.floor)
+
+    def _drop_each(self) -> None:
+        """Try what has most evidence without each of its effects: the first ones may have stood in for the later ones."""
+        best = max(self.tried.values(), key=lambda h: h.score)
+        if len(best.names) > len(self.known) + 1:
+            for gone in best.effects:
+                if gone.name not in self.known and frozenset(best.names) - {gone.name} not in self.tried:
+                    self._without(best, gone)
 
     def _turn(self) -> bool:
         """Begin anew under another noise, once each, or the other law of the trim where that fits the likeliest better.
@@ -333,49 +342,35 @@ class Search:
             self.tried[frozenset(again.names)] = again if known is None or again.score > known.score else known
         return True
 
-    def _two_at_once(self, current: Hypothesis, children: Sequence[Hypothesis], paying: Hypothesis | None) -> Hypothesis | None:
-        """Return a pair that pays, of whose two the first has more evidence than what pays alone, and no less error yet."""
-        least = -np.inf if paying is None else paying.score + WORTH
-        first = next((c for c in children if likelier(current, c)), None)
-        if first is None or first.score <= least or not self.allowance.lasts():
-            return None
-        return next((c for c in self.grow(first) if pays(first, c) and pays(current, c) and c.score > least), None)
+    def core_of(self, h: Hypothesis) -> frozenset[str]:
+        """Return the effects of a hypothesis that pay over it without them: the others have no evidence, or do not matter."""
+        while idle := [w for w in self._less(h) if not pays(w, h)]:
+            h = max(idle, key=lambda w: w.score)
+        return frozenset(h.names)
+
+    def _less(self, h: Hypothesis) -> list[Hypothesis]:
+        """Return what was tried of a hypothesis without one of its effects."""
+        return [self.tried[k] for n in h.names if n not in self.known and (k := frozenset(h.names) - {n}) in self.tried]
+
+    def evidences(self) -> dict[frozenset[str], float]:
+        """Return the log evidence of every set of effects that pay: of all that was tried with these, and others that do not.
+
+        The log of the sum of the evidence of every hypothesis that comes to the set.
+        """
+        sums: dict[frozenset[str], float] = {}
+        for h in self.ranked():
+            core = self.core_of(h)
+            sums[core] = float(np.logaddexp(sums.get(core, -np.inf), h.score))
+        return sums
 
     def admissible(self, h: Hypothesis) -> bool:
-        """Whether every effect of a hypothesis is worth having: it pays over each smaller one that was tried."""
-        key = frozenset(h.names)
-        return all(pays(self.tried[k], h) for k in self.tried if k < key)
+        """Whether every effect of a hypothesis pays."""
+        return self.core_of(h) == frozenset(h.names)
 
     def _likeliest(self) -> Hypothesis:
-        """Return the hypothesis of most evidence among the admissible ones, of which the base is always one."""
-        return max((h for h in self.tried.values() if self.admissible(h)), key=lambda h: h.score)
-
-    def _swapped(self, found: Hypothesis) -> Hypothesis:
-        """Drop each effect in turn and add the best other one; keep what scores higher and predicts as well."""
-        best = found
-        for gone in found.effects[:-1]:
-            rest = frozenset(n for n in found.names if n != gone.name)
-            if gone.name in self.known or rest not in self.tried or not self.allowance.lasts():
-                continue
-            children = self.grow(self.tried[rest], most=PROMISING_INSTEAD)
-            child = next((c for c in children if pays(self.tried[rest], c)), best)
-            if child.score > best.score and child.judging.mean < ALIKE * best.judging.mean:
-                best = child
-        return best
-
-    def _thinned(self, found: Hypothesis) -> Hypothesis:
-        """Leave out each effect that was added before the last two where the rest does as well: the first ones may have stood in.
-
-        What is left out is judged from the numbers of the whole; a pair's parts were tried on the way to it, though not in
-        the forms that the pair has taken since.
-        """
-        while len(found.names) > len(self.known) + (1 if any(e not in self.catalogue for e in found.effects) else PAIR):
-            smaller = [self._without(found, e) for e in found.effects if e.name not in self.known]
-            idle = [h for h in smaller if not pays(h, found)]
-            if not idle:
-                break
-            found = max(idle, key=lambda h: h.score)
-        return found
+        """Return the set of effects of most evidence."""
+        sums = self.evidences()
+        return self.tried[max(sums, key=lambda k: sums[k])]
 
     def _without(self, h: Hypothesis, gone: Effect) -> Hypothesis:
         """Return a hypothesis without one of its effects, tried from the numbers it has with it."""

@@ -1,8 +1,8 @@
-"""From ranked hypotheses to a verdict: effect, sufficient, undecided or unexplained."""
+"""From ranked hypotheses to a verdict: effect, sufficient, disturbed, undecided or unexplained."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,16 +52,20 @@ def verdict_of(search: Search, found: Hypothesis, left: Remainder, judged: Judge
     """Return the verdict on the hypothesis a search ended at, with what is left of it judged in its weather.
 
     Where sea and sensors are told apart, errors are over the sensors' noise with its colour, else over its white part.
+    Sufficient is only what predicts fitted and unseen runs alike that well; `disturbed` where what it leaves is a disturbance.
     """
     noise, floor = judged.noise, shown_floor(search.floor, judged.noise)
     least = floor if judged.family == BOTH else search.floor
     error = found.judging.over(least)
-    visible = (found.judging.over(floor) if noise.coloured_time < FILTER_S else error) > VISIBLE
     if frozenset(found.names) == search.root:
+        worst = max(error, found.train.over(least))
+        if worst <= VISIBLE:
+            return Verdict("sufficient", ())
         sea = max(found.judging.over(floor), found.train.over(floor))
-        p = 3.0 * left.relation if max(error, found.train.over(least)) < FAINT else left.p
+        p = 3.0 * left.relation if worst < FAINT else left.p
         odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(found, least) > WORSE
-        return Verdict("unexplained" if visible and odd else "sufficient", ())
+        return Verdict("unexplained" if odd else "disturbed", ())
+    visible = (found.judging.over(floor) if noise.coloured_time < FILTER_S else error) > VISIBLE
     share = explained(search, found, least)
     asked = BESIDE if error <= LEAVES or search.is_noiseless else (*BESIDE, *(BESIDE_SOME if error <= STORM else BESIDE_MUCH))
     if visible and any(left.p < p and share < enough for enough, p in asked):
@@ -87,15 +91,15 @@ def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
 
 def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
     """Return hypotheses of the same size that the data cannot tell from the one found."""
-    margin = RIVAL if len(search.records) > 1 else 2.0 * RIVAL
+    margin, sums = RIVAL if len(search.records) > 1 else 2.0 * RIVAL, search.evidences()
+    best = sums[frozenset(found.names)]
     return tuple(
         h
         for h in search.ranked()
         if h is not found
         and len(h.names) == len(found.names)
-        and abs(found.score - h.score) < margin
+        and best - sums.get(frozenset(h.names), -np.inf) < margin
         and h.judging.mean < ALIKE * found.judging.mean
-        and search.admissible(h)
     )
 
 
@@ -111,8 +115,8 @@ def worsens(search: Search, h: Hypothesis, floor: Noise) -> bool:
     return bool(h.judging.over(floor) > ALIKE * search.base().judging.over(floor))
 
 
-def probabilities(hypotheses: Sequence[Hypothesis]) -> list[float]:
-    """Return the probability of each of some hypotheses among themselves, from their tempered evidence."""
-    scores = np.array([h.score for h in hypotheses]) / TEMPER
+def probabilities(evidences: Mapping[frozenset[str], float]) -> dict[frozenset[str], float]:
+    """Return the probability of each set of effects among all that were tried, from their tempered log evidence."""
+    scores = np.array(list(evidences.values())) / TEMPER
     weights = np.exp(scores - scores.max())
-    return [float(w) for w in weights / weights.sum()]
+    return dict(zip(evidences, (weights / weights.sum()).tolist(), strict=True))

@@ -18,9 +18,9 @@ from fieldsid.logs.run import BoolArray, FloatArray
 from fieldsid.models.effect import Effect, Stage
 from fieldsid.models.record import Record
 
-PROMISING, PROMISING_LATER, PROMISING_INSTEAD = 5, 4, 2
+PROMISING, PROMISING_LATER = 5, 4
 """Effects that go on from each of the two screens: the free run's own error, and the error whitened by its noise. Of
-the base, of a hypothesis with effects, and of one that is only tried in another order."""
+the base, and of a hypothesis with effects."""
 GLIMPSE, GLIMPSE_PLAIN = 5.0, 0.02
 """Fall of the whitened sum of squares, and share of the plain one, below which the screen does not send an effect on."""
 MATTERS_PLAIN = 0.05

@@ -22,15 +22,15 @@ def over(search: Search, h: Hypothesis, floor: Noise) -> float:
     return h.judging.over(floor)
 
 
-def evidence(search: Search, h: Hypothesis, errors: Pair, floor: Noise) -> str:
-    """Return what speaks for or against a hypothesis with these errors, in one sentence."""
+def evidence(search: Search, h: Hypothesis, errors: Pair, floor: Noise, gain: float) -> str:
+    """Return what speaks for or against a hypothesis with these errors and this log evidence over the base, in one sentence."""
     base = search.base()
     kind = "unseen runs" if search.validation else "the runs it was fitted to"
     fall = f"error on {kind} {over(search, base, floor):.2f} -> {over(search, h, floor):.2f} x noise floor"
     share = f"{fall} ({100 * explained(search, h, floor):.0f} % of the excess)"
     said = f"makes it worse: {fall}" if worsens(search, h, floor) else share
     lower, total = lower_on(errors, base.errors, floor)
-    return f"{said}; log evidence {h.score - base.score:+.1f}; error lower on {lower} of {total} runs"
+    return f"{said}; log evidence {gain:+.1f}; error lower on {lower} of {total} runs"
 
 
 def lower_on(errors: Pair, base: Pair, floor: Noise) -> tuple[int, int]:
@@ -46,6 +46,9 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
+    if verdict.word == "disturbed":
+        left = _sized(search, search.base(), base)
+        return f"no effect of the catalogue is missing: what is left, {left}, is {_disturbance(noise)}"
     if verdict.word == "unexplained":
         worse = worse_unseen(search.base(), search.floor)
         return (
@@ -61,6 +64,15 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
         others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
         return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
     return f"{names} ({says}): {fall}"
+
+
+def _disturbance(noise: Noise) -> str:
+    """Return what disturbs in words: a moment on the hull, or sensors that wander."""
+    if noise.disturbance > DISTURBED:
+        lasts = f"{noise.disturbance:.2g} rad/s^2 with a time constant of {noise.disturbance_time:.2g} s"
+        return f"a disturbance moment of {lasts} that does not follow the fin or the motion"
+    wander = f"{noise.coloured_angle:.2g} rad and {noise.coloured_rate:.2g} rad/s"
+    return f"sensors that wander by {wander} with a time constant of {noise.coloured_time:.2g} s"
 
 
 def _says(h: Hypothesis, name: str) -> str:

@@ -1,4 +1,7 @@
-"""When an addition to a hypothesis is worth having: what it must bring in evidence, on the runs fitted to, and on unseen ones."""
+"""When an addition to a hypothesis is worth having: by its evidence, and by what it does to the error.
+
+The evidence holds the prior odds of what was added; the errors are those of the free run, of fitted and of unseen runs.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from fieldsid.diagnosis.hypothesis import Hypothesis
 from fieldsid.models.model import Noise
 
 WORTH = 6.0
-"""Log evidence an addition must bring: odds of 400 to 1, for the dozens of additions that are tried."""
+"""Prior log odds against another kind of noise or another law of the speed than the usual: 400 to 1."""
 LEARNED = 4.0
 """Log likelihood an addition with numbers of every run's own must gain on the runs it is fitted to: on unseen runs those
 numbers are fitted too, and might come from nowhere. One without must only not lose there."""
@@ -24,23 +27,34 @@ WORSE = 2.0
 MATTERS_MORE = 0.02
 """What a third and each further effect must bring beyond that: long explanations are the easier to find."""
 FAR = 4.0
-"""Error over the floor from which every leading child is put into other forms, and a step that does not pay is gone beyond: far
-off, a textbook's shape tells little, and the first of two effects less."""
-HOPE = 0.5
-"""Share of the base's error that effects must have left, for a step that does not pay to be gone beyond."""
+"""Error over the floor from which every leading child is put into other forms: far
+off, a textbook's shape tells little."""
 MUCH = 1.5
 """Error over the floor from which something is missing even where no effect has evidence in the textbook's form."""
 
 
 def pays(without: Hypothesis, with_: Hypothesis) -> bool:
-    """Whether an addition brings evidence and lowers the error on unseen runs by more than a trifle."""
-    matters = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
-    return likelier(without, with_) and with_.judging.mean < matters * without.judging.mean
+    """Whether an addition brings evidence, and matters."""
+    return likelier(without, with_) and matters(without, with_)
+
+
+def matters(without: Hypothesis, with_: Hypothesis) -> bool:
+    """Whether an addition lowers the error on fitted or on unseen runs by more than a trifle, that on all, and raises no unseen one.
+
+    Of both either may show what it is for: a mild run says nothing of what only a hard one brings out, and a hypothesis that
+    lacks it has bent its other numbers to the runs fitted to.
+    """
+    share = MATTERS - MATTERS_MORE * max(0, len(with_.names) - 2)
+    unseen = with_.judging.mean / without.judging.mean
+    if not unseen < ALIKE:
+        return False
+    fitted = with_.train.mean / without.train.mean
+    return bool(min(unseen, fitted) < share and unseen * fitted < 1.0)
 
 
 def fits(without: Hypothesis, with_: Hypothesis) -> bool:
     """Whether an addition has evidence on the runs fitted to alone."""
-    return bool(with_.by_run.sum() - with_.cost > without.by_run.sum() - without.cost + WORTH)
+    return bool(with_.by_run.sum() - with_.cost > without.by_run.sum() - without.cost)
 
 
 def asks_for_more(h: Hypothesis, floor: Noise) -> bool:
@@ -62,7 +76,7 @@ def likelier(without: Hypothesis, with_: Hypothesis) -> bool:
     known = {e.name for e in without.effects}
     own = any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
     learned = float(with_.by_run.sum() - without.by_run.sum()) > (LEARNED if own else 0.0)
-    return learned and with_.score - without.score > WORTH
+    return learned and with_.score > without.score
 
 
 def helps(without: Hypothesis, with_: Hypothesis) -> bool:

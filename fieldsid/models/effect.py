@@ -198,7 +198,7 @@ class Effect:
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
-    `forms` are other shapes, tried where the textbook's leaves something.
+    `forms` are other shapes, tried where the textbook's leaves something; `is_formed` where it is in one of them.
     `handicap` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
@@ -228,6 +228,7 @@ class Effect:
     twin: Callable[[Values, Axis], dict[str, float] | None] | None = None
     forms: tuple[Form, ...] = ()
     handicap: float = 0.0
+    is_formed: bool = False
     origin: str = field(default="built in")
     definition: Definition | None = None
 
@@ -268,7 +269,7 @@ class Effect:
 
 def in_form(effect: Effect, form: Form) -> Effect:
     """Return an effect with the coefficients of one of its forms among its own."""
-    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=())
+    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=(), is_formed=True)
 
 
 def form_of(effect: Effect, known: Collection[str]) -> Form | None:

@@ -78,7 +78,7 @@ def run_case(task):
     row = {
         "name": case.name, "index": index, "kind": case.kind, "axis": case.axis,
         "truth": list(case.details["causes"]), "accepts": sorted(case.accepts), "effects_hidden": list(case.effects),
-        "expected": case.expected, "ratio": case.ratio,
+        "expected": sorted(case.expected), "ratio": case.ratio,
         "ratio_training": case.ratio_training, "visible": case.visible, "causes": case.details["causes"],
         "colour": case.details.get("colour"), "cross_measured": case.details.get("cross_measured"),
     }  # fmt: skip
@@ -137,7 +137,7 @@ def right(row):
     if row["kind"] == "pair":
         missing = set(row["effects_hidden"]) - set(row["said"])
         return not missing or (missing == {"clock_offset"} and "delay" in row["accepts"] and "delay" in row["said"])
-    return row["verdict"] == row["expected"]
+    return row["verdict"] in row["expected"]
 
 
 def share(rows, test):
@@ -163,7 +163,8 @@ def table(rows):
         ("right in the first three, singles", ">= 0.99", share(of["single"], lambda r: bool(first_three(r) & set(r["accepts"])))),
         ("false alarm when nothing is missing", "<= 0.05", share(nothing, lambda r: not right(r))),
         ("  of which `effect`", "", share(nothing, lambda r: r["verdict"] == "effect")),
-        ("`unexplained` when not in the catalogue", ">= 0.90", share(of["uncatalogued"], right)),
+        ("no effect named when not in the catalogue", ">= 0.90", share(of["uncatalogued"], right)),
+        ("  of which `disturbed`", "", share(of["uncatalogued"], lambda r: r["verdict"] == "disturbed")),
         ("both of two effects", ">= 0.85", share(of["pair"], right)),
         ("one of the REMUS' own effects first", "", share(of["remus"], right)),
         ("error over floor, unseen runs: median", "<= 1.02", f"{np.median(over):6.3f}" if known else "   -"),

@@ -7,7 +7,7 @@ import re
 import pytest
 from guide.make import GUIDE
 
-from fieldsid.diagnosis import remainder, verdict, worth
+from fieldsid.diagnosis import hypothesis, remainder, verdict, worth
 from fieldsid.fitting import choice, layout, own_speed, remarks, restricted, suspects
 from fieldsid.schedule import verify
 from fieldsid.turning import doubt, formulas, radius
@@ -15,7 +15,7 @@ from fieldsid.turning import doubt, formulas, radius
 PAGE = (GUIDE / "theory.md").read_text()
 WORDS = " ".join(PAGE.split())
 NUMBERS = {
-    "log evidence an addition must gain": worth.WORTH,
+    "prior log odds against an effect": hypothesis.PRIOR_ODDS,
     "share the free-run error must fall to": worth.MATTERS,
     "less of it for a third and each further effect": worth.MATTERS_MORE,
     "log evidence is divided by, for a probability": verdict.TEMPER,

@@ -37,6 +37,10 @@ APART = (
 """Sets of which a pair takes at most one member: telling those apart is a matter for singles."""
 
 
+EXPECTED = {"none": frozenset({"sufficient", "disturbed"}), "uncatalogued": frozenset({"unexplained", "disturbed"})}
+"""Verdicts that are right where no effect of the catalogue is hidden: a sea, or a moment like one, is a disturbance."""
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """One blind case. `training` and `validation` are logs with canonical columns.
@@ -52,7 +56,7 @@ class Case:
     kind: str
     effects: tuple[str, ...]
     accepts: frozenset[str]
-    expected: str
+    expected: frozenset[str]
     training: list[dict[str, np.ndarray]]
     validation: list[dict[str, np.ndarray]]
     floor: dict[str, float]
@@ -234,7 +238,7 @@ def assemble(name, kind, names, scene, hidden, rng):
         name=name, axis="pitch" if scene.pitching else "yaw", kind=kind,
         effects=() if kind in ("none", "uncatalogued") else names,
         accepts=frozenset() if kind in ("none", "uncatalogued") else accepted(names, hidden),
-        expected={"none": "sufficient", "uncatalogued": "unexplained"}.get(kind, "effect"),
+        expected=EXPECTED.get(kind, frozenset({"effect"})),
         training=logs[:TRAINING], validation=logs[TRAINING:], floor=_named(floors[1]), floor_training=_named(floors[0]),
         base=_named(base), ratio=judged, ratio_training=trained, visible=seen(judged, trained, scene),
         details=_details(scene, hidden),

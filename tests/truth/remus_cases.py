@@ -45,7 +45,7 @@ def remus_case(index: int, seed: int) -> Case:
     accepts = OWN[axis] | ({"servo_lag"} if lag > 0 else set())
     return Case(
         name=f"remus-{seed}-{index}", axis=axis, kind="remus", effects=tuple(sorted(accepts)), accepts=frozenset(accepts),
-        expected="effect", training=[f.log for f in flights[:3]], validation=[f.log for f in flights[3:]],
+        expected=frozenset({"effect"}), training=[f.log for f in flights[:3]], validation=[f.log for f in flights[3:]],
         floor=_named(floors[1]), floor_training=_named(floors[0]), base=_named(judged), ratio=ratio,
         ratio_training=ratio_training, visible=ratio > VISIBLE and ratio_training > LEARNABLE,
         details={"causes": {"servo_lag": lag} if lag else {"hull": 1.0}, "speeds": speeds.tolist(), "damping": fit.damping},

@@ -40,7 +40,7 @@ def _search(base=BASE):
 
 def test_what_raises_the_error_is_said_to_make_it_worse():
     h = _made("current", train=(1.0,), unseen=(3.3,), score=40.0)
-    said = evidence(_search(), h, h.errors, FLOOR)
+    said = evidence(_search(), h, h.errors, FLOOR, h.score)
     assert said.startswith("makes it worse: error on unseen runs 1.10 -> 3.30 x noise floor; log evidence +40.0")
     assert "%" not in said
     assert worsens(_search(), h, FLOOR)
@@ -48,7 +48,7 @@ def test_what_raises_the_error_is_said_to_make_it_worse():
 
 def test_what_lowers_it_says_the_share_of_the_table():
     h = _made("servo_lag", train=(1.0,), unseen=(1.02,), score=40.0)
-    said = evidence(_search(), h, h.errors, FLOOR)
+    said = evidence(_search(), h, h.errors, FLOOR, h.score)
     assert f"1.10 -> 1.02 x noise floor ({100 * explained(_search(), h, FLOOR):.0f} % of the excess)" in said
     assert not worsens(_search(), h, FLOOR)
 
@@ -56,7 +56,7 @@ def test_what_lowers_it_says_the_share_of_the_table():
 def test_runs_are_counted_by_the_error_that_the_sentence_is_about():
     base = _made(train=(90.0,), unseen=(145.0,), score=0.0)
     h = _made("stall", train=(800.0,), unseen=(1922.0,), score=9.0, runs=(4.0, 5.0))
-    said = evidence(_search(base), h, h.errors, FLOOR)
+    said = evidence(_search(base), h, h.errors, FLOOR, h.score)
     assert "145.00 -> 1922.00" in said
     assert said.endswith("error lower on 0 of 2 runs")
 
@@ -64,7 +64,7 @@ def test_runs_are_counted_by_the_error_that_the_sentence_is_about():
 def test_what_is_alike_is_not_lower():
     base = _made(train=(2.0, 2.0), unseen=(2.0,), score=0.0)
     h = _made("stall", train=(1.99, 1.5), unseen=(1.0,), score=9.0)
-    assert evidence(_search(base), h, h.errors, FLOOR).endswith("error lower on 2 of 3 runs")
+    assert evidence(_search(base), h, h.errors, FLOOR, h.score).endswith("error lower on 2 of 3 runs")
 
 
 @pytest.mark.parametrize(("behind", "rival"), [(0.5, True), (5.9, True), (6.1, False), (400.0, False)])
@@ -73,7 +73,7 @@ def test_a_rival_is_one_whose_probability_makes_it_one(behind, rival):
     first = _made("servo_lag", train=(1.0,), unseen=(1.12,), score=500.0)
     other = _made("delay", train=(1.6,), unseen=(1.67,), score=500.0 - behind)
     shown = [first, other]
-    p = dict(zip(map(id, shown), probabilities(shown), strict=True))
+    p = probabilities({frozenset(h.names): h.score for h in shown})
     assert confusable(_search(base), first, shown, p, FLOOR) == (("delay",) if rival else ())
     assert confusable(_search(base), other, shown, p, FLOOR) == (("servo_lag",) if rival else ())
 

@@ -9,7 +9,7 @@ import pytest
 
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added
-from fieldsid.diagnosis.worth import asks_for_more, likelier, pays, refines
+from fieldsid.diagnosis.worth import asks_for_more, likelier, matters, pays, refines
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
 
@@ -41,10 +41,19 @@ def test_a_form_may_show_on_the_runs_fitted_to_where_it_raises_no_error_on_the_o
     assert refines(plain, hypothesis("stall", gain=50.0, over=over, train=train)) == refined
 
 
-@pytest.mark.parametrize(("gain", "paid"), [(5.0, False), (7.0, True)])
+@pytest.mark.parametrize(("gain", "paid"), [(-1.0, False), (1.0, True)])
 def test_the_error_alone_is_not_enough(gain, paid):
     found = hypothesis("servo_lag", gain=gain, over=1.0)
     assert (pays(BASE, found), likelier(BASE, found)) == (paid, paid)
+
+
+@pytest.mark.parametrize(
+    ("over", "train", "counts"),
+    [(1.0, 1.5, True), (1.2, 1.3, True), (1.19, 1.45, False), (1.0, 1.7, True), (1.0, 1.9, False), (1.3, 1.0, False)],
+)
+def test_an_addition_matters_on_fitted_or_on_unseen_runs_if_it_lowers_all_and_no_unseen_one_rises(over, train, counts):
+    base = hypothesis(over=1.2, train=1.5)
+    assert matters(base, hypothesis("servo_lag", gain=50.0, over=over, train=train)) == counts
 
 
 def test_numbers_of_every_runs_own_must_be_learned_on_the_runs_fitted_to():
