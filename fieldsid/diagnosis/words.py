@@ -47,8 +47,8 @@ def headline(search: Search, verdict: Verdict, found: Hypothesis, left: Remainde
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "disturbed":
-        left = _sized(search, search.base(), base)
-        return f"no effect of the catalogue is missing: what is left, {left}, is {_disturbance(noise)}"
+        size = _sized(search, search.base(), base)
+        return f"no effect of the catalogue is missing: what is left, {size}, is {_disturbance(noise)}"
     if verdict.word == "unexplained":
         worse = worse_unseen(search.base(), search.floor)
         return (

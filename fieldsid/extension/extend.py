@@ -20,7 +20,7 @@ from fieldsid.diagnosis.split import held_back
 from fieldsid.diagnosis.trial import judge, refine
 from fieldsid.diagnosis.usable import usable
 from fieldsid.diagnosis.weather import in_its_weather
-from fieldsid.diagnosis.worth import MATTERS, WORTH
+from fieldsid.diagnosis.worth import MATTERS
 from fieldsid.display import Brief, Plotted
 from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import DataError, UsageError
@@ -81,7 +81,7 @@ class Extension(Plotted):
     def pays(self) -> bool:
         """Whether the error falls by more than a trifle; where all data were fitted the evidence must pay as well."""
         before, after = self.gain.over_floor
-        return after < MATTERS * before and (self.gain.unseen or self.evidence > WORTH)
+        return after < MATTERS * before and (self.gain.unseen or self.evidence > 0.0)
 
 
 def extend(
