@@ -39,7 +39,7 @@ def pays(without: Hypothesis, with_: Hypothesis) -> bool:
 
 
 def matters(without: Hypothesis, with_: Hypothesis) -> bool:
-    """Whether an addition lowers the error on fitted or on unseen runs by more than a trifle, on all runs, and raises no unseen one.
+    """Whether an addition lowers the error on fitted or on unseen runs by more than a trifle, on all, and raises no unseen one.
 
     Of both either may show what it is for: a mild run says nothing of what only a hard one brings out, and a hypothesis that
     lacks it has bent its other numbers to the runs fitted to.
