@@ -10,10 +10,12 @@ from shlex import quote
 import numpy as np
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, Source
+from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.clock import Track, one_clock
 from fieldsid.logs.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
+from fieldsid.logs.counts import COUNTED, COUNTS, turned_from_counts
 from fieldsid.logs.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
+from fieldsid.logs.geodetic import north_and_east
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
 from fieldsid.logs.run import SIGNALS, FloatArray, Note, Run
 from fieldsid.logs.units import depth_of_pressure, factor_to, pick_unit, scaled
@@ -92,7 +94,11 @@ def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note],
     picked = series if is_whole else replace(series, time=series.time[rows], values=series.values[rows])
     refuse_impossible_steps(picked.time, label)
     with np.errstate(over="ignore", invalid="ignore"):
-        given = _quaternion if picked.values.ndim == 2 else _scalar
+        given = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
+        if signal in COUNTED and source.unit == COUNTS:
+            angles, found = turned_from_counts(signal, picked.values, source.centre, source.scale)
+            picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None)
+            notes += found
         values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}
     notes += [note for _, found in values.values() for note in found]
     return {name: Track(picked.time, v, series.label) for name, (v, _) in values.items()}
@@ -139,6 +145,10 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
     if signal != ATTITUDE and signal not in ANGLES:
         raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number")
     return {n: angles[n] + source.offset if source.offset and n == "yaw_rad" else angles[n] for n in wanted}
+
+
+def _position(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
+    return dict(zip(("x_m", "y_m"), north_and_east(series.values), strict=True))
 
 
 def _distinct(notes: list[Note]) -> tuple[Note, ...]:

@@ -13,6 +13,9 @@ from fieldsid.logs.frames import Frame
 Stamp = Literal["header", "receive"]
 ATTITUDE = "attitude"
 """Not a signal but three: a quaternion mapped to it gives yaw, pitch and roll."""
+POSITION = "position"
+"""Two signals: latitude and longitude mapped to it give x and y, in m north and east of the first fix."""
+COMBINED = (ATTITUDE, POSITION)
 ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
 
 
@@ -20,8 +23,10 @@ ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
 class Source:
     """Where one signal comes from: a column (name, or index from 0), four columns of a quaternion, or a topic's field.
 
-    value = sign x (number in its unit, as SI), turned into our frames, + offset in SI. `stamp` None means the
-    header's where the message has one. `unit` None means what the column's name or the message type says, else SI.
+    value = sign x (number in its unit, as SI), turned into our frames, + offset in SI. `stamp` None means the header's where
+    the message has one. `unit` None means what the column's name or the message type says, else SI. Where the unit is
+    `counts`, `centre` is their number at zero, and `scale` the rad that one is worth. `date` and `week` are the columns of a
+    time's days, where the time is a clock, and of its GPS weeks.
     """
 
     column: str | int | None = None
@@ -34,6 +39,10 @@ class Source:
     offset: float = 0.0
     frame: Frame | None = None
     stamp: Stamp | None = None
+    centre: float | None = None
+    scale: float | None = None
+    date: str | int | None = None
+    week: str | int | None = None
 
     @property
     def label(self) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
+from fieldsid.logs.clocktime import unit_of_step
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import FloatArray, Note
 
@@ -29,8 +30,6 @@ LARGEST = 1e9
 """What is larger in SI was never measured: a damaged cell, or no number of this signal."""
 STEPS_S = (1e-7, 1e5)
 """Between these a log's steps of time lie, whatever vehicle and logger."""
-SLOW_S = 5.0
-"""A step longer than this shows nothing of a vehicle's motion: time is in another unit."""
 
 
 def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
@@ -44,8 +43,8 @@ def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
 
 def likely_unit(step_s: float) -> str:
     """Return the unit of time in which a median step is that of a log, with the words to set it; nothing where there is none."""
-    units = [name for name, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if 1e-4 <= step_s * factor <= 2.0]
-    return f"set its unit, probably `unit: {units[0]}`" if units and step_s > SLOW_S else ""
+    unit = unit_of_step(step_s)
+    return f"set its unit, probably `unit: {unit}`" if unit else ""
 
 
 def refuse_impossible_steps(time: FloatArray, label: str) -> None:

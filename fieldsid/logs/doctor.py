@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fieldsid.logs.conditioning import MAIN, SLOW_S, likely_unit
+from fieldsid.logs.clocktime import SLOW_S
+from fieldsid.logs.conditioning import MAIN, likely_unit
 from fieldsid.logs.doctor_pairs import pair_findings
 from fieldsid.logs.doctor_signals import signal_findings
 from fieldsid.logs.run import Note, Run

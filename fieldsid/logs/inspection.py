@@ -49,9 +49,7 @@ class Inspection(Brief):
         signals = body.pop("signals")
         if signals:
             return head + to_yaml(body) + "signals:\n" + "".join(f"  {name}: {_line(item)}\n" for name, item in signals.items())
-        return (
-            head + to_yaml(body) + "signals: {}\n" + (_TOPIC_EXAMPLE if self.inventory.form.endswith("bag") else _COLUMN_EXAMPLE)
-        )
+        return head + to_yaml(body) + "signals: {}\n" + (_TOPIC_EXAMPLE if self.inventory.by_topic else _COLUMN_EXAMPLE)
 
     def record(self, written: Path | None) -> dict[str, Any]:
         """Return the inspection as plain values, for JSON and for the page."""
@@ -85,16 +83,17 @@ def inspect_log(
     from fieldsid.logs.load import load_run
     from fieldsid.logs.mapping import load_mapping
 
-    clock = None if mapping is None else load_mapping(mapping).time
-    reader, options = reader_of(path), ReadOptions(msg_path, salvage=True, clock=clock)
+    given = None if mapping is None else load_mapping(mapping)
+    reader, options = reader_of(path), ReadOptions(msg_path, salvage=True, clock=None if given is None else given.time)
     options = replace(options, progress=progress or options.progress)
-    inventory = reader.inventory(path, options, TableForm())
+    inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
     needs_none = reader.own_map(path, options) is not None
     run = proposal.run
     if mapping is not None or needs_none:
         run = load_run(path, mapping, msg_path=msg_path, salvage=True, max_gap_s=math.inf)
-    notes = list(inventory.notes) + ([] if run is None else list(run.notes))
+    proposed = [] if needs_none or mapping is not None else list(proposal.notes)
+    notes = [*inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
         notes.append(
             Note("not_importable", proposal.problem.what, {"found": proposal.problem.found, "hint": proposal.problem.hint})
@@ -122,10 +121,12 @@ def _line(item: dict[str, Any]) -> str:
 
 
 def _scalar(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_scalar(part) for part in value) + "]"
     text = str(value)
     return (
         text
-        if isinstance(value, int) or (_PLAIN.match(text) and text.lower() not in _RESERVED)
+        if isinstance(value, (int, float)) or (_PLAIN.match(text) and text.lower() not in _RESERVED)
         else json.dumps(text, ensure_ascii=False)
     )
 

@@ -9,11 +9,13 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from fieldsid.errors import FieldsidError, MappingError
-from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, Pressure, Source, TableForm
+from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
+from fieldsid.logs.clocktext import FORMS
+from fieldsid.logs.counts import COUNTED, COUNTS
 from fieldsid.logs.frames import Body, Frame, World
 from fieldsid.logs.names import TIME
 from fieldsid.logs.run import SIGNALS
-from fieldsid.logs.units import dimension_of, pick_unit
+from fieldsid.logs.units import UNITS, dimension_of, find_unit, pick_unit
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 
@@ -33,11 +35,15 @@ class _Source(StrictModel):
     offset: Finite = 0.0
     frame: str | None = None
     stamp: Literal["header", "receive"] | None = None
+    centre: Finite | None = None
+    scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
 
 
 class _Time(StrictModel):
     column: Column
     unit: str | None = None
+    date: Column | None = None
+    week: Column | None = None
 
 
 class _Pressure(StrictModel):
@@ -109,10 +115,11 @@ def channel_of(text: str) -> tuple[str, Source]:
     signal = TIME if signal.strip() == "time" else signal.strip()
     if not equals or not rest:
         raise MappingError(f"`--channel {text}` is no channel", found=repr(text), hint="write `--channel yaw_rad=heading:deg`")
-    known = (TIME, ATTITUDE, *SIGNALS)
+    known = (TIME, *COMBINED, *SIGNALS)
     if signal not in known:
         raise MappingError(f"`--channel` names an unknown signal `{signal}`", found=repr(text), hint=near(signal, known))
-    where, colon, unit = rest.rpartition(":")
+    form = next((f for f in FORMS if signal == TIME and rest.endswith(f":{f}")), "")
+    where, colon, unit = (rest.removesuffix(f":{form}"), ":", form) if form else rest.rpartition(":")
     if not colon:
         where, unit = rest, ""
     if unit and signal != TIME:
@@ -134,7 +141,7 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
         )
     return ChannelMap(
         sources,
-        time=Source(column=file.time.column, unit=file.time.unit) if file.time else None,
+        time=_time(file.time, place) if file.time else None,
         frame=frame or Frame(),
         stamp=file.stamp,
         clock=file.clock,
@@ -145,12 +152,24 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
     )
 
 
+def _time(time: _Time, place: str) -> Source:
+    """The unit of a time is one of time, or says how a clock is written."""
+    if time.unit is not None and time.unit not in FORMS:
+        found = find_unit(time.unit)
+        if found is None or found.dimension != "time":
+            known = [u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS)
+            raise MappingError(
+                f"{place}: time cannot be in {time.unit!r}", found=time.unit, hint=f"use one of: {', '.join(known)}"
+            )
+    return Source(column=time.column, unit=time.unit, date=time.date, week=time.week)
+
+
 def _write_hint(origin: Path | None) -> str:
     return f"let a first one be written: `sysid inspect LOG --write-mapping {origin or 'mapping.yaml'} --force`"
 
 
 def _source(signal: str, item: _Source | str | int, place: str) -> Source:
-    known = (ATTITUDE, *SIGNALS)
+    known = (*COMBINED, *SIGNALS)
     if signal not in known:
         raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
     if not isinstance(item, _Source):
@@ -158,8 +177,12 @@ def _source(signal: str, item: _Source | str | int, place: str) -> Source:
     _check_place(signal, item, place)
     if item.unit is not None:
         _check_unit(signal, item.unit, place)
-    if (signal == ATTITUDE or item.columns) and (item.sign != 1 or item.unit):
-        raise MappingError(f"{place}: a quaternion has no sign and no unit", found=f"at `{signal}`", hint="set `frame` instead")
+    if (signal in COMBINED or item.columns) and (item.sign != 1 or item.unit):
+        raise MappingError(
+            f"{place}: a {'position' if signal == POSITION else 'quaternion'} has no sign and no unit",
+            found=f"at `{signal}`",
+            hint="set `frame` instead",
+        )
     return Source(
         column=item.column,
         columns=tuple(item.columns or ()),
@@ -171,6 +194,8 @@ def _source(signal: str, item: _Source | str | int, place: str) -> Source:
         offset=item.offset,
         frame=frame_of(item.frame, f"{place}, `{signal}`"),
         stamp=item.stamp,
+        centre=item.centre,
+        scale=item.scale,
     )
 
 
@@ -187,7 +212,19 @@ def _check_place(signal: str, item: _Source, place: str) -> None:
         raise MappingError(
             f"{place}: `{signal}` has a `field` without a `topic`", found=f"field: {item.field}", hint="name the `topic` too"
         )
-    if item.columns and (len(item.columns) != 4 or signal not in (ATTITUDE, *ANGLES)):
+    _check_columns(signal, item, place)
+    _check_counts(signal, item, place)
+
+
+def _check_columns(signal: str, item: _Source, place: str) -> None:
+    if signal == POSITION:
+        if item.topic is None and len(item.columns or ()) != 2:
+            raise MappingError(
+                f"{place}: `{POSITION}` needs two columns",
+                found=str(item.columns or item.column),
+                hint="write `columns: [LAT, LON]`",
+            )
+    elif item.columns and (len(item.columns) != 4 or signal not in (ATTITUDE, *ANGLES)):
         raise MappingError(
             f"{place}: `columns` is for the four numbers of a quaternion",
             found=f"{len(item.columns)} columns at `{signal}`",
@@ -195,10 +232,22 @@ def _check_place(signal: str, item: _Source, place: str) -> None:
         )
 
 
+def _check_counts(signal: str, item: _Source, place: str) -> None:
+    """A centre and a scale are those of counts, and counts those of a servo or a motor."""
+    extra = [n for n, v in (("centre", item.centre), ("scale", item.scale)) if v is not None]
+    if extra and item.unit != COUNTS:
+        hint = f"write `unit: {COUNTS}` beside it"
+        raise MappingError(f"{place}: `{signal}` has a `{extra[0]}` without counts", found=f"unit: {item.unit}", hint=hint)
+    if item.unit == COUNTS and signal not in COUNTED:
+        raise MappingError(
+            f"{place}: `{signal}` cannot be in {COUNTS!r}", found=f"{COUNTS} are those of a servo or a motor", hint="set its unit"
+        )
+
+
 def _check_unit(signal: str, unit: str, place: str) -> None:
     """The unit is one, and of the signal's dimension; a depth may be a pressure."""
-    dimension = dimension_of(signal) if signal != ATTITUDE else None
-    if dimension is None:
+    dimension = dimension_of(signal) if signal not in COMBINED else None
+    if dimension is None or unit == COUNTS:
         return
     try:
         picked = pick_unit(unit)

@@ -69,12 +69,22 @@ def _fits(signal: str, unit: str) -> bool:
     return dimension == dimension_of(signal) or (signal == "depth_m" and dimension == "pressure")
 
 
+def stated_unit(text: str, signal: str) -> str | None:
+    """Return a unit that stands beside a signal, as `deg/s` or `[deg/s]`, by its own name; None where it does not fit."""
+    unit = find_unit(text.strip().strip("[]()"))
+    fits = unit is not None and (unit.dimension == "time" if signal == TIME else _fits(signal, unit.name))
+    return unit.name if unit is not None and fits else None
+
+
 def unit_in_name(name: str, signal: str) -> str | None:
     """Return the unit a name states for a signal: `heading [deg]`, `r (deg/s)`, `fin_deg`; None when it states none that fits."""
     inside = _BRACKET.search(name)
     if inside is not None:
         unit = find_unit(inside["unit"])
         return unit.name if unit is not None and (signal == TIME or _fits(signal, unit.name)) else None
+    last = name.strip().rpartition(" ")[2] if " " in name.strip() else ""
+    if len(last) > 1 and (found := stated_unit(last, signal)) is not None:
+        return found
     for _, suffix in _splits(name.strip().lower()):
         unit_name = _SUFFIX.get(suffix)
         if unit_name is not None and (UNITS[unit_name].dimension == "time" if signal == TIME else _fits(signal, unit_name)):

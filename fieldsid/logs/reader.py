@@ -53,28 +53,45 @@ class RawLog:
 
 @dataclass(frozen=True, slots=True)
 class FieldInfo:
-    """One number inside a channel: its path (empty for a column), its type, first values, least and largest (a column's)."""
+    """One number inside a channel: its path (empty for a column), its type, first values, least and largest (a column's).
+
+    `means` is the signal it is by the definition of the format itself, with its unit there: None where that says none.
+    """
 
     path: str
     kind: str
     first: tuple[Any, ...]
     span: tuple[float, float] | None = None
+    means: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """The numbers of a table's columns by name or place, (n,) each, on its time (n,) in s, which `source` reads."""
+
+    time: FloatArray
+    columns: Mapping[str | int, FloatArray]
+    source: Source
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
-    """One column or topic: how many samples, at which rate in Hz (NaN where unknown), and what is inside."""
+    """One column or topic: how many samples, at which rate in Hz (NaN where unknown), what is inside, and the unit it states."""
 
     name: str
     kind: str
     count: int
     rate_hz: float
     fields: tuple[FieldInfo, ...]
+    unit: str | None = None
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Inventory(Brief):
-    """What is in a log file; `table` says how a text table was understood."""
+    """What is in a log file; `table` says how a text table was understood, `samples` are a table's numbers.
+
+    `frame` is that of a log of topics whose format has one, `by_topic` whether it is such a log.
+    """
 
     path: Path
     form: str
@@ -82,6 +99,13 @@ class Inventory(Brief):
     channels: tuple[ChannelInfo, ...]
     table: TableForm | None = None
     notes: tuple[Note, ...] = ()
+    samples: Samples | None = None
+    frame: str | None = None
+
+    @property
+    def by_topic(self) -> bool:
+        """Whether its signals are fields of topics, each on a clock of its own, and not columns of a table."""
+        return self.form.endswith("bag") or self.frame is not None
 
 
 def _unseen(share: float) -> None:

@@ -306,7 +306,7 @@ def test_inspect_says_the_rate_of_each_column_of_a_table(run_cli, tmp_path, suff
         ("Timestamp,a", 1e9, [], "20"),
         ("stamp,a", 1.0, [], "20"),
         ("", 1.0, [], "20"),
-        ("tick,a", 1e3, [], "-"),
+        ("tick,a", 1e3, [], "20"),
         ("tick,a", 1e3, ["-m", "ms.yaml"], "20"),
         ("time_ms,a", 1e3, [], "20"),
     ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -13,24 +13,34 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.cells import as_numbers
-from fieldsid.logs.channels import ATTITUDE, ChannelMap, Source
+from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.clocktime import seconds_of
-from fieldsid.logs.names import TIME, Canonical, canonical, unit_in_name
+from fieldsid.logs.names import TIME, Canonical, canonical, stated_unit, unit_in_name
 from fieldsid.logs.naming import stem_of
-from fieldsid.logs.reader import RawLog, ReadOptions, Series
+from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.logs.words import meaning_of
 from fieldsid.registry import near
 
+LOOKED_AT = 200
+FEW_WORDS = 0.05
+"""Share of words among the first cells of a column, and among all, up to which it is one of numbers."""
+SAMPLED = 100_000
+"""Rows of a table that are looked at for what its numbers say."""
+
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The columns of one file; `take` gives the raw cells (n,) of a column by index. Names are empty without a header."""
+    """The columns of one file; `take` gives the raw cells (n,) of a column by index. Names are empty without a header.
+
+    `units` are those of a row below the names, empty without one.
+    """
 
     path: Path
     names: tuple[str, ...]
     width: int
     take: Callable[[int], npt.NDArray[Any]]
+    units: tuple[str, ...] = ()
 
     def index(self, column: str | int, signal: str) -> int:
         """Return the index of a column; raises MappingError naming the near matches."""
@@ -61,6 +71,37 @@ class Columns:
         """Return a column's name, or its index as text."""
         return self.names[index] if self.names else str(index)
 
+    def unit(self, index: int, signal: str) -> str | None:
+        """Return the unit that a column states for a signal, in its name or in the row of units; None where none fits."""
+        return unit_in_name(self.name(index), signal) or (stated_unit(self.units[index], signal) if self.units else None)
+
+    def rows(self, keep: npt.NDArray[np.bool_]) -> Columns:
+        """Return the columns with some of their rows (n,) only."""
+        return replace(self, take=lambda index: self.take(index)[keep])
+
+
+def numbers_mostly(cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return cells (n,) as numbers, NaN where words stand among them, as long as nearly all are; else as they are."""
+    if cells.dtype.kind != "O":
+        return cells
+    seen = [c for c in cells[:LOOKED_AT].tolist() if isinstance(c, str)]
+    if as_numbers(np.array(seen, dtype=object))[1].size > FEW_WORDS * len(seen):
+        return cells
+    values, wrong = as_numbers(cells)
+    return values if wrong.size <= FEW_WORDS * cells.size else cells
+
+
+def samples_of(columns: Columns, time: FloatArray, source: Source) -> Samples:
+    """Return the numbers of a table's columns, of a long one every so many rows."""
+    step, seen = max(1, -(-time.size // SAMPLED)), np.isfinite(time)
+    taken = {}
+    for i in range(columns.width):
+        cells = numbers_mostly(columns.take(i))
+        if cells.dtype.kind in "fiub":
+            name = columns.name(i)
+            taken[name if columns.names.count(name) == 1 else i] = cells[seen][::step].astype(np.float64)
+    return Samples(time[seen][::step], taken, source)
+
 
 def own_map_of(names: Sequence[str]) -> ChannelMap | None:
     """Return the mapping of a table whose columns have canonical names (time among them), or None.
@@ -81,13 +122,15 @@ def own_map_of(names: Sequence[str]) -> ChannelMap | None:
 def used_by(mapping: ChannelMap, names: Sequence[str], width: int) -> set[int]:
     """Return the indexes of the columns that a mapping names, as far as a table has them."""
     named = [c for s in mapping.sources.values() for c in (s.column, *s.columns)]
-    named.append(mapping.time.column if mapping.time else None)
+    named += [mapping.time.column, mapping.time.date, mapping.time.week] if mapping.time else []
     indexes = {c for c in named if isinstance(c, int) and 0 <= c < width}
     return indexes | {i for i, name in enumerate(names) if name in named}
 
 
 def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[Note, ...], options: ReadOptions) -> RawLog:
     """Return the mapped columns of a table on its time column."""
+    columns, blank = _without_blank_rows(columns, mapping)
+    notes = (*notes, *blank)
     time, time_notes = _time(columns, mapping, options)
     bad: list[Note] = []
     series: dict[str, Series] = {}
@@ -97,7 +140,7 @@ def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[No
         numbers = [_numbers(columns, i, signal, bad, options) for i in picked]
         values = numbers[0] if len(numbers) == 1 else np.stack(numbers, axis=1)
         label = ", ".join(columns.name(i) for i in picked)
-        unit = None if signal == ATTITUDE else unit_in_name(label, signal)
+        unit = None if signal in COMBINED else columns.unit(picked[0], signal)
         series[signal] = Series(time, values, label, unit, label.strip().lower() == "z")
     ignored = _ignored(columns, mapping)
     return RawLog(stem_of(path), series, (*notes, *time_notes, *bad, *ignored))
@@ -127,9 +170,48 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
             hint=way or f"add `--channel {quote(f'time={likely}:s')}`",
         )
     index = columns.index(mapping.time.column, TIME)
-    name = columns.name(index)
-    unit = mapping.time.unit or unit_in_name(name, TIME)
-    return seconds_of(columns.take(index), unit, options, name=name)
+    unit = mapping.time.unit or columns.unit(index, TIME)
+    dates, weeks = (None if c is None else columns.take(columns.index(c, TIME)) for c in (mapping.time.date, mapping.time.week))
+    return seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
+
+
+def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns, list[Note]]:
+    """Return the columns without rows that hold neither a time nor a number of the mapped ones, and a note on words in them.
+
+    Such are a last line of separators alone, and what was written between the rows.
+    """
+    if mapping.time is None or mapping.time.column is None:
+        return columns, []
+    place = columns.index(mapping.time.column, TIME)
+    times = columns.take(place)
+    if times.dtype.kind not in "fO" or not times.size:
+        return columns, []
+    empty = _is_missing(times)
+    words = ~empty & _is_word(times) if times.dtype.kind == "O" else np.zeros(times.size, dtype=np.bool_)
+    if not (empty.any() or words.any()):
+        return columns, []
+    others = used_by(mapping, columns.names, columns.width) - {place}
+    rows = empty | words
+    for i in others:
+        cells = columns.take(i)
+        rows &= _is_missing(cells) | (_is_word(cells) if cells.dtype.kind == "O" else False)
+    if not rows.any() or rows.all():
+        return columns, []
+    said = int((rows & words).sum())
+    first = str(times[rows & words][0])[:60] if said else ""
+    found = [Note("text_rows", f"lines of words between the rows, left out: {said}, the first {first!r}", {"count": said})]
+    return columns.rows(~rows), found if said else []
+
+
+def _is_missing(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    import pandas as pd
+
+    return np.asarray(pd.isna(cells))
+
+
+def _is_word(cells: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Return which cells (n,) hold a letter and no digit at their start: no number, clock or date."""
+    return np.array([isinstance(c, str) and not c.strip()[:1].isdigit() and any(x.isalpha() for x in c) for c in cells])
 
 
 def _numbers(columns: Columns, index: int, signal: str, bad: list[Note], options: ReadOptions) -> FloatArray:
@@ -152,7 +234,7 @@ def _numbers(columns: Columns, index: int, signal: str, bad: list[Note], options
 
 def _ignored(columns: Columns, mapping: ChannelMap) -> list[Note]:
     used = {s.column for s in mapping.sources.values()} | {c for s in mapping.sources.values() for c in s.columns}
-    used.add(mapping.time.column if mapping.time else None)
+    used |= {mapping.time.column, mapping.time.date, mapping.time.week} if mapping.time else set()
     extra = [name for i, name in enumerate(columns.names) if name not in used and i not in used]
     if not extra:
         return []

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
+from fieldsid.logs.readers._cells import cells, is_row, is_word
+from fieldsid.logs.readers._header import behind_sizes, header_of
 from fieldsid.logs.strangers import COPY_AGAIN
 
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
@@ -19,22 +20,17 @@ AGREEING = 20
 Score = tuple[int, float, int]
 """Rows that agree with the first, share of its cells that are no words, and its columns."""
 
-_NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
-_COMMA_NUMBER = re.compile(r"^[+-]?(\d+,\d+|\d+)([eE][+-]?\d+)?$")
-_DATE = re.compile(r"^\d{4}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d*)?)?)?(Z|[+-]\d\d:?\d\d)?$")
-MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "-nan", "infinity", "-"})
-COMMENTS = "#%"
-
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """How a table is written: `start` is the line of its first row, `names` what the header calls the columns."""
+    """How a table is written: `start` is the line of its first row, `names` and `units` what is said above."""
 
     separator: str
     decimal: str
     start: int
     width: int
     names: tuple[str, ...]
+    units: tuple[str, ...] = ()
 
     def label(self, index: int) -> str:
         """The name of a column, or its index where there is no header."""
@@ -71,64 +67,15 @@ def _try(lines: list[str], first: int, separator: str, asked: TableForm) -> tupl
     for decimal in decimals:
         for at in range(first, len(lines)):
             row = cells(lines[at], separator)
-            if len(row) < 2 or not _is_row(row, decimal):
+            if len(row) < 2 or not is_row(row, decimal):
                 continue
             rows = [r for line in lines[at + 1 : at + AGREEING] if line.strip() and len(r := cells(line, separator)) > 0]
-            agreeing = 1 + sum(len(r) == len(row) and _is_row(r, decimal) for r in rows)
+            agreeing = 1 + sum(len(r) == len(row) and is_row(r, decimal) for r in rows)
             if agreeing * 2 <= len(rows):
                 continue
-            score = (agreeing, sum(not _is_word(c, decimal) for c in row) / len(row), len(row))
+            score = (agreeing, sum(not is_word(c, decimal) for c in row) / len(row), len(row))
             if score > best[1]:
-                names = _header(lines, at, first, separator, len(row), asked=asked.header)
-                best = Form(separator, decimal, at, len(row), names), score
+                names, units = header_of(lines, at, first, separator, len(row), asked=asked.header)
+                best = Form(separator, decimal, behind_sizes(lines, at, names), len(row), names, units), score
             break
     return best
-
-
-def cells(line: str, separator: str) -> list[str]:
-    """Return a line's cells without blanks and quotes."""
-    parts = line.split() if separator == "whitespace" else line.split(separator)
-    return [p.strip().strip("\"'").strip() for p in parts]
-
-
-def _is_row(row: list[str], decimal: str) -> bool:
-    """Whether a line is data: it holds a number, and what is no number is a date, missing or a word among numbers."""
-    words = sum(_is_word(c, decimal) for c in row)
-    missing = sum(c.lower() in MISSING for c in row)
-    said = len(row) - words - missing
-    return said > 0 and words <= said and not row[0].startswith(tuple(COMMENTS))
-
-
-def _is_word(cell: str, decimal: str) -> bool:
-    """Whether a cell is no number, no date and not one of the ways to say that there is none."""
-    number = _NUMBER if decimal == "." else _COMMA_NUMBER
-    return not (number.match(cell) or _DATE.match(cell) or cell.lower() in MISSING)
-
-
-def _header(lines: list[str], at: int, first: int, separator: str, width: int, *, asked: bool | None) -> tuple[str, ...]:
-    if asked is False:
-        return ()
-    for i in range(at - 1, max(first, 0) - 1, -1):
-        if not lines[i].strip():
-            continue
-        names = _names(lines[i], separator, width)
-        if names:
-            return names
-        if not lines[i].lstrip().startswith(tuple(COMMENTS)) and not _are_units(lines[i], separator, width):
-            return ()
-    return ()
-
-
-def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
-    """Return a header line's names when it has one word for each column, else nothing."""
-    bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
-    names = cells(bare, separator)
-    if len(names) != width or any(_NUMBER.match(n) or _DATE.match(n) for n in names) or not any(names):
-        return ()
-    return () if _are_units(line, separator, width) else tuple(names)
-
-
-def _are_units(line: str, separator: str, width: int) -> bool:
-    """Whether a line below the names only states units, such as `[s];[deg];[deg/s]`."""
-    parts = cells(line, separator)
-    return len(parts) == width and all(p == "" or (p[:1] in "[(" and p[-1:] in "])") for p in parts)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +16,12 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._cells import MISSING, cells, has_number, is_word
 from fieldsid.logs.readers._clock import Clock, clock_of
-from fieldsid.logs.readers._columns import Columns, own_map_of, series_of, used_by
+from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
-from fieldsid.logs.readers._text import MISSING, Form, cells, form_of
+from fieldsid.logs.readers._text import Form, form_of
 from fieldsid.logs.run import Note
 from fieldsid.logs.strangers import COPY_AGAIN, is_text
 
@@ -42,13 +45,14 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     with _opened(path, form, options) as table:
         columns = table.columns(range(table.form.width))
         clock = clock_of(columns, options.clock)
-        channels = tuple(_channel(table.form.label(i), columns.take(i), clock) for i in range(table.form.width))
+        channels = tuple(_channel(columns, i, clock) for i in range(table.form.width))
         written = table.form
         found = TableForm(
             written.separator, bool(written.names), written.start, form.encoding, "," if written.decimal == "," else "."
         )
         duration = clock.duration_s if clock else float("nan")
-        return Inventory(path, "text table", duration, channels, found, tuple(table.notes))
+        samples = samples_of(columns, clock.time, clock.source) if clock else None
+        return Inventory(path, "text table", duration, channels, found, tuple(table.notes), samples)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -114,9 +118,34 @@ class _Table:
     def columns(self, wanted: Iterable[int]) -> Columns:
         """Return the columns; the cells are there of those that are wanted."""
         taken = self._cells(sorted(set(wanted)))
-        return Columns(self.path, self.form.names, self.form.width, taken.__getitem__)
+        return Columns(self.path, self.form.names, self.form.width, taken.__getitem__, self.form.units)
 
     def _cells(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
+        """Return the cells (n,) of the wanted columns; lines of words that do not fit the columns are left out."""
+        try:
+            return self._parsed(wanted)
+        except LogError:
+            with TemporaryFile() as plain:
+                if not self._without_words(plain):
+                    raise
+                return self._parsed(wanted)
+
+    def _without_words(self, plain: IO[bytes]) -> bool:
+        """Copy the rows, with an empty line for each line without a number that is no row; return whether there was one."""
+        found: list[str] = []
+        with self.text.between(self.begin, self.end) as rows:
+            for raw in rows:
+                line = raw.decode(self.text.encoding, errors="replace").strip()
+                is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
+                plain.write(raw if is_row else b"\n")
+                found += [] if is_row else [line]
+        self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
+        self.begin, self.end = 0, plain.tell()
+        message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}" if found else ""
+        self.notes += [Note("text_rows", message, {"count": len(found)})] if found else []
+        return bool(found)
+
+    def _parsed(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
         """Return the cells (n,) of the wanted columns: numbers where a column holds nothing else, words otherwise."""
         import pandas as pd
 
@@ -134,7 +163,13 @@ class _Table:
                 raise self._misfit(error) from error
         if self.options.salvage:
             self._count_bad_rows(count)
-        return {i: column.whole() for i, column in grown.items()}
+        return {i: self._with_points(column.whole()) for i, column in grown.items()}
+
+    def _with_points(self, cells: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return cells with a decimal point where words among them kept pandas from reading their commas."""
+        if self.form.decimal == "." or cells.dtype.kind in NUMBERS:
+            return cells
+        return np.array([c.replace(",", ".") if isinstance(c, str) and not is_word(c, ",") else c for c in cells], dtype=object)
 
     def _form_for_pandas(self, version: str) -> dict[str, Any]:
         return {
@@ -177,16 +212,18 @@ def _exact(version: str) -> dict[str, Any]:
     return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
 
 
-def _channel(name: str, values: npt.NDArray[Any], clock: Clock | None) -> ChannelInfo:
+def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
     import pandas as pd
 
+    values = numbers_mostly(columns.take(index))
     numeric = values.dtype.kind in NUMBERS
     seen = np.isfinite(values.astype(float)) if numeric else ~np.asarray(pd.isna(values))
     first: Sequence[Any] = values[seen][:3].tolist()
     kind = "number" if numeric else "text"
     span = (float(values[seen].min()), float(values[seen].max())) if numeric and seen.any() else None
     rate = clock.rate_hz(values) if clock else float("nan")
-    return ChannelInfo(name, kind, int(seen.sum()), rate, (FieldInfo("", kind, tuple(first), span),))
+    unit = columns.units[index] if columns.units else None
+    return ChannelInfo(columns.name(index), kind, int(seen.sum()), rate, (FieldInfo("", kind, tuple(first), span),), unit)
 
 
 READER = Reader(

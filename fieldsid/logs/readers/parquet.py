@@ -13,7 +13,7 @@ from fieldsid.logs.names import TIME
 from fieldsid.logs.naming import stem_of
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.readers._clock import clock_of
-from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
+from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.run import SIGNALS, Note
 from fieldsid.logs.strangers import COPY_AGAIN
 
@@ -32,7 +32,8 @@ def sniff(path: Path) -> bool:
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers and first values."""
     table = _table(path)
-    clock = clock_of(_columns(path, table), options.clock)
+    columns = _columns(path, table)
+    clock = clock_of(columns, options.clock)
     channels = []
     for name in table.column_names:
         column = table.column(name)
@@ -40,7 +41,8 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         kind = "number" if _is_number(column) else "text"
         rate = clock.rate_hz(column.to_numpy()) if clock else float("nan")
         channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(column[:3].to_pylist())),)))
-    return Inventory(path, "Parquet table", clock.duration_s if clock else float("nan"), tuple(channels))
+    samples = samples_of(columns, clock.time, clock.source) if clock else None
+    return Inventory(path, "Parquet table", clock.duration_s if clock else float("nan"), tuple(channels), samples=samples)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

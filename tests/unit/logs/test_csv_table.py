@@ -11,7 +11,8 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs import load_run
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.conditioning import LARGEST
-from fieldsid.logs.readers._text import cells, form_of
+from fieldsid.logs.readers._cells import cells
+from fieldsid.logs.readers._text import form_of
 
 NAMES = ("time_s", "yaw_rad", "rudder_rad")
 ROWS = [(0.0, 0.5, -0.1), (0.05, 0.25, 0.1), (0.1, -1.5e-3, 0.0), (0.15, 0.125, 0.3)]

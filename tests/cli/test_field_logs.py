@@ -1,0 +1,101 @@
+"""Logs as the field has them: what inspect proposes is imported and identified without an edit."""
+
+import json
+
+import numpy as np
+import pytest
+from lookalikes import LENGTH_S, STEP, TABLES, A, B, flight
+
+from fieldsid.logs import load_run
+
+PER_COUNT = {"iver": (200.0, 127.0), "spreadsheet": (200.0, 127.0), "pulses": (900.0, 400.0)}
+"""Counts a rad, and the travel of the servo, of logs whose fin is in counts."""
+
+
+def imported(run_cli, log, folder, *more):
+    """The run of a log by the mapping that inspect proposes, and what both commands said."""
+    inspected = run_cli("inspect", str(log), "--write-mapping", str(folder / "m.yaml"), "--json")
+    done = run_cli("import", str(log), "--mapping", str(folder / "m.yaml"), "-o", str(folder / "run.parquet"), "--json", *more)
+    return load_run(folder / "run.parquet"), inspected.json, done.json
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_a_log_of_the_field_is_imported_and_identified_without_an_edit(run_cli, tmp_path, kind):
+    run, _, _ = imported(run_cli, TABLES[kind](tmp_path), tmp_path)
+    f = flight()
+    assert len(run) == f["time"].size
+    np.testing.assert_allclose(np.diff(run.time), STEP, atol=2e-3)
+    off = run["yaw_rad"] - f["yaw"]
+    np.testing.assert_allclose(off - 2 * np.pi * np.round(off / (2 * np.pi)), 0.0, atol=2e-3)
+    done = run_cli("identify", str(tmp_path / "run.parquet"), "--axis", "yaw", "-o", str(tmp_path / "models"), "--json")
+    values = {name: p["value"] for name, p in json.loads(done.out)["fits"][0]["parameters"].items()}
+    counts, travel = PER_COUNT.get(kind, (1.0, np.radians(30.0)))
+    assert -values["a22"] == pytest.approx(A, rel=0.1)
+    assert values["b2"] * np.radians(30.0) / travel * counts == pytest.approx(B, rel=0.1)
+
+
+def findings(record, code):
+    return [f["message"] for f in record["findings"] if f["code"] == code]
+
+
+def test_the_compass_is_taken_before_the_course_and_the_vehicle_before_its_goal(run_cli, tmp_path):
+    _, record, _ = imported(run_cli, TABLES["iver"](tmp_path), tmp_path)
+    signals = record["mapping"]["signals"]
+    columns = {s: item.get("column") for s, item in signals.items()}
+    assert columns["yaw_rad"] == "C True Heading"
+    assert columns["surge_m_s"] == "Vehicle Speed (kn)"
+    assert columns["depth_m"] == "DFS Depth (m)"
+    assert columns["rudder_rad"] == "Fin Yaw T"
+    assert signals["rudder_rad"]["unit"] == "counts"
+    assert signals["position"] == {"columns": ["Latitude", "Longitude"]}
+    assert "roll_rad" not in signals
+    assert any("`Fin Yaw B`" in m for m in findings(record, "alternatives"))
+    assert record["mapping"]["time"] == {"column": "Time", "date": "Date"}
+
+
+def test_latitude_and_longitude_are_metres_from_the_first_fix(run_cli, tmp_path):
+    run, _, _ = imported(run_cli, TABLES["iver"](tmp_path), tmp_path)
+    f = flight()
+    np.testing.assert_allclose(run["x_m"], f["x"], atol=0.2 + 2e-3 * np.abs(f["x"]).max())
+    np.testing.assert_allclose(run["y_m"], f["y"], atol=0.2 + 2e-3 * np.abs(f["y"]).max())
+
+
+def test_what_was_rebuilt_or_taken_is_said(run_cli, tmp_path):
+    said = {
+        kind: imported(run_cli, TABLES[kind](tmp_path), (tmp_path / kind, (tmp_path / kind).mkdir())[0])[2] for kind in TABLES
+    }
+    codes = {kind: {n["code"] for n in done["runs"][0]["notes"]} for kind, done in said.items()}
+    assert "lost_hours" in codes["spreadsheet"]
+    assert {"coarse_time", "counts"} <= codes["pulses"]
+    assert "coarse_time" in codes["tank"]
+    assert "text_rows" in codes["units_row"]
+    assert "lost_hours" not in codes["iver"]
+
+
+def test_a_table_without_names_is_known_by_its_numbers_and_says_why(run_cli, tmp_path):
+    _, record, _ = imported(run_cli, TABLES["tank"](tmp_path), tmp_path)
+    columns = {s: item["column"] for s, item in record["mapping"]["signals"].items()}
+    assert {"x_m": 1, "y_m": 2, "yaw_rad": 4, "surge_m_s": 5, "yaw_rate_rad_s": 7, "rudder_rad": 8}.items() <= columns.items()
+    assert any("derivative of column 4" in m for m in findings(record, "evidence"))
+    assert any("explains" in m for m in findings(record, "evidence"))
+
+
+def test_the_scale_of_counts_makes_them_angles_and_the_note_goes(run_cli, tmp_path):
+    log = TABLES["pulses"](tmp_path)
+    (tmp_path / "m.yaml").write_text(
+        "time: {column: epoch, unit: s}\nsignals:\n  yaw_rad: {column: compass, unit: deg}\n"
+        f"  rudder_rad: {{column: rudder_servo, unit: counts, centre: 1500, scale: {1 / 900}}}\n"
+    )
+    run = load_run(log, tmp_path / "m.yaml")
+    np.testing.assert_allclose(run["rudder_rad"], flight()["rudder"], atol=1e-3)
+    assert "counts" not in {n.code for n in run.notes}
+
+
+def test_the_angle_of_a_pose_in_the_plane_is_the_heading(run_cli, tmp_path):
+    f = flight()
+    rows = "\n".join(",".join(f"{f[k][i]:.5f}" for k in ("time", "x", "y", "yaw", "rudder")) for i in range(f["time"].size))
+    (tmp_path / "pose.csv").write_text("t,x,y,theta,delta\n" + rows + "\n")
+    run, _, _ = imported(run_cli, tmp_path / "pose.csv", tmp_path)
+    np.testing.assert_allclose(run["yaw_rad"], f["yaw"], atol=1e-4)
+    assert not run.has("pitch_rad")
+    assert LENGTH_S - run.time[-1] == pytest.approx(STEP)
