@@ -32,10 +32,14 @@ def command(
     from_s: FromS = None,
     to_s: ToS = None,
     max_gap: Annotated[
-        float, typer.Option("--max-gap", metavar="S", help="Longest gap allowed in a main signal.", min=0.0)
+        float,
+        typer.Option("--max-gap", metavar="S", help="Longest gap of a main signal, or 5 of its own steps.", min=0.0),
     ] = 2.0,
     salvage: Annotated[
         bool, typer.Option("--salvage", help="Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
+    ] = False,
+    whole: Annotated[
+        bool, typer.Option("--whole", help="Keep what is not under way: on deck, at the surface, idle; one run for each log.")
     ] = False,
     format_: Annotated[
         str, typer.Option("--format", metavar="parquet|csv|csv.gz", help="Kind of file in the folder.")
@@ -45,8 +49,11 @@ def command(
 ) -> None:
     """Turn logs into Runs: SI and radians, NED and forward-starboard-down, one clock, gaps left as gaps.
 
+    What is not under way is left out, and said; several stretches of one log are runs of their own.
+
     Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
     """
+    from fieldsid.artifacts import check_output
     from fieldsid.cli.console import emit, tracked, warn
     from fieldsid.cli.inputs import between, mapping_of
     from fieldsid.cli.skips import Skips
@@ -54,15 +61,20 @@ def command(
     from fieldsid.logs.naming import refuse_twice
     from fieldsid.logs.sifting import attempt, sifted
 
-    importer = Importer(mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage=salvage)
+    importer = Importer(
+        mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage=salvage, whole=whole
+    )
     limits = _fin_limits(vehicle)
     targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
     skips = Skips()
     shown = tracked(logs, "reading")
     outcomes = (attempt(lambda log_and_bar: importer.read(log_and_bar[0], limits, log_and_bar[1]), pair) for pair in shown)
-    runs = sifted(logs, outcomes, skips.skip)
-    refuse_twice([run for _, run in runs], [log for log, _ in runs])
-    done = [importer.write(run, targets[log], force=force) for log, run in runs]
+    read = sifted(logs, outcomes, skips.skip)
+    refuse_twice([run for _, runs in read for run in runs], [log for log, runs in read for _ in runs])
+    placed = [pair for log, runs in read for pair in zip(runs, importer.places(targets[log], len(runs)), strict=True)]
+    for _, place in placed:
+        check_output(place, force=force)
+    done = [importer.write(run, place, force=force) for run, place in placed]
     body = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
     emit(body, as_json=as_json, render=lambda c: _render(done, c))
     for item in done:

@@ -16,6 +16,10 @@ from fieldsid.logs.run import FloatArray, Note
 MAX_GAP_S = 2.0
 """A main signal missing for longer than this inside a run is refused unless the user raises the limit."""
 
+OWN_STEPS = 5.0
+"""Steps of a signal's own that are no gap of it, however long they are."""
+WORTH_TAKING = 10
+"""Samples above which a part without a gap is worth a hint."""
 ROUNDING = 1.01
 """What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
 
@@ -113,22 +117,31 @@ def gaps_in(time: FloatArray, values: FloatArray) -> list[Gap]:
     return [Gap(float(time[seen[i]]), float(time[seen[i + 1]]), int(seen[i + 1] - seen[i] - 1)) for i in wide]
 
 
+def gap_limit(time: FloatArray, values: FloatArray, limit_s: float) -> float:
+    """Return the longest gap in s that is allowed in a signal (n,): the limit, and never less than a few of its own steps."""
+    steps = np.diff(time[np.isfinite(values)])
+    return max(limit_s, OWN_STEPS * float(np.median(steps))) if steps.size else limit_s
+
+
 def refuse_long_gaps(
     time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions | None = None, *, limit_s: float = MAX_GAP_S
 ) -> None:
-    """Raise LogError naming the longest gap of a main signal above the limit."""
+    """Raise LogError naming the longest gap of a main signal above the limit, which a slow signal's own steps raise."""
     options = options or ReadOptions()
-    long = [(g, s) for s in MAIN if s in signals for g in gaps_in(time, signals[s]) if g.length_s > ROUNDING * limit_s]
+    limits = {s: gap_limit(time, signals[s], limit_s) for s in MAIN if s in signals}
+    long = [(g, s) for s, limit in limits.items() for g in gaps_in(time, signals[s]) if g.length_s > ROUNDING * limit]
     if not long:
         return
     gap, signal = max(long, key=lambda found: found[0].length_s)
     length = gap.length_s
     start, end = _longest_without(time, [g for g, _ in long])
+    hint = f"accept it: {options.with_option(f'--max-gap {length + 0.1:.1f}')}"
+    if np.count_nonzero((time >= start) & (time <= end)) > WORTH_TAKING:
+        hint += f"; or take the longest part without one: {options.with_option(f'--from {start:.2f} --to {end:.2f}')}"
     raise LogError(
-        f"`{signal}` is missing for {length:.2f} s (limit {limit_s:g} s)",
+        f"`{signal}` is missing for {length:.2f} s (limit {limits[signal]:.3g} s)",
         found=f"{gap.count} samples without a number between {gap.start_s:.2f} and {gap.end_s:.2f} s",
-        hint=f"accept it: {options.with_option(f'--max-gap {length + 0.1:.1f}')}; "
-        f"or take the longest part without one: {options.with_option(f'--from {start:.2f} --to {end:.2f}')}",
+        hint=hint,
     )
 
 

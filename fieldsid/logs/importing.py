@@ -14,10 +14,12 @@ from fieldsid.artifacts import check_output, plain
 from fieldsid.errors import UsageError
 from fieldsid.logs.assemble import WHOLE
 from fieldsid.logs.channels import ChannelMap, Source
+from fieldsid.logs.conditioning import MAIN, ROUNDING, gap_limit, gaps_in
 from fieldsid.logs.load import load_run
 from fieldsid.logs.naming import names_apart, stem_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
+from fieldsid.logs.stretches import stretches_of
 from fieldsid.registry import near
 
 FORMATS = {"parquet": ".parquet", "csv": ".csv", "csv.gz": ".csv.gz"}
@@ -64,6 +66,7 @@ class Importer:
     part: tuple[float, float] = WHOLE
     max_gap_s: float = 2.0
     salvage: bool = False
+    whole: bool = False
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
         """Return the file each log becomes; raises before anything is read what would be the same for all logs.
@@ -88,16 +91,40 @@ class Importer:
 
     def read(
         self, log: Path, fin_max_rad: Mapping[str, float] | None = None, progress: Callable[[float], None] | None = None
+    ) -> list[Run]:
+        """Return the runs of one log: its stretches under way, each judged by itself, or what `part` or `whole` ask for."""
+        if self.whole or self.part != WHOLE:
+            return [self._load(log, fin_max_rad, progress, self.part, self.max_gap_s)]
+        run = self._load(log, fin_max_rad, progress, WHOLE, np.inf)
+        stretches, notes = stretches_of(run)
+        if not notes:
+            has_gaps = any(_is_long(run, s, self.max_gap_s) for s in MAIN if run.has(s))
+            return [self._load(log, fin_max_rad, progress, WHOLE, self.max_gap_s) if has_gaps else run]
+        runs = [self._load(log, fin_max_rad, progress, s.part, self.max_gap_s) for s in stretches]
+        return [replace(r, notes=(*r.notes, *notes)) for r in runs]
+
+    def places(self, target: Path, count: int) -> list[Path]:
+        """Return the file of each run of a log: the log's own, and where it has several stretches their numbers behind it."""
+        suffix = next(s for s in SUFFIXES if target.name.endswith(s))
+        stem = target.name.removesuffix(suffix)
+        return [target] if count == 1 else [target.with_name(f"{stem}_{i + 1}{suffix}") for i in range(count)]
+
+    def _load(
+        self,
+        log: Path,
+        fin_max_rad: Mapping[str, float] | None,
+        progress: Callable[[float], None] | None,
+        part: tuple[float, float],
+        max_gap_s: float,
     ) -> Run:
-        """Read one log and cut it to the times asked for; `progress` is told the share of it that has been read."""
         return load_run(
             log,
             self.mapping,
             channels=self._sources(),
             msg_path=self.msg_path,
             salvage=self.salvage,
-            max_gap_s=self.max_gap_s,
-            part=self.part,
+            max_gap_s=max_gap_s,
+            part=part,
             fin_max_rad=fin_max_rad,
             progress=progress,
         )
@@ -113,6 +140,11 @@ class Importer:
         from fieldsid.logs.mapping import channel_of
 
         return dict(channel_of(text) for text in self.channels)
+
+
+def _is_long(run: Run, signal: str, limit_s: float) -> bool:
+    limit = ROUNDING * gap_limit(run.time, run[signal], limit_s)
+    return any(gap.length_s > limit for gap in gaps_in(run.time, run[signal]))
 
 
 def _check_free(logs: Sequence[Path], targets: Sequence[Path], *, force: bool) -> None:

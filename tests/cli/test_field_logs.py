@@ -99,3 +99,33 @@ def test_the_angle_of_a_pose_in_the_plane_is_the_heading(run_cli, tmp_path):
     np.testing.assert_allclose(run["yaw_rad"], f["yaw"], atol=1e-4)
     assert not run.has("pitch_rad")
     assert LENGTH_S - run.time[-1] == pytest.approx(STEP)
+
+
+def stopped(folder):
+    """A log of two stretches under way between three stops, at 2 Hz."""
+    f = flight(step=0.5)
+    stop = (f["time"] < 30.0) | ((f["time"] > 100.0) & (f["time"] < 140.0)) | (f["time"] > 200.0)
+    speed = np.where(stop, 0.02, f["speed"])
+    rows = "\n".join(f"{t},{y:.5f},{r:.4f},{u:.3f}" for t, y, r, u in zip(f["time"], f["yaw"], f["rudder"], speed, strict=True))
+    (folder / "stops.csv").write_text("time_s,yaw_rad,rudder_rad,surge_m_s\n" + rows + "\n")
+    return folder / "stops.csv"
+
+
+def test_stretches_of_one_log_are_runs_of_their_own_and_whole_keeps_them(run_cli, tmp_path):
+    log = stopped(tmp_path)
+    body = run_cli("import", log, "-o", tmp_path / "runs", "--json").json
+    assert [r["run"] for r in body["runs"]] == ["stops_1", "stops_2"]
+    assert [(r["start_s"], r["end_s"]) for r in body["runs"]] == [(30.0, 100.0), (140.0, 200.0)]
+    assert all("--whole" in next(n["message"] for n in r["notes"] if n["code"] == "stretches") for r in body["runs"])
+    (whole,) = run_cli("import", log, "-o", tmp_path / "whole", "--whole", "--json").json["runs"]
+    assert (whole["start_s"], whole["end_s"]) == (0.0, 239.5)
+    again = run_cli("import", log, "-o", tmp_path / "runs")
+    assert again.code == 2
+    assert "stops_1.parquet" in again.err
+
+
+def test_both_stretches_of_one_log_are_identified_together(run_cli, tmp_path):
+    run_cli("import", stopped(tmp_path), "-o", tmp_path / "runs", "--json").json  # noqa: B018 - reading it says that it went well
+    fits = run_cli("identify", *sorted((tmp_path / "runs").iterdir()), "--axis", "yaw", "--json").json["fits"]
+    assert [f["run"] for f in fits] == ["stops_1", "stops_2"]
+    assert all(f["parameters"]["b2"]["value"] == pytest.approx(B, rel=0.1) for f in fits)
