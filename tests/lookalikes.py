@@ -7,6 +7,7 @@ r' = -0.8 r - 2.4 delta, at 1.5 m/s. Every file holds this flight in its own nam
 from __future__ import annotations
 
 import numpy as np
+from binary_logs import write_alog, write_dbd, write_mat
 
 A, B, SPEED, STEP = -0.8, -2.4, 1.5, 0.25
 LENGTH_S = 240.0
@@ -131,4 +132,20 @@ def glider(folder):
     return path
 
 
-TABLES = {m.__name__: m for m in (iver, spreadsheet, tank, units_row, pulses, gps_week, glider)}
+def moos(folder):
+    f = flight()
+    signals = {"NAV_HEADING": heading(f, 4), "NAV_SPEED": f["speed"], "DESIRED_HEADING": 0.0 * f["time"]}
+    return write_alog(folder / "pandan.alog", f["time"], signals | {"DESIRED_RUDDER": np.degrees(f["rudder"])})
+
+
+def slocum(folder):
+    f = flight()
+    return write_dbd(folder / "pandan.dbd", f["time"], {"m_heading": f["yaw"], "m_depth": f["speed"], "c_fin": f["rudder"]})
+
+
+def matlab(folder):
+    f = flight()
+    return write_mat(folder / "pandan.mat", f["time"], {"heading_deg": heading(f, 4), "Rudder": np.degrees(f["rudder"])})
+
+
+TABLES = {m.__name__: m for m in (iver, spreadsheet, tank, units_row, pulses, gps_week, glider, moos, slocum, matlab)}

@@ -20,6 +20,10 @@ ORDER = (
 """A room may import itself and what stands before it."""
 
 ONLY = {
+    "pyulog": ("fieldsid/logs/readers/ulog.py",),
+    "pymavlink": ("fieldsid/logs/readers/ardupilot.py",),
+    "dbdreader": ("fieldsid/logs/readers/slocum.py",),
+    "h5py": ("fieldsid/logs/readers/mat.py",),
     "rosbags": ("fieldsid/logs/readers/bags/",),
     "matplotlib": ("fieldsid/figures/",),
     "typer": ("fieldsid/cli/",),

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def command(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs: tables of text, Parquet, ROS 1 and ROS 2 bags.")],
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs: tables, bags, MATLAB, MOOS, PX4, ArduPilot, gliders.")
+    ],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR|FILE", help="Folder for the runs, or the file of a single one.")
     ],

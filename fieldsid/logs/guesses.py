@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fieldsid.logs.channels import ATTITUDE
 from fieldsid.logs.names import TIME, canonical, stated_unit, unit_in_name
-from fieldsid.logs.reader import ChannelInfo, FieldInfo
+from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo
 from fieldsid.logs.words import COMMANDED, LATITUDE, LONGITUDE, meaning_of, words_of
 
 _VECTORS = {
@@ -71,7 +71,7 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
         if info.means is not None:
             yield _of_format(channel, info, *info.means)
             continue
-        if last in _COUNTERS or "covariance" in info.path or "[" in parent:
+        if channel.kind == DEFINED or last in _COUNTERS or "covariance" in info.path or "[" in parent:
             continue
         if planar and info.path in _PLANAR and not commanded:
             yield Guess(_PLANAR[info.path], 5.0, {"topic": channel.name, "field": info.path}, channel.count)
@@ -84,9 +84,8 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count)
 
 
-def _of_format(channel: ChannelInfo, info: FieldInfo, signal: str, unit: str) -> Guess:
-    item = {"topic": channel.name, "field": info.path} | ({"unit": unit} if unit else {})
-    return Guess(signal, 9.0, item, channel.count)
+def _of_format(channel: ChannelInfo, info: FieldInfo, signal: str, how: Mapping[str, Any]) -> Guess:
+    return Guess(signal, 9.0, {"topic": channel.name, "field": info.path, **how}, channel.count)
 
 
 def _of_vector(channel: ChannelInfo, parent: str, last: str, *, commanded: bool) -> tuple[str | None, float]:
@@ -122,6 +121,7 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     if found is None or found[0] in (TIME, LATITUDE, LONGITUDE):
         return
     unit = unit_in_name(info.path.rpartition(".")[2], found[0])
+    unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit
     if unit is not None:
         item["unit"] = unit
     if found[0] == "yaw_rad" and {"heading", "compass", "hdg"} & set(words_of(f"{channel.name} {info.path}")):

@@ -105,11 +105,13 @@ def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
 
 
 def _unmapped(path: Path, reader: Reader, options: ReadOptions) -> MappingError:
-    names = [c.name for c in reader.inventory(path, options, TableForm()).channels]
+    found = reader.inventory(path, options, TableForm())
+    names = [c.name for c in found.channels]
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     hint = f"write a mapping: `sysid inspect {shlex.quote(str(path))} --write-mapping {MAPPING_FILE}`"
-    if reader.name == "rosbag":
-        return MappingError(f"`{path}` is a bag and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
+    if found.by_topic:
+        what = "bag" if found.form.endswith("bag") else "log of topics"
+        return MappingError(f"`{path}` is a {what} and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
     close = _near_names(names)
     hint += f"; {close}" if close else ""
     if not any((said := canonical(n)) is not None and said.signal == TIME for n in names):

@@ -19,6 +19,8 @@ from fieldsid.logs.strangers import COPY_AGAIN, not_a_log
 from fieldsid.registry import members
 
 PACKAGE = "fieldsid.logs.readers"
+DEFINED = "message"
+"""The kind of a topic whose fields the format defines: its names are not guessed at."""
 WORTH_SALVAGING = 0.5
 """Share of a log from which what is left of it is worth taking."""
 
@@ -55,14 +57,14 @@ class RawLog:
 class FieldInfo:
     """One number inside a channel: its path (empty for a column), its type, first values, least and largest (a column's).
 
-    `means` is the signal it is by the definition of the format itself, with its unit there: None where that says none.
+    `means` is the signal that it is by the definition of the format itself, with what a mapping must say to read it.
     """
 
     path: str
     kind: str
     first: tuple[Any, ...]
     span: tuple[float, float] | None = None
-    means: tuple[str, str] | None = None
+    means: tuple[str, Mapping[str, Any]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,15 +16,14 @@ COPY_AGAIN = "where the vehicle's own file is larger, copy it again"
 """What helps where a log holds less than it should, and is true of any."""
 
 ULOG = b"ULog\x01\x12\x35"
+DATAFLASH = b"\xa3\x95\x80"
 ULOG_HEADER = 16
 """Bytes of a ULog file's header: signature, version and time of the start."""
 FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
     {
-        ULOG: ("a ULog file (PX4)", "`ulog2csv {path}`, of pyulog, writes a table of each topic: put the columns into one"),
-        b"\xa3\x95\x80": ("a DataFlash log (ArduPilot)", "make one table of its messages, with pymavlink's `mavlogdump.py`"),
-        b"MATLAB 5.0": ("a MATLAB file", "write a table from it: `writetable`"),
-        b"\x89HDF": ("an HDF5 file, as MATLAB 7.3 writes them too", "write a table from it"),
+        b"\x89HDF": ("an HDF5 file", "write a table from it"),
         b"PK\x03\x04": ("a ZIP file, as .xlsx and .npz are too", "unpack it, or write a table from it"),
+        b"\x54\xfe": ("an IMC log (DUNE, LSTS)", "export its messages as tables, with Neptus or imcjava, and make one of them"),
         b"BZh": ("a bzip2 file", "unpack it: `bunzip2 -k {path}`"),
         b"\xfd7zXZ\x00": ("an xz file", "unpack it: `unxz -k {path}`"),
         b"\x28\xb5\x2f\xfd": ("a zstd file", "unpack it: `unzstd {path}`"),
@@ -33,7 +32,7 @@ FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
 )
 """Binary formats by their signature: what they are, and how to make a log of them where there is a way."""
 NO_LOG = MappingProxyType({b"\x89PNG": "a picture", b"%PDF": "a document", b"\x7fELF": "a program"})
-READ_ELSEWHERE = (b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
+READ_ELSEWHERE = (ULOG, DATAFLASH, b"MATLAB ", b"dbd_label:", b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
 """How files start that another reader takes."""
 
 _OWN = re.compile(rb"^\s*\{?\s*[\"']?schema[\"']?\s*:\s*[\"']?(fieldsid/([a-z-]+)/\d+)", re.MULTILINE)
@@ -60,20 +59,18 @@ def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
     if own is not None:
         return _of_own(path, own[1].decode(), own[2].decode(), give)
     if head.startswith(READ_ELSEWHERE):
-        return LogError(f"`{path}` starts as a bag or a Parquet file does, and is none", found=size, hint=COPY_AGAIN)
+        return LogError(f"`{path}` starts as a log of another kind does, and is none", found=size, hint=COPY_AGAIN)
     for signature, (what, way) in FOREIGN.items():
         if head.startswith(signature):
-            return _of_foreign(path, signature, what, way.format(path=quote(str(path))))
+            return _of_foreign(path, what, way.format(path=quote(str(path))))
     for signature, what in NO_LOG.items():
         if head.startswith(signature):
             return LogError(f"`{path}` is {what}, not a log", found=size, hint=give)
     return LogError(f"`{path}` is no log this program reads", found=f"{size} with no known signature", hint=give)
 
 
-def _of_foreign(path: Path, signature: bytes, what: str, way: str) -> LogError:
+def _of_foreign(path: Path, what: str, way: str) -> LogError:
     size = path.stat().st_size
-    if signature == ULOG and size <= ULOG_HEADER:
-        return LogError(f"`{path}` is {what} without data", found=f"{size} bytes: its header", hint="take another log")
     return LogError(f"`{path}` is {what}, for which no reader is installed", found=f"{size} bytes", hint=way)
 
 

@@ -7,6 +7,7 @@ from operator import attrgetter
 import numpy as np
 import pytest
 from bags import MAPPING, write_bag
+from binary_logs import write_alog, write_dataflash, write_dbd, write_mat, write_ulog
 
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import LogError, MappingError
@@ -39,7 +40,54 @@ def as_bag(folder):
     return write_bag(folder / "log", "mcap", {"time_s": TIME, **SIGNALS}), mapping_of(MAPPING)
 
 
-MADE = {"csv_table": as_csv, "parquet": as_parquet, "rosbag": as_bag}
+def as_mat(folder):
+    return write_mat(folder / "log.mat", TIME, SIGNALS), None
+
+
+def by_topic(topics):
+    signals = {name: {"topic": topic, "field": field, "unit": SI[name]} for name, (topic, field) in topics.items()}
+    return mapping_of({"signals": signals})
+
+
+SI = {"yaw_rad": "rad", "yaw_rate_rad_s": "rad/s", "surge_m_s": "m/s", "rudder_rad": "rad"}
+
+
+def as_alog(folder):
+    return write_alog(folder / "log.alog", TIME, SIGNALS), by_topic({n: (n, "data") for n in SIGNALS})
+
+
+def as_ulog(folder):
+    return write_ulog(folder / "log.ulg", TIME, SIGNALS), by_topic({n: ("trial", n) for n in SIGNALS})
+
+
+def as_ardupilot(folder):
+    return write_dataflash(folder / "log.bin", TIME, SIGNALS), by_topic({n: ("TRI", f"S{k}") for k, n in enumerate(SIGNALS)})
+
+
+def as_slocum(folder):
+    return write_dbd(folder / "log.dbd", TIME, SIGNALS), by_topic({n: (n, "data") for n in SIGNALS})
+
+
+MADE = {
+    "csv_table": as_csv,
+    "parquet": as_parquet,
+    "rosbag": as_bag,
+    "mat": as_mat,
+    "alog": as_alog,
+    "ulog": as_ulog,
+    "ardupilot": as_ardupilot,
+    "slocum": as_slocum,
+}
+
+
+MISSPELT = {
+    "rosbag": Source(topic="/rudder_cm", path="data"),
+    "alog": Source(topic="rudder_rd", path="data"),
+    "ulog": Source(topic="trial", path="rudder_rd"),
+    "ardupilot": Source(topic="TRI", path="S33"),
+    "slocum": Source(topic="rudder_rd", path="data"),
+}
+"""Sources of logs of topics that are not there; all others are tables."""
 
 
 def test_every_reader_has_a_log_of_its_kind_in_this_suite():
@@ -111,17 +159,17 @@ def test_the_log_is_left_as_it_was(reader, log):
 
 def test_a_channel_that_is_not_there_is_an_error_with_near_names(reader, log):
     path, _ = log
-    source = Source(topic="/rudder_cm", path="data") if reader.name == "rosbag" else Source(column="rudder_rd")
+    source = MISSPELT.get(reader.name, Source(column="rudder_rd"))
     mapping = ChannelMap({"rudder_rad": source}, time=Source(column="time_s"), origin=path)
     with pytest.raises(MappingError) as error:
         load_run(path, mapping)
-    assert "rudder" in error.value.hint
+    assert ("S3" if reader.name == "ardupilot" else "rudder") in error.value.hint
     assert error.value.found
 
 
 def test_a_mapping_of_the_other_kind_is_an_error(reader, log):
     path, _ = log
-    other = Source(column="a") if reader.name == "rosbag" else Source(topic="/a")
+    other = Source(column="a") if reader.name in MISSPELT else Source(topic="/a")
     with pytest.raises(MappingError):
         load_run(path, ChannelMap({"yaw_rad": other}, time=Source(column="time_s"), origin=path))
 

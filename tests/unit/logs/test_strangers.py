@@ -24,13 +24,9 @@ def refused(path) -> LogError:
 @pytest.mark.parametrize(
     ("name", "content", "what", "hint"),
     [
-        ("a.ulg", ULOG, "is a ULog file (PX4) without data", "take another log"),
-        ("a.ulg", ULOG + bytes(range(256)) * 9, "is a ULog file (PX4), for which no reader is installed", "`ulog2csv "),
-        ("a.bin", b"\xa3\x95\x80" + bytes(900), "is a DataFlash log (ArduPilot), for which no reader", "`mavlogdump.py`"),
-        ("a.mat", b"MATLAB 5.0 MAT-file" + bytes(900), "is a MATLAB file, for which no reader", "`writetable`"),
         ("a.xlsx", b"PK\x03\x04" + bytes(900), "is a ZIP file, as .xlsx", "unpack it"),
         ("a.png", b"\x89PNG\r\n" + bytes(900), "is a picture, not a log", "give a log: "),
-        ("a.parquet", b"\x89MCAP", "starts as a bag or a Parquet file does, and is none", "copy it again"),
+        ("a.parquet", b"\x89MCAP", "starts as a log of another kind does, and is none", "copy it again"),
         ("a.dat", b"\x01\x02\x00\x04" * 200, "is no log this program reads", "give a log: "),
     ],
 )
@@ -65,7 +61,7 @@ def test_a_model_says_which_logs_it_was_made_from_and_a_mapping_how_it_is_given(
     model.write_text(f"schema: fieldsid/model/1\ninputs:\n- path: {log}\n  sha256: a\n- path: /gone.csv\n  sha256: b\n")
     assert refused(model).hint == f"give logs, such as those it was made from: `'{log}'`"
     model.write_text("schema: fieldsid/model/1\ninputs: {broken\n")
-    assert refused(model).hint.startswith("give a log: .csv")
+    assert refused(model).hint.startswith("give a log: .alog")
     mapping = tmp_path / "mapping.yaml"
     mapping.write_text("# mine\nschema: fieldsid/mapping/1\n")
     assert refused(mapping).hint == f"give it beside the log: `--mapping {mapping}`"

@@ -1,0 +1,130 @@
+"""Logs of topics, each with numbers on a clock of its own: what is in them, and the mapped fields; shared by several formats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import LogError, MappingError
+from fieldsid.logs.channels import COMBINED, ChannelMap, Source
+from fieldsid.logs.names import stated_unit, unit_in_name
+from fieldsid.logs.naming import stem_of
+from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo, Inventory, RawLog, Series
+from fieldsid.logs.run import FloatArray, Note
+from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.registry import near
+
+DATA = "data"
+"""Field of a topic that is one number."""
+Means = Mapping[str, tuple[str, Mapping[str, Any]]]
+"""What a format's own definition says: by `topic.field`, the signal and how a mapping reads it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One topic: time (n,) in s, its numbers (n,) by field, and the unit that the log states where it is one number."""
+
+    time: FloatArray
+    fields: Mapping[str, FloatArray]
+    unit: str | None = None
+    notes: tuple[Note, ...] = field(default=())
+
+
+def library(module: str, path: Path, what: str, extra: str) -> Any:
+    """Return an optional library; raises LogError that says what the log is, and the line that installs what reads it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        name = module.partition(".")[0]
+        raise LogError(
+            f"`{path}` is {what}, which is read with `{name}`, and that is not installed",
+            found=str(error),
+            hint=f"install it: `pip install 'fieldsid[{extra}]'`",
+        ) from error
+
+
+def inventory_of(
+    path: Path, form: str, topics: Mapping[str, Topic], means: Means, notes: tuple[Note, ...] = (), *, kind: str = DEFINED
+) -> Inventory:
+    """Return what is in a log of topics, all of them north-east-down; raises LogError where it holds none.
+
+    `kind` is what a topic is called; of what the format has defined nothing is guessed by its name.
+    """
+    _check_not_empty(path, topics)
+    channels = tuple(_channel(name, topics[name], means, kind) for name in sorted(topics))
+    ends = [(float(t.time[0]), float(t.time[-1])) for t in topics.values()]
+    duration = max(end for _, end in ends) - min(start for start, _ in ends)
+    return Inventory(path, form, duration, channels, notes=notes, frame="NED/FRD")
+
+
+def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
+    bare = name.partition("[")[0]
+    several = {p: m for key, m in means.items() if (p := key.removeprefix(f"{bare}.")) != key and ", " in p}
+    fields = [FieldInfo(p, "number", tuple(v[:3].tolist()), None, means.get(f"{bare}.{p}")) for p, v in topic.fields.items()]
+    fields += [
+        FieldInfo(p, "numbers", (), None, m) for p, m in several.items() if all(part in topic.fields for part in p.split(", "))
+    ]
+    steps = np.diff(topic.time)
+    rate = 1.0 / float(np.median(steps)) if steps.size and float(np.median(steps)) > 0.0 else float("nan")
+    return ChannelInfo(name, kind, int(topic.time.size), rate, tuple(fields), topic.unit)
+
+
+def _check_not_empty(path: Path, topics: Mapping[str, Topic]) -> None:
+    if not topics:
+        raise LogError(f"`{path}` has no data", found="no topic with a number and a time", hint=COPY_AGAIN)
+
+
+def raw_log_of(path: Path, topics: Mapping[str, Topic], mapping: ChannelMap, notes: tuple[Note, ...] = ()) -> RawLog:
+    """Return the mapped fields on the time from the first of them; raises MappingError for a topic or field that is not there."""
+    _check_not_empty(path, topics)
+    picked = {signal: _picked(path, topics, signal, source) for signal, source in mapping.sources.items()}
+    origin = min((float(s.time[0]) for s in picked.values()), default=0.0)
+    series = {signal: Series(s.time - origin, s.values, s.label, s.unit, s.is_height) for signal, s in picked.items()}
+    started = Note("time_origin", f"time 0 is {origin:.6f} s of the log's clock", {"origin_ns": round(origin * 1e9)})
+    return RawLog(stem_of(path), series, (*notes, started), one_clock=False)
+
+
+def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source) -> Series:
+    if source.topic is None:
+        raise MappingError(
+            f"`{signal}` is mapped to a {source.label}, but `{path}` is a log of topics",
+            found=source.label,
+            hint="name a `topic` and a `field`",
+        )
+    if source.topic not in topics:
+        raise MappingError(
+            f"`{path}` has no topic `{source.topic}` for `{signal}`",
+            found=", ".join(sorted(topics)[:12]),
+            hint=near(source.topic, list(topics)),
+        )
+    topic = topics[source.topic]
+    fields = [part.strip() for part in (source.path or DATA).split(",")]
+    for name in fields:
+        if name not in topic.fields:
+            raise MappingError(
+                f"topic `{source.topic}` has no field `{name}` for `{signal}`",
+                found=", ".join(topic.fields),
+                hint=near(name, list(topic.fields)),
+            )
+    values = [topic.fields[name] for name in fields]
+    label = f"{source.topic}.{source.path}" if source.path else source.topic
+    unit = None
+    if signal not in COMBINED:
+        unit = stated_unit(topic.unit, signal) if topic.unit else unit_in_name(fields[0], signal)
+    return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), label, unit)
+
+
+def topic_of(time: FloatArray, fields: Mapping[str, FloatArray], unit: str | None = None) -> Topic | None:
+    """Return a topic whose time increases, of equal times the last sample; None where there is no time."""
+    good = np.isfinite(time)
+    order = np.flatnonzero(good)[np.argsort(time[good], kind="stable")]
+    kept = order[np.append(np.diff(time[order]) > 0.0, True)] if order.size else order
+    if not kept.size:
+        return None
+    return Topic(time[kept], MappingProxyType({name: v[kept] for name, v in fields.items()}), unit)

@@ -1,0 +1,95 @@
+"""MOOS logs, .alog: a line for each posting, `time VARIABLE source value`; the variables that are numbers are topics."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.run import Note
+
+HEAD = 4096
+_ENU = {"frame": "ENU/FRD"}
+MEANS: Means = {
+    f"NAV_HEADING.{DATA}": ("yaw_rad", {"unit": "deg"}),
+    f"NAV_PITCH.{DATA}": ("pitch_rad", {"unit": "rad"}),
+    f"NAV_DEPTH.{DATA}": ("depth_m", {"unit": "m"}),
+    f"NAV_SPEED.{DATA}": ("surge_m_s", {"unit": "m/s"}),
+    f"NAV_X.{DATA}": ("x_m", {"unit": "m", **_ENU}),
+    f"NAV_Y.{DATA}": ("y_m", {"unit": "m", **_ENU}),
+    f"DESIRED_RUDDER.{DATA}": ("rudder_rad", {"unit": "deg"}),
+    f"DESIRED_ELEVATOR.{DATA}": ("elevator_rad", {"unit": "deg"}),
+    f"DESIRED_THRUST.{DATA}": ("thrust", {}),
+}
+"""The helm's own variables: heading from north, X east and Y north, fins in degrees."""
+
+
+def sniff(path: Path) -> bool:
+    """Whether a file has the logger's head."""
+    if path.is_dir():
+        return False
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    return head.startswith(b"%%") and b"%% LOGSTART" in head
+
+
+def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+    times: dict[str, list[float]] = {}
+    values: dict[str, list[float]] = {}
+    odd = 0
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            parts = line.split(None, 3)
+            if line.startswith("%") or len(parts) < 4:
+                odd += bool(parts) and not line.startswith("%")
+                continue
+            if not line.endswith("\n"):
+                odd += 1
+                continue
+            time, value = _number(parts[0]), _number(parts[3].strip())
+            if time is not None and value is not None:
+                times.setdefault(parts[1], []).append(time)
+                values.setdefault(parts[1], []).append(value)
+    found = {name: topic_of(np.array(t), {DATA: np.array(values[name])}) for name, t in times.items()}
+    message = f"lines of the log that are cut off or no posting, left out: {odd}"
+    return {n: t for n, t in found.items() if t is not None}, (Note("truncated", message, {"count": odd}),) if odd else ()
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:  # most variables are words
+        return None
+    return value if math.isfinite(value) else None
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the variables that are numbers, with count, rate and first values."""
+    topics, notes = _topics(path)
+    return inventory_of(path, "MOOS log", topics, MEANS, notes, kind="variable")
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped variables; raises MappingError for one that is not there."""
+    topics, notes = _topics(path)
+    return raw_log_of(path, topics, mapping, notes)
+
+
+def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return None: which fin is which is the vehicle's."""
+    return None
+
+
+READER = Reader(
+    name="alog",
+    says="MOOS log: .alog",
+    suffixes=(".alog",),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+    own_map=own_map,
+)

@@ -1,0 +1,145 @@
+"""MATLAB files, .mat: the columns of equal length among their variables and the fields of their structs; 7.3 by h5py."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._clock import clock_of
+from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
+from fieldsid.logs.readers._topics import library
+from fieldsid.logs.run import FloatArray
+from fieldsid.logs.strangers import COPY_AGAIN
+
+MAGIC = b"MATLAB "
+HDF5 = b"MATLAB 7.3"
+DEEPEST = 5
+SHORTEST = 3
+WIDEST = 64
+_FAILURES = (ValueError, TypeError, KeyError, IndexError, OSError, EOFError, NotImplementedError, OverflowError, MemoryError)
+
+
+def sniff(path: Path) -> bool:
+    """Whether a file has MATLAB's head."""
+    if path.is_dir():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
+
+
+def _columns(path: Path) -> Columns:
+    with path.open("rb") as stream:
+        is_hdf5 = stream.read(len(HDF5)) == HDF5
+    found = dict(_of_hdf5(path) if is_hdf5 else _of_mat(path))
+    lengths = Counter(v.size for v in found.values())
+    if not lengths:
+        raise LogError(
+            f"`{path}` holds no columns of numbers",
+            found="no variable or field of a struct with a row for each sample; `table` and `timeseries` are objects",
+            hint="save its columns: `save('log.mat', '-struct', 's')`, with `s = table2struct(T, 'ToScalar', true)`",
+        )
+    longest = max(lengths, key=lambda size: (lengths[size], size))
+    kept = {name: v for name, v in found.items() if v.size == longest}
+    names = tuple(kept)
+    return Columns(path, names, len(names), lambda i: kept[names[i]])
+
+
+def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
+    scipy_io = import_module("scipy.io")
+    try:
+        variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
+    except _FAILURES as error:
+        raise _damaged(path, error) from error
+    except Exception as error:  # scipy raises its own kind, and zlib another
+        if type(error).__module__.partition(".")[0] not in ("scipy", "zlib"):
+            raise
+        raise _damaged(path, error) from error
+    for name, value in variables.items():
+        if not name.startswith("__"):
+            yield from _walked(name, value, 0)
+
+
+def _walked(name: str, value: Any, depth: int) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the columns of a variable: itself, those of a matrix, and those of a struct's fields."""
+    if hasattr(value, "_fieldnames") and depth < DEEPEST:
+        for part in value._fieldnames:  # noqa: SLF001 - scipy's only list of a struct's fields
+            yield from _walked(part if depth == 0 else f"{name}.{part}", getattr(value, part), depth + 1)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        yield from _of_array(name, value)
+
+
+def _of_array(name: str, value: Any) -> Iterator[tuple[str, FloatArray]]:
+    if value.ndim == 1 and value.size >= SHORTEST:
+        yield name, value.astype(np.float64)
+    elif value.ndim == 2 and min(value.shape) <= WIDEST and max(value.shape) >= SHORTEST:
+        rows = value if value.shape[0] >= value.shape[1] else value.T
+        for i in range(rows.shape[1]):
+            yield f"{name}({i + 1})", rows[:, i].astype(np.float64)
+
+
+def _of_hdf5(path: Path) -> Iterator[tuple[str, FloatArray]]:
+    h5py = library("h5py", path, "a MATLAB 7.3 file", "matlab")
+    found: list[tuple[str, FloatArray]] = []
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not name.startswith("#"):
+            found.extend(_of_array(name.rpartition("/")[2], np.squeeze(np.asarray(item))))
+
+    try:
+        with h5py.File(str(path), "r") as file:
+            file.visititems(visit)
+    except _FAILURES as error:
+        raise _damaged(path, error) from error
+    yield from found
+
+
+def _damaged(path: Path, error: Exception) -> LogError:
+    found = f"{type(error).__name__}: {error}"[:160]
+    return LogError(f"`{path}` is a MATLAB file that cannot be read", found=found, hint=COPY_AGAIN)
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the columns with their count of numbers, rate and first values; raises LogError where there are none."""
+    columns = _columns(path)
+    clock = clock_of(columns, options.clock)
+    channels = tuple(
+        ChannelInfo(
+            name,
+            "number",
+            int(np.isfinite(values).sum()),
+            clock.rate_hz(values) if clock else float("nan"),
+            (FieldInfo("", "number", tuple(values[:3].tolist())),),
+        )
+        for name, values in ((n, columns.take(i)) for i, n in enumerate(columns.names))
+    )
+    samples = samples_of(columns, clock.time, clock.source) if clock else None
+    return Inventory(path, "MATLAB file", clock.duration_s if clock else float("nan"), channels, samples=samples)
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped columns; raises MappingError for one that is not there."""
+    return series_of(path, _columns(path), mapping, (), options)
+
+
+def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return the mapping of a file with canonical names, or None."""
+    return own_map_of(_columns(path).names)
+
+
+READER = Reader(
+    name="mat",
+    says="MATLAB file: .mat, of version 7.3 with the extra `matlab`",
+    suffixes=(".mat",),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+    own_map=own_map,
+)

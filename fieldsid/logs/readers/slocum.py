@@ -1,0 +1,119 @@
+"""Logs of Slocum gliders, .dbd and its kin, read by dbdreader (extra `slocum`): each sensor on the times it was written at."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, library, raw_log_of, topic_of
+from fieldsid.logs.run import Note
+from fieldsid.logs.strangers import COPY_AGAIN
+
+LABEL = b"dbd_label:"
+BINARY = b"dinkum_binary_data"
+END = b"X"
+HEAD = 2048
+MEANS: Means = {
+    f"m_heading.{DATA}": ("yaw_rad", {"unit": "rad"}),
+    f"m_pitch.{DATA}": ("pitch_rad", {"unit": "rad"}),
+    f"m_roll.{DATA}": ("roll_rad", {"unit": "rad"}),
+    f"m_depth.{DATA}": ("depth_m", {"unit": "m"}),
+    f"m_fin.{DATA}": ("rudder_measured_rad", {"unit": "rad"}),
+    f"c_fin.{DATA}": ("rudder_rad", {"unit": "rad"}),
+}
+"""The glider's own sensors: heading from north, pitch up, the fin its rudder; `c_` is commanded, `m_` measured."""
+_CACHE = re.compile(rb"sensor_list_crc:\s*(\w+)")
+_FACTORED = re.compile(rb"sensor_list_factored:\s*1")
+_FAILURES = (ValueError, KeyError, IndexError, TypeError, OSError, UnicodeDecodeError)
+
+
+def sniff(path: Path) -> bool:
+    """Whether a file has the head of a glider's binary log."""
+    if path.is_dir():
+        return False
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    return head.startswith(LABEL) and BINARY in head[:100]
+
+
+def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
+    dbdreader = library("dbdreader", path, "a Slocum glider's log", "slocum")
+    folder = _cache_of(path)
+    try:
+        # The list of sensors of a log that brings its own is written to the cache: not beside the log.
+        with TemporaryDirectory() as own:
+            log = dbdreader.DBD(str(path), cacheDir=str(folder or own))
+            names = [n for n in log.parameterNames if wanted is None or n in wanted]
+            found = {n: _sensor(log, n) for n in names}
+            log.close()
+    except (*_FAILURES, dbdreader.DbdError) as error:
+        what = f"`{path}` is a Slocum glider's log that cannot be read"
+        raise LogError(what, found=f"{type(error).__name__}: {error}"[:160], hint=COPY_AGAIN) from error
+    return {n: topic for n, topic in found.items() if topic is not None}
+
+
+def _sensor(log: Any, name: str) -> Topic | None:
+    time, values = log.get(name)
+    return topic_of(np.asarray(time, dtype=np.float64), {DATA: np.asarray(values, dtype=np.float64)}, log.parameterUnits[name])
+
+
+def _cut(path: Path) -> tuple[Note, ...]:
+    """Return the note that a log is cut off: the glider closes it with a mark."""
+    with path.open("rb") as stream:
+        stream.seek(-1, 2)
+        is_whole = stream.read(1) == END
+    return () if is_whole else (Note("truncated", "the log is cut off: it does not end with the glider's mark", {}),)
+
+
+def _cache_of(path: Path) -> Path | None:
+    """Return the folder of the list of sensors that a log refers to, None where it brings the list; raises LogError."""
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    found = _CACHE.search(head)
+    if found is None or not _FACTORED.search(head):
+        return None
+    crc = found[1].decode()
+    folders = (path.parent, path.parent / "cache", path.parent.parent / "cache")
+    for folder in folders:
+        if any((folder / f"{name}{suffix}").is_file() for name in (crc, crc.upper()) for suffix in (".cac", ".ccc", ".CAC")):
+            return folder
+    raise LogError(
+        f"`{path}` leaves the list of its sensors to a file that is not there",
+        found=f"no `{crc}.cac` in {', '.join(f'`{f}`' for f in folders)}",
+        hint="copy it from the glider's or the dock server's cache folder beside the log",
+    )
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the sensors that were written, with count, rate and first values; raises LogError, also without dbdreader."""
+    return inventory_of(path, "Slocum glider log", _topics(path), MEANS, _cut(path))
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped sensors; raises MappingError for one that is not there, LogError as `inventory` does."""
+    wanted = {source.topic for source in mapping.sources.values() if source.topic is not None}
+    topics = _topics(path, wanted or None)
+    return raw_log_of(path, topics if wanted <= topics.keys() else _topics(path), mapping, _cut(path))
+
+
+def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return None: its sensors have the glider's names."""
+    return None
+
+
+READER = Reader(
+    name="slocum",
+    says="Slocum glider log: .dbd, .ebd and their kin, with the extra `slocum`",
+    suffixes=(".dbd", ".ebd", ".mbd", ".nbd", ".sbd", ".tbd"),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+    own_map=own_map,
+)

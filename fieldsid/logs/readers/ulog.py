@@ -1,0 +1,93 @@
+"""PX4 logs, .ulg, read by pyulog (extra `ulog`): each topic of the flight stack with its fields, north-east-down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
+from fieldsid.logs.run import Note
+from fieldsid.logs.strangers import COPY_AGAIN, ULOG, ULOG_HEADER
+
+MESSAGE_HEADER = 3
+"""Bytes before a message's body: its length and its type."""
+MEANS: Means = {
+    "vehicle_attitude.q[0], q[1], q[2], q[3]": ("attitude", {"order": "wxyz"}),
+    "vehicle_angular_velocity.xyz[0]": ("roll_rate_rad_s", {"unit": "rad/s"}),
+    "vehicle_angular_velocity.xyz[1]": ("pitch_rate_rad_s", {"unit": "rad/s"}),
+    "vehicle_angular_velocity.xyz[2]": ("yaw_rate_rad_s", {"unit": "rad/s"}),
+    "vehicle_local_position.x": ("x_m", {}),
+    "vehicle_local_position.y": ("y_m", {}),
+    "vehicle_local_position.z": ("depth_m", {}),
+}
+"""What the definitions of PX4's own topics say."""
+
+
+def sniff(path: Path) -> bool:
+    """Whether a file has the signature."""
+    if path.is_dir():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(ULOG)) == ULOG
+
+
+def _topics(path: Path) -> dict[str, Topic]:
+    size = path.stat().st_size
+    if size <= ULOG_HEADER:
+        what = f"`{path}` is a ULog file (PX4) without data"
+        raise LogError(what, found=f"{size} bytes: its header", hint="take another log")
+    pyulog = library("pyulog", path, "a ULog file (PX4)", "ulog")
+    try:
+        with path.open("rb") as stream:
+            log = pyulog.ULog(stream)
+    except Exception as error:  # pyulog has no error of its own for what it cannot parse
+        found = f"{type(error).__name__}: {error}"[:160]
+        raise LogError(f"`{path}` is a damaged ULog file", found=found, hint=COPY_AGAIN) from error
+    topics = {}
+    for part in log.data_list:
+        fields = {n: np.asarray(v, dtype=np.float64) for n, v in part.data.items() if n != "timestamp"}
+        stamps = np.asarray(part.data["timestamp"], dtype=np.float64) / 1e6
+        topic = topic_of(stamps, fields)
+        if topic is not None:
+            topics[f"{part.name}[{part.multi_id}]" if part.multi_id else part.name] = topic
+    return topics
+
+
+def _cut(path: Path) -> tuple[Note, ...]:
+    """Return the note that a log is cut off inside a message."""
+    size, at = path.stat().st_size, ULOG_HEADER
+    with path.open("rb") as stream:
+        while at + MESSAGE_HEADER <= size:
+            stream.seek(at)
+            at += MESSAGE_HEADER + int.from_bytes(stream.read(2), "little")
+    return () if at == size else (Note("truncated", "the log is cut off inside a message, which was left out", {}),)
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the topics with count, rate and first values; raises LogError for a damaged file, or without pyulog."""
+    return inventory_of(path, "ULog", _topics(path), MEANS, _cut(path))
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
+    return raw_log_of(path, _topics(path), mapping, _cut(path))
+
+
+def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return None: which output is which fin is the vehicle's."""
+    return None
+
+
+READER = Reader(
+    name="ulog",
+    says="PX4 log: .ulg, with the extra `ulog`",
+    suffixes=(".ulg",),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+    own_map=own_map,
+)
