@@ -10,7 +10,6 @@ import numpy as np
 
 from fieldsid.fitting.colour import chosen_noise
 from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations
-from fieldsid.fitting.free_run_covariance import corrected
 from fieldsid.fitting.grow import grown_start
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
@@ -18,6 +17,7 @@ from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import lines_of, restricted_likelihood
 from fieldsid.fitting.small_sample import FEWEST_DEGREES_PLAIN, LONG, noise_spread, widened
 from fieldsid.fitting.unbounded import refuse_unbounded
+from fieldsid.fitting.uncertainty import corrected
 from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray

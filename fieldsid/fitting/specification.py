@@ -13,10 +13,10 @@ import numpy as np
 
 from fieldsid.fitting.descent import covariance, descend
 from fieldsid.fitting.fin_history import BLOCK_S, block_means, columns_of
-from fieldsid.fitting.free_run_covariance import coloured_covariance
 from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.restricted import ENOUGH, generalised, lines_of
 from fieldsid.fitting.tails import chi_square_tail, f_tail
+from fieldsid.fitting.uncertainty import coloured_covariance
 from fieldsid.fitting.weights import white_weights
 from fieldsid.fitting.whitening import noise_vector, whiten
 from fieldsid.logs.run import FloatArray
