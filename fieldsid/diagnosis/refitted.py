@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.estimators.output_error import coloured_covariance
 from fieldsid.fitting.descent import covariance, descend, normal_equations
 from fieldsid.fitting.fit import model_of
 from fieldsid.fitting.method import Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
 from fieldsid.fitting.predict import refit_own
-from fieldsid.fitting.uncertainty import coloured_covariance
 from fieldsid.fitting.weights import white_weights
 from fieldsid.models.model import Model
 

@@ -6,18 +6,20 @@ missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fieldsid.fitting.colour import chosen_noise
-from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations
+from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations, sandwich
 from fieldsid.fitting.grow import grown_start
 from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.problem import Problem, RunResult
 from fieldsid.fitting.restricted import lines_of, restricted_likelihood
 from fieldsid.fitting.small_sample import FEWEST_DEGREES_PLAIN, LONG, noise_spread, widened
 from fieldsid.fitting.unbounded import refuse_unbounded
-from fieldsid.fitting.uncertainty import corrected
+from fieldsid.fitting.uncertainty import middle
 from fieldsid.fitting.weights import squares_of
 from fieldsid.fitting.whitening import noise_vector
 from fieldsid.logs.run import FloatArray
@@ -88,6 +90,25 @@ def _found_over_parts(problem: Problem) -> tuple[Descent, Noise]:
     return descend(problem, found.x, new, tolerance=CLOSE, damping=NEAR), new
 
 
+def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
+    """Return the covariance (F, F) of an output-error estimate under a noise model of any colour."""
+    _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
+    return _sandwich(problem, found, weights, noise_vector(noise), normal, results)
+
+
+def _sandwich(
+    problem: Problem, found: Descent, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult]
+) -> FloatArray:
+    sigma = np.array([weights.angle, weights.rate])
+    place = {slot: i for i, slot in enumerate(found.free)}
+    centre = np.zeros_like(normal)
+    for record, result in zip(problem.records, results, strict=True):
+        weighted = np.where(record.ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
+        index = np.array([place[s] for s in result.slots])
+        centre[np.ix_(index, index)] += middle(record, noise, result.base.damping, result.base.stiffness, weighted)
+    return sandwich(normal, centre)
+
+
 def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, family: str) -> FloatArray:
     """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
     if family == "white":
@@ -95,12 +116,12 @@ def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, famil
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
     vector = noise_vector(noise)
     if sum(len(r) for r in problem.records) > LONG:
-        return corrected(problem, found, weights, vector, normal, results)
+        return _sandwich(problem, found, weights, vector, normal, results)
     lines, count = lines_of(problem, found.x), len(problem.layout.slots)
     spread = noise_spread(lambda v: restricted_likelihood(lines, count, v), vector, family)
     still = found.x[list(found.free)]
     return widened(
-        lambda v: (still, corrected(problem, found, weights, v, normal, results)), vector, family, spread, FEWEST_DEGREES_PLAIN
+        lambda v: (still, _sandwich(problem, found, weights, v, normal, results)), vector, family, spread, FEWEST_DEGREES_PLAIN
     )
 
 

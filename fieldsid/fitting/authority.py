@@ -14,9 +14,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fieldsid.fitting.choice import share_of_fin
 from fieldsid.fitting.descent import covariance, descend
 from fieldsid.fitting.feedback import feedback
-from fieldsid.fitting.fin_history import share_of_fin
 from fieldsid.fitting.method import Solution
 from fieldsid.fitting.problem import Problem
 from fieldsid.logs.run import FloatArray, Note

@@ -10,7 +10,7 @@ import numpy as np
 from fieldsid.display import Plotted
 from fieldsid.effects import refuse_clash
 from fieldsid.errors import DataError, UsageError
-from fieldsid.fitting.choice import best_start, chosen
+from fieldsid.fitting.choice import is_disturbed, keeps_free_run
 from fieldsid.fitting.colour import whiteness
 from fieldsid.fitting.estimates import estimates
 from fieldsid.fitting.judge import findings
@@ -22,6 +22,7 @@ from fieldsid.fitting.problem import Problem
 from fieldsid.fitting.remarks import remarks
 from fieldsid.fitting.suspects import suspects
 from fieldsid.fitting.trim_law import groups_by_trim
+from fieldsid.fitting.weights import white_weights
 from fieldsid.logs.run import FloatArray, Note
 from fieldsid.logs.segments import excursions
 from fieldsid.models.axis import NAMES, Axis
@@ -74,8 +75,8 @@ def fit(
 ) -> Fit:
     """Return the joint fit of records on one axis.
 
-    method "auto" is output error, and the prediction-error method where a disturbance, and no missing effect, colours
-    the residuals. Raises DataError for records too short or
+    method "auto" is output error, and the prediction-error method where the residuals are coloured by a
+    disturbance that does not follow the fin (a missing effect does). Raises DataError for records too short or
     without fin movement, UsageError for a method that cannot take the effects or several runs, EffectError for two effects
     that cannot be in one model.
     """
@@ -87,22 +88,23 @@ def fit(
 
 
 def _solve(problem: Problem, method: str, options: Options) -> Solution:
-    first: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "output_error" if method == AUTO else method)
-    if problem.layout.effects and not first.takes_effects:
+    chosen: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "output_error" if method == AUTO else method)
+    if problem.layout.effects and not chosen.takes_effects:
         raise UsageError(
-            f"`{first.name}` cannot estimate effects",
+            f"`{chosen.name}` cannot estimate effects",
             found=", ".join(e.name for e in problem.layout.effects),
             hint="use `--method output_error`",
         )
-    if len(problem.records) > 1 and not first.joint:
+    if len(problem.records) > 1 and not chosen.joint:
         raise UsageError(
-            f"`{first.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out"
+            f"`{chosen.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out"
         )
-    solution = first.solve(problem, options)
-    if method == AUTO:
+    solution = chosen.solve(problem, options)
+    if method == AUTO and is_disturbed(problem, solution):
         finer: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
-        plain = solution
-        solution = chosen(problem, plain, lambda: finer.refined(problem, plain, options))
+        refined = finer.solve(problem, options)
+        if keeps_free_run(problem, solution, refined, white_weights(problem, solution.x)):
+            solution = refined
     if not solution.own_done:
         x = solution.x
         for run, record in enumerate(problem.records):
@@ -155,9 +157,7 @@ def fitted(problem: Problem, solution: Solution) -> Fit:
     names = problem.layout.names
     notes = (*remarks(problem, solution, floor), *suspects(problem, solution), *findings(problem, solution), *solution.notes)
     model = model_of(problem, solution)
-    # a start of least prediction error is not that of the best free run, which every other command shows
-    shown = solution.x if solution.weights is None else best_start(problem, solution.x, floor)
-    predictions = tuple(prediction_of(problem, shown, run) for run in range(len(problem.records)))
+    predictions = tuple(prediction_of(problem, solution.x, run) for run in range(len(problem.records)))
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(sigma, sigma)
     order = [names.index(n) for n in model.free]
