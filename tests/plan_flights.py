@@ -18,9 +18,9 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.planning.candidate import Candidate, Window, asked_of
-from fieldsid.planning.rule_flight import fly_scenes
-from fieldsid.planning.scene import autopilot_of, scene_of
+from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
+from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
+from fieldsid.planning.flight.rule_flight import fly_operating_points
 
 SENSOR = float(np.radians(0.3))
 PAPER = {1.07: (1.04, -0.62, -0.0086), 1.36: (1.11, -0.86, -0.0082), 2.19: (1.10, -1.83, -0.0021)}
@@ -59,16 +59,16 @@ def exact(day: Day) -> Model:
     return believed(day, relative=0.01, offset=1.0)
 
 
-def orders(day: Day, candidate: Candidate, window: Window) -> TruthManeuver:
+def orders(day: Day, candidate: Excitation, window: Window) -> TruthManeuver:
     """What the truth is told: the planned command about its own trim, or its own zig-zag rule for as long as planned."""
     if candidate.record.rule is None:
         asked = asked_of(candidate, window)
         trim = np.where(np.isnan(asked), 0.0, -day.physics.trim / day.physics.authority)
         return TruthManeuver("planned", np.nan_to_num(asked) + trim, np.where(np.isnan(asked), kernel.HOLD, kernel.OPEN))
-    scene = scene_of(exact(day), day.speed)
+    scene = operating_point(exact(day), day.speed)
     limits = Limits(day.physics.fin_limit)
     schedule = Schedule(window.rate_hz, window.lead, window.recover)
-    flight = fly_scenes(
+    flight = fly_operating_points(
         [scene],
         candidate.record,
         candidate.parameters,
@@ -86,7 +86,7 @@ def orders(day: Day, candidate: Candidate, window: Window) -> TruthManeuver:
     return TruthManeuver("zigzag", np.zeros(time.size), np.where(inside, kernel.ZIGZAG, kernel.HOLD), settings)
 
 
-def flown(day: Day, candidate: Candidate, window: Window, seed: int) -> Run:
+def flown(day: Day, candidate: Excitation, window: Window, seed: int) -> Run:
     """A candidate flown by the truth and measured with the day's noise."""
     rng = np.random.default_rng(seed)
     size = window.time.size
@@ -106,7 +106,7 @@ def flown(day: Day, candidate: Candidate, window: Window, seed: int) -> Run:
     return Run("planned", motion.time, signals)
 
 
-def scatter(day: Day, candidate: Candidate, window: Window, seeds: range, method: str = "output_error") -> dict[str, float]:
+def scatter(day: Day, candidate: Excitation, window: Window, seeds: range, method: str = "output_error") -> dict[str, float]:
     """Standard deviation of every fitted parameter over seeds: the standard error as it really is."""
     found = []
     for seed in seeds:

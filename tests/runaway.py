@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from cli import trial
 
+from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.simulate import command_record, simulate
 
 SECONDS, SAMPLE, SPEED = 250.0, 0.05, 1.4
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldsid.fitting.descent import normal_equations
-from fieldsid.fitting.lean import lean
+from fieldsid.fitting.optimise.levenberg_marquardt import normal_equations
+from fieldsid.fitting.optimise.linear_white import linear_white
 
 
 def compare_with_the_general_core(problem, x, noise, *, gradient_near):
     """Compare cost, normal matrix and gradient at x, the gradient to the share gradient_near of its largest entry."""
     free = tuple(range(x.size))
-    short = lean(problem, noise, free)
+    short = linear_white(problem, noise, free)
     assert short is not None
     cost, normal, gradient = short.linear(x)
     expected = normal_equations(problem, x, noise, free)

@@ -9,8 +9,8 @@ import pytest
 from cli import trial
 
 import fieldsid
-from fieldsid.cli.catalogue import entries
-from fieldsid.cli.front import command_list
+from fieldsid.cli.help.catalogue import entries
+from fieldsid.cli.help.help_page import command_list
 from fieldsid.fitting.fit import estimators
 from fieldsid.logs.run import SIGNALS
 

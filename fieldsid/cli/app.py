@@ -8,6 +8,8 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
+from fieldsid.cli.exit_codes import DONE, INTERRUPTED
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Never
@@ -16,8 +18,7 @@ if TYPE_CHECKING:
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
-DONE, GATE_FAILED, BAD_INPUT, OUR_BUG, INTERRUPTED = 0, 1, 2, 3, 130
-LITTER = 50_000
+GC_THRESHOLD = 50_000
 """Things made since the last look from which on Python looks for what can be given back. What is imported and compiled makes
 millions that stay: looking at Python's own pace takes a fifth of the time of compiling, a twentieth of a tour."""
 
@@ -46,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def entry() -> Never:
     """Run the command line of this process and end it."""
-    gc.set_threshold(LITTER)
+    gc.set_threshold(GC_THRESHOLD)
     codes: list[int] = []
     atexit.register(_end, codes)  # what is registered first is called last
     codes.append(main())
@@ -71,7 +72,7 @@ def run(arguments: Sequence[str]) -> Any:
     """
     from importlib import import_module
 
-    from fieldsid.cli.catalogue import entries
+    from fieldsid.cli.help.catalogue import entries
 
     known = entries()
     name = arguments[0]
@@ -79,7 +80,7 @@ def run(arguments: Sequence[str]) -> Any:
         raise _unknown(name, tuple(known))
     import typer
 
-    from fieldsid.cli.own import load_own_effects
+    from fieldsid.cli.user_effects import load_own_effects
 
     if "--help" not in arguments:
         load_own_effects()
@@ -94,8 +95,8 @@ def run(arguments: Sequence[str]) -> Any:
 
 def _dispatch(arguments: list[str]) -> int:
     if not arguments or arguments[0] in {"--help", "-h", "help"}:
-        from fieldsid.cli.catalogue import entries
-        from fieldsid.cli.front import front_page
+        from fieldsid.cli.help.catalogue import entries
+        from fieldsid.cli.help.help_page import front_page
 
         sys.stdout.write(front_page(entries()))
         return DONE

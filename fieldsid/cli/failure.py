@@ -14,7 +14,7 @@ from pathlib import Path
 import typer
 
 from fieldsid._version import __version__
-from fieldsid.cli.app import BAD_INPUT, INTERRUPTED, OUR_BUG
+from fieldsid.cli.exit_codes import BAD_INPUT, INTERRUPTED, OUR_BUG
 from fieldsid.errors import FieldsidError, UsageError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

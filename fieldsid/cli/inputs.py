@@ -11,13 +11,13 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldsid.copies import copied, read_back, written
 from fieldsid.errors import FieldsidError, UsageError
+from fieldsid.runtime.worker_pool import dumps, fork_worker, loads
 
 if TYPE_CHECKING:
     from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
-    from fieldsid.logs.sifting import Refused
+    from fieldsid.logs.several.sifting import Refused
 
 STDIN = Path("-")
 READING = ("pandas", "pyarrow")
@@ -56,8 +56,8 @@ def read_groups(
     refused: Refused[Path] | None = None,
 ) -> list[list[Run]]:
     """Return the runs of several groups of files, each with a name no other has; as `read_runs` does, for each group."""
-    from fieldsid.logs.naming import refuse_twice
-    from fieldsid.logs.sifting import attempt, sifted
+    from fieldsid.logs.several.run_names import refuse_twice
+    from fieldsid.logs.several.sifting import attempt, sifted
 
     paths = [path for group in groups for path in group]
     if paths.count(STDIN) > 1:
@@ -77,7 +77,7 @@ def read_groups(
 
 def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> list[Run]:
     """Return the runs with names that no two share, the same whichever of the files can be read."""
-    from fieldsid.logs.naming import names_apart, stem_of
+    from fieldsid.logs.several.run_names import names_apart, stem_of
 
     own = dict(zip(paths, names_apart([stem_of(path) for path in paths], paths), strict=True))
     return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
@@ -92,14 +92,14 @@ def mapping_of(path: Path | None) -> ChannelMap | None:
     """Return what a mapping file says: what is wrong with it is wrong for all logs."""
     if path is None:
         return None
-    from fieldsid.logs.mapping import load_mapping
+    from fieldsid.logs.mapping.mapping_file import load_mapping
 
     return load_mapping(path)
 
 
 def refuse_swapped(command: str, model: Path, runs: Sequence[Path]) -> None:
     """Raise UsageError where a model stands among the runs and something else in its place."""
-    from fieldsid.logs.strangers import own_kind
+    from fieldsid.logs.unknown_file import own_kind
 
     models = [path for path in runs if own_kind(path) == "model"]
     if own_kind(model) == "model" or not models:
@@ -128,13 +128,13 @@ def _read_beside(
     read: Callable[[Path], Run], paths: Sequence[Path], check: Callable[[], None], meanwhile: Callable[[], None]
 ) -> list[Run | FieldsidError] | None:
     """Return the runs as a copy of this process read them, or why not; None where it did not: what is wrong is met again here."""
-    from fieldsid.logs.sifting import attempt
+    from fieldsid.logs.several.sifting import attempt
 
-    copy = copied(lambda: written([attempt(read, path) for path in paths]))
+    copy = fork_worker(lambda: dumps([attempt(read, path) for path in paths]))
     if copy is None:
         return None
     with copy:
         check()
         meanwhile()
         answer = copy.answer()
-    return None if answer is None else read_back(answer)
+    return None if answer is None else loads(answer)

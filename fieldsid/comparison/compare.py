@@ -10,14 +10,14 @@ from fieldsid.comparison.localize import Place, Stretch, places, stretches
 from fieldsid.comparison.metrics import Metrics, metrics
 from fieldsid.comparison.residuals import Companion, companions
 from fieldsid.display import Brief, Plotted
-from fieldsid.fitting.merit import Merit, merit
-from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.predict import Prediction, predict
+from fieldsid.dynamics.free_run import base_at
+from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit, goodness_of_fit
+from fieldsid.fitting.predict.predict import Prediction, predict
 from fieldsid.logs.run import Run
-from fieldsid.logs.sifting import Refused, attempt, sifted
+from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
-from fieldsid.models.simulate import base_at
+from fieldsid.noise.white_floor import white_noise_floor
 
 DOWN_TO_NOISE = 1.15
 """Rms over the noise up to which a channel has nothing left to show: the noise is itself an estimate."""
@@ -44,7 +44,7 @@ class Comparison(Plotted):
     """One run: free run, merit, noise floor, its channels, the one furthest above its floor first, and the model."""
 
     shown: Prediction
-    merit: Merit
+    merit: GoodnessOfFit
     floor: Noise
     channels: tuple[Channel, ...]
     moves_with: tuple[Companion, ...]
@@ -90,13 +90,15 @@ def compare_one(model: Model, run: Run) -> Comparison:
     shown = predict(model, record)
     base = base_at(model, record.speed)
     trim = -base.trim / base.authority if base.authority != 0.0 else 0.0
-    floor = floor_of([record])
-    return Comparison(shown, merit([shown]), floor, _channels(shown, floor, trim), companions(shown, base.damping), model)
+    floor = white_noise_floor([record])
+    return Comparison(
+        shown, goodness_of_fit([shown]), floor, _channels(shown, floor, trim), companions(shown, base.damping), model
+    )
 
 
 def _channels(shown: Prediction, floor: Noise, trim: float) -> tuple[Channel, ...]:
     """Return the measured channels, the one furthest above its floor first; trim is the fin at rest in rad."""
-    record, found = shown.record, merit([shown])
+    record, found = shown.record, goodness_of_fit([shown])
     parts = (("angle", found.angle_rms / floor.angle), ("rate", found.rate_rms / floor.rate))
     cases = conditions(record, shown.rate, trim)
     channels = []

@@ -11,17 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 Mask = npt.NDArray[np.bool_]
 
 ONSET_S = 1.0
 """Time after a fin movement that counts as onset."""
-MOVED = 0.1
+MIN_MOVE_RANGE_SHARE = 0.1
 """Share of the fin's range that is a movement, or an angle off trim."""
-TURNING = 0.1
+MIN_TURNING_RATE_SHARE = 0.1
 """Share of the largest rate below which the vehicle goes straight."""
 LEAST_SPREAD = {"surge": 0.05, "depth": 0.5}
 """Spread (m/s as a share of the median; m) below which a signal makes no conditions."""
@@ -54,10 +54,10 @@ def _phases(record: Record, trim: float) -> Iterator[Condition]:
     reach = float(np.ptp(record.fin))
     if reach == 0.0:
         return
-    moved = np.abs(np.diff(record.fin, prepend=record.fin[0])) > MOVED * reach
+    moved = np.abs(np.diff(record.fin, prepend=record.fin[0])) > MIN_MOVE_RANGE_SHARE * reach
     last = np.maximum.accumulate(np.where(moved, record.time, -np.inf))
     onset = record.time - last < ONSET_S
-    away = np.abs(record.fin - trim) > MOVED * reach
+    away = np.abs(record.fin - trim) > MIN_MOVE_RANGE_SHARE * reach
     begun = np.maximum.accumulate(moved | away)
     yield Condition("phase: before", ~begun)
     yield Condition("phase: onset", begun & onset)
@@ -85,7 +85,7 @@ def _thirds(what: str, size: FloatArray, unit: str) -> Iterator[Condition]:
 
 
 def _side(record: Record, rate: FloatArray) -> Iterator[Condition]:
-    least = TURNING * float(np.max(np.abs(rate)))
+    least = MIN_TURNING_RATE_SHARE * float(np.max(np.abs(rate)))
     up, down = ("starboard", "port") if record.axis is Axis.YAW else ("nose up", "nose down")
     yield Condition(f"side: {up}", rate > least)
     yield Condition(f"side: {down}", rate < -least)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.comparison.conditions import Condition, Mask
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
 
 SMALLEST_SHARE = 0.02
 """Share of the samples below which a condition says nothing."""
-WINDOW_S = 2.0
+STRETCH_WINDOW_S = 2.0
 JOIN_S = 0.5
 MOST_STRETCHES = 3
 
@@ -69,7 +69,7 @@ def stretches(time: FloatArray, square: FloatArray, ok: Mask) -> tuple[Stretch, 
     found: list[Stretch] = []
     while total > 0.0 and len(found) < MOST_STRETCHES:
         sums = np.concatenate([[0.0], np.cumsum(left)])
-        ends = np.searchsorted(time, time + WINDOW_S, side="right")
+        ends = np.searchsorted(time, time + STRETCH_WINDOW_S, side="right")
         inside = sums[ends] - sums[:-1]
         first = int(np.argmax(inside))
         last = int(ends[first]) - 1

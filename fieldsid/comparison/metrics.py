@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.predict import Prediction
-from fieldsid.fitting.whiteness import LEAST, white_p
-from fieldsid.logs.run import FloatArray
+from fieldsid.fitting.predict.predict import Prediction
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.ljung_box import FEWEST_SAMPLES, ljung_box_p
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def r_squared(measured: FloatArray, simulated: FloatArray) -> float:
 
 def whiteness_p(residual: FloatArray) -> float:
     """Return the probability of a residual at least as coloured as this one if it were white; NaN when too short."""
-    return white_p([residual]) if residual.size >= LEAST else float("nan")
+    return ljung_box_p([residual]) if residual.size >= FEWEST_SAMPLES else float("nan")
 
 
 def _rms(values: FloatArray) -> float:

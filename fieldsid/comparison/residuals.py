@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.predict import Prediction
-from fieldsid.logs.run import FloatArray
+from fieldsid.fitting.predict.predict import Prediction
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 BLOCK_S = 0.25
 FEWEST_BLOCKS = 20

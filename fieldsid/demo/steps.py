@@ -17,7 +17,7 @@ from fieldsid.demo.trial import CHECK_SPEEDS, PLANNED_SPEED
 from fieldsid.demo.vehicle import LIMITS
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.axis import Axis
-from fieldsid.planning.leg import error_in_words
+from fieldsid.planning.design.leg import error_in_words
 from fieldsid.rounding import number, with_error
 
 Result = Mapping[str, Any]

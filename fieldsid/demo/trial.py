@@ -15,10 +15,11 @@ import numpy as np
 
 from fieldsid.artifacts import write_text
 from fieldsid.demo.vehicle import flown, judging_maneuver, training_maneuver
-from fieldsid.logs.run import FloatArray, Run
+from fieldsid.logs.run import Run
 from fieldsid.maneuvers import Maneuver, Schedule
 from fieldsid.models.model import Model
-from fieldsid.planning.leg import Leg
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.design.leg import Leg
 
 TRAIN_SPEEDS = (1.0, 1.4, 1.8)
 PLANNED_SPEED = 1.4

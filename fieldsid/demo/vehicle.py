@@ -14,18 +14,19 @@ import numpy as np
 
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.errors import UsageError
-from fieldsid.fitting.descent import descend
-from fieldsid.fitting.layout import layout_of, speed_groups
-from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.start import start_vector
-from fieldsid.logs.run import FloatArray, Run
+from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
+from fieldsid.fitting.problem.parameters import layout_of, speed_groups
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Run
 from fieldsid.maneuvers import Limits, Maneuver, Schedule, all_maneuvers
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
-from fieldsid.planning.rehearse import rehearse, with_noise
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.flight.dry_run import dry_run, with_noise
 
 SPEED = 1.4
 SPEED_NOISE = 0.02
@@ -123,7 +124,7 @@ def flown(
     """Return a maneuver flown by the vehicle at a speed in m/s, measured with its sensors' noise."""
     effects = tuple(pick_effect(n) for n in model.effects)
     values = maneuver.checked(parameters)
-    run = rehearse(
+    run = dry_run(
         model, maneuver, values,
         speed=speed, limits=LIMITS, schedule=schedule, helpers=lambda time: helpers(effects, time, speed),
     )  # fmt: skip
@@ -144,5 +145,5 @@ def misfit(model: Model, maneuver: Maneuver | None = None) -> float:
     """
     record = record_of(flown(model, maneuver or training_maneuver(model), SPEED, SEED), model.axis)
     problem = Problem((record,), layout_of((record,), model.axis, (), speed_groups((record,))))
-    left, _ = problem.residual(descend(problem, start_vector((record,), problem.layout), NOISE).x, 0)
+    left, _ = problem.residual(levenberg_marquardt(problem, equation_error_start((record,), problem.layout), NOISE).x, 0)
     return float(np.max(np.sqrt(np.mean(left**2, axis=1)) / (NOISE.angle, NOISE.rate)))

@@ -11,38 +11,47 @@ import numpy as np
 
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
-from fieldsid.diagnosis.advise import next_maneuver
-from fieldsid.diagnosis.floor import shown_floor
-from fieldsid.diagnosis.freely import freely
-from fieldsid.diagnosis.hypothesis import Hypothesis
+from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.diagnosis.data.holdout_split import holdout_split
+from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
+from fieldsid.diagnosis.evidence.acceptance import leaves_error
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
+from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Pair
-from fieldsid.diagnosis.refitted import refitted_model
-from fieldsid.diagnosis.remainder import Remainder, remainder_of
-from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.split import held_back
-from fieldsid.diagnosis.trial import Judged
-from fieldsid.diagnosis.usable import usable
-from fieldsid.diagnosis.verdict import LIKELY, MOSTLY, Verdict, added, explained, probabilities, verdict_of, worsens
-from fieldsid.diagnosis.weather import in_its_weather
-from fieldsid.diagnosis.words import evidence, headline
-from fieldsid.diagnosis.worth import asks_for_more
+from fieldsid.diagnosis.report.final_model import final_model
+from fieldsid.diagnosis.report.next_maneuver import next_maneuver
+from fieldsid.diagnosis.report.report_text import evidence, headline
+from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, residual_tests
+from fieldsid.diagnosis.search.noiseless_search import noiseless_search
+from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.verdict import (
+    MIN_EXPLAINED_SHARE,
+    MIN_RIVAL_PROBABILITY_RATIO,
+    Verdict,
+    added_effects,
+    excess_explained,
+    probabilities,
+    verdict_of,
+    worsens,
+)
 from fieldsid.effects import all_effects, apart_from
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.fitting.fit_runs import records_of
-from fieldsid.fitting.predict import as_flown, predict
+from fieldsid.fitting.predict.predict import as_flown, predict
 from fieldsid.logs.run import Note, Run
-from fieldsid.logs.sifting import Refused
+from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import Axis
 from fieldsid.models.definition import NONE, Definition
 from fieldsid.models.effect import effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
 
-SHOWN = 8
-UNTRIED = Note(
+MAX_CANDIDATES_SHOWN = 8
+SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
 )
-Refitted = tuple[Model, tuple[Note, ...]]
+FinalModel = tuple[Model, tuple[Note, ...]]
 
 
 def diagnose(
@@ -56,86 +65,89 @@ def diagnose(
     thorough: bool = False,
     unfit: Refused[Run] | None = None,
 ) -> Diagnosis:
-    """Return which catalogued effect the base model lacks on some runs, judged on runs it was not fitted to.
+    """Return which catalogued effect the base model lacks, validated on runs it was not fitted to.
 
-    known names effects the model has already: they are part of the base; own defines those of them that are not built in, as a
-    model holds them. report is told what is being tried. thorough: for as long as there is something to try, see allowance.py.
-    unfit is told of each of several runs that cannot be fitted; without it, and where no run to learn from or none of those to
-    judge by is left, its error is raised.
-    Raises DataError when a run cannot be fitted on the axis, EffectError for a user's effect that fails.
+    `known` names effects that are part of the base model; `own` defines those of them that are not built in. `report` is called
+    with the names of each model tried. `thorough` removes the evaluation budget (search/budget.py). `unfit` is called for each
+    run that cannot be fitted; without it, or where no training run or no validation run is left, the error is raised. Raises
+    DataError when a run cannot be fitted on the axis, EffectError when a user's effect fails.
     """
     fitted, checked = records_of([training, validation], axis, unfit)
     records, unseen = [record for _, record in fitted], tuple(record for _, record in checked)
-    learned, unseen, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
+    learned, unseen, notes = (tuple(records), unseen, ()) if unseen else holdout_split(records)
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], axis))
     effects, clashes = apart_from(all_effects(axis).values(), [effect_held(name, own) for name in known])
     notes = (*notes, *(Note("effect_left_out", f"not tried: {why}", {"effect": name}) for name, why in clashes.items()))
-    catalogue, skipped = usable(effects, [*learned, *unseen])
+    catalogue, skipped = applicable_effects(effects, [*learned, *unseen])
     missing = [n for n in known if n in skipped]
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
     work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
+    work.base()
+    if work.is_noiseless:
+        found = noiseless_search(work)
+        if found is not None and excess_explained(work, found) > MIN_EXPLAINED_SHARE:
+            ending = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
+            return _diagnosis(ending, skipped, notes)
+        work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
     found = work.best()
-    ending = _ended(work, found, in_its_weather(found.judged, work.beside))
-    if ending.verdict.word == "unexplained" and work.is_noiseless:
-        # from the first base: one begun anew under the other noise is that of a search that has led nowhere
-        first = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
-        other = freely(first)
-        if other is not None and explained(first, other) > MOSTLY:
-            ending = _ended(first, other, other.judged, Verdict("effect", added(first, other)))
-    return _said(ending, skipped, notes)
+    ending = _search_result(work, found, joint_noise_fit(found.likelihood_fit, work.parallel))
+    return _diagnosis(ending, skipped, notes)
 
 
 @dataclass(frozen=True, slots=True)
-class _Ending:
-    """Where a search ended, its verdict, and what is said of that.
+class _SearchResult:
+    """The final model of a search, its verdict, and what is reported with it.
 
-    judged is the hypothesis found as what is left is judged; models are the base's and its, with how unseen runs were flown;
-    shown are the leading hypotheses, with the errors of the first of them.
+    `ml_fit` is the final model under the noise that its residuals are tested with; `models` are those of the base and of the
+    final model for the file, each with notes on the validation runs; `errors` belong to the first of the `leading` models.
     """
 
     work: Search
-    found: Hypothesis
-    judged: Judged
-    left: Remainder
+    found: ScoredModel
+    ml_fit: LikelihoodFit
+    residual_tests: ResidualTests
     verdict: Verdict
-    models: tuple[Refitted, Refitted]
+    models: tuple[FinalModel, FinalModel]
     places: tuple[tuple[Place, ...], tuple[Note, ...]]
-    shown: Sequence[Hypothesis]
+    leading: Sequence[ScoredModel]
     errors: Sequence[Pair]
 
 
-def _ended(work: Search, found: Hypothesis, judged: Judged, verdict: Verdict | None = None) -> _Ending:
-    """Return what a search comes to that ended at a hypothesis, judged in its weather, under a verdict where that is known."""
+def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verdict: Verdict | None = None) -> _SearchResult:
+    """Return the final model of a search with its residual tests, its models for the file, and its verdict unless given."""
     base, shown = work.base(), _leading(work, found)
 
-    def refitted(h: Hypothesis) -> Refitted:
-        model = refitted_model(h)
+    def refitted(h: ScoredModel) -> FinalModel:
+        model = final_model(h)
         return model, as_flown(model, work.validation)
 
     # at once, whatever the verdict will be: each sharing out costs a copy of the process
     parts: list[Callable[[], Any]] = [
-        partial(refitted, found), partial(remainder_of, judged), partial(where_of, base, work.validation or work.records),
-        *(partial(getattr, h, "errors") for h in shown[:SHOWN]), *([partial(refitted, base)] if found is not base else []),
-    ]  # fmt: skip
-    done = work.beside.each(lambda part: part(), parts)
+        partial(refitted, found),
+        partial(residual_tests, ml_fit),
+        partial(where_of, base, work.validation or work.records),
+        *(partial(getattr, h, "errors") for h in shown[:MAX_CANDIDATES_SHOWN]),
+        *([partial(refitted, base)] if found is not base else []),
+    ]
+    done = work.parallel.map(lambda part: part(), parts)
     own, left, places = done[:3]
-    errors, of_base = done[3 : 3 + len(shown[:SHOWN])], own if found is base else done[-1]
-    verdict = verdict or verdict_of(work, found, left, judged)
-    return _Ending(work, found, judged, left, verdict, (of_base, own), places, shown, errors)
+    errors, of_base = done[3 : 3 + len(shown[:MAX_CANDIDATES_SHOWN])], own if found is base else done[-1]
+    verdict = verdict or verdict_of(work, found, left, ml_fit)
+    return _SearchResult(work, found, ml_fit, left, verdict, (of_base, own), places, shown, errors)
 
 
-def _said(end: _Ending, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> Diagnosis:
+def _diagnosis(end: _SearchResult, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> Diagnosis:
     work, found, verdict, base = end.work, end.found, end.verdict, end.work.base()
     named = found if verdict.word in ("effect", "undecided") else base
     (base_model, _), (model, flown) = end.models if named is found else (end.models[0], end.models[0])
-    floor = shown_floor(work.floor, end.judged.noise)
+    floor = reported_noise_floor(work.floor, end.ml_fit.noise)
     where, diverged = end.places
     return Diagnosis(
         axis=work.axis,
         verdict=verdict.word,
-        effects=added(work, named),
-        says=headline(work, verdict, found, end.left, floor, end.judged.noise),
+        effects=added_effects(work, named),
+        says=headline(work, verdict, found, end.residual_tests, floor, end.ml_fit.noise),
         base=base.errors,
         final=named.errors,
         noise_floor=floor,
@@ -145,64 +157,73 @@ def _said(end: _Ending, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> 
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, skipped, floor),
         skipped=skipped,
-        notes=(*notes, *diverged, *flown, *([UNTRIED] if work.allowance.ended and asks_for_more(found, work.floor) else [])),
+        notes=(
+            *notes,
+            *diverged,
+            *flown,
+            *([SEARCH_ENDED] if work.budget.is_exhausted and leaves_error(found, work.floor) else []),
+        ),
     )
 
 
-def _leading(work: Search, found: Hypothesis) -> list[Hypothesis]:
-    """Return all hypotheses but the base, the one found first, then by evidence, those with effects that do not pay last."""
+def _leading(work: Search, found: ScoredModel) -> list[ScoredModel]:
+    """Return all models but the base: the one found, then the accepted sets by log evidence, then the others."""
     base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
     others.sort(key=lambda h: -sums.get(frozenset(h.names), -np.inf))
     return [*([found] if found is not base else []), *others]
 
 
-def _candidates(end: _Ending, floor: Noise) -> tuple[Candidate, ...]:
-    """Return the leading hypotheses."""
+def _candidates(end: _SearchResult, floor: Noise) -> tuple[Candidate, ...]:
+    """Return the leading models as candidates of the diagnosis."""
     work, sums = end.work, end.work.evidences()
     p = probabilities(sums)
 
-    def gain(h: Hypothesis) -> float:
-        return sums.get(frozenset(h.names), h.score) - sums[work.root]
+    def gain(h: ScoredModel) -> float:
+        return sums.get(frozenset(h.names), h.log_evidence) - sums[work.root]
 
     return tuple(
         Candidate(
-            effects=added(work, h),
+            effects=added_effects(work, h),
             probability=p.get(frozenset(h.names), 0.0),
             parameters=dict(h.model.values),
             errors=pair,
-            explained=explained(work, h, floor),
+            explained=excess_explained(work, h, floor),
             score=gain(h),
             evidence=evidence(work, h, pair, floor, gain(h)),
-            confusable_with=confusable(work, h, end.shown, p, floor),
+            confusable_with=confusable(work, h, end.leading, p, floor),
             worse=worsens(work, h, floor),
         )
-        for h, pair in zip(end.shown, end.errors, strict=False)
+        for h, pair in zip(end.leading, end.errors, strict=False)
     )
 
 
 def confusable(
-    work: Search, h: Hypothesis, others: Sequence[Hypothesis], p: Mapping[frozenset[str], float], floor: Noise
+    work: Search, h: ScoredModel, others: Sequence[ScoredModel], p: Mapping[frozenset[str], float], floor: Noise
 ) -> tuple[str, ...]:
-    """Return the other hypotheses of the same size that take away nearly as much of the error, and are as good as likely.
+    """Return the other models of the same size that take away nearly as much of the error, and are as good as likely.
 
     p are probabilities by sets of effects: what the evidence tells from one is no rival of it.
     """
-    mine, own = explained(work, h, floor), p.get(frozenset(h.names), 0.0)
+    mine, own = excess_explained(work, h, floor), p.get(frozenset(h.names), 0.0)
 
-    def as_likely(other: Hypothesis) -> bool:
+    def as_likely(other: ScoredModel) -> bool:
         its = p.get(frozenset(other.names), 0.0)
-        return min(own, its) > 0.0 and min(own, its) >= LIKELY * max(own, its)
+        return min(own, its) > 0.0 and min(own, its) >= MIN_RIVAL_PROBABILITY_RATIO * max(own, its)
 
     return tuple(
         "+".join(n for n in o.names if n not in work.known)
         for o in others
-        if o is not h and len(o.names) == len(h.names) and as_likely(o) and mine > 0.0 and explained(work, o, floor) > 0.8 * mine
+        if o is not h
+        and len(o.names) == len(h.names)
+        and as_likely(o)
+        and mine > 0.0
+        and excess_explained(work, o, floor) > 0.8 * mine
     )[:4]
 
 
-def where_of(h: Hypothesis, records: Sequence[Record]) -> tuple[tuple[Place, ...], tuple[Note, ...]]:
-    """Return where a hypothesis's free run fails, over the run it fails most on, and the runs it cannot be simulated on."""
+def where_of(h: ScoredModel, records: Sequence[Record]) -> tuple[tuple[Place, ...], tuple[Note, ...]]:
+    """Return where a model's free run fails, for the run it fails most on, and notes on the runs it diverges on."""
     shown, notes = [], []
     for record in records:
         try:

@@ -1,4 +1,4 @@
-"""What a diagnosis says: frozen records, from the errors of one hypothesis to the verdict."""
+"""The records of a diagnosis, from the errors of one model to the verdict; all frozen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fieldsid.models.model import Model, Noise
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Errors(Brief):
-    """Free-run error over some runs: rms of measured minus simulated angle (rad) and rate (rad/s), and of each run alone."""
+    """Free-run error over some runs: rms of measured minus simulated angle (rad) and rate (rad/s), and that of each run."""
 
     angle_rms_rad: float
     rate_rms_rad_s: float
@@ -32,14 +32,14 @@ class Errors(Brief):
 
     @property
     def mean(self) -> float:
-        """The geometric mean of both channels: the heading, where every error adds up, has no more say."""
+        """The geometric mean of both channels, so that the heading, which integrates every error, does not dominate."""
         known = [e for e in (self.angle_rms_rad, self.rate_rms_rad_s) if isfinite(e)]
         return float(prod(known) ** (1.0 / len(known))) if known else float("inf")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Pair(Brief):
-    """Errors on the runs learned from and on runs not seen."""
+    """Errors on the training and on the validation runs."""
 
     train: Errors
     validation: Errors
@@ -47,10 +47,10 @@ class Pair(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Candidate(Displayed):
-    """One hypothesis: effects, probability among all that were tried, parameters, errors, and the evidence in words.
+    """One model: its effects, probability among all that were tried, parameters, errors, and its evidence in a sentence.
 
-    explained is the share of the excess error it takes away, 0..1; worse tells that it raises the error instead.
-    confusable_with are those that are likely enough to be it in its stead.
+    `explained` is the share of the excess error it removes, 0..1; `worse` says that it raises the error instead.
+    `confusable_with` are models of comparable probability that remove as much.
     """
 
     effects: tuple[str, ...]

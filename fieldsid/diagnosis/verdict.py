@@ -1,4 +1,4 @@
-"""From ranked hypotheses to a verdict: effect, sufficient, disturbed, undecided or unexplained."""
+"""The verdict on the ranked models: effect, sufficient, disturbed, undecided or unexplained."""
 
 from __future__ import annotations
 
@@ -7,36 +7,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.diagnosis.floor import shown_floor
-from fieldsid.diagnosis.hypothesis import Hypothesis
-from fieldsid.diagnosis.remainder import BEYOND_CHANCE, Remainder
-from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.trial import BOTH, Judged
-from fieldsid.diagnosis.worth import ALIKE, WORSE, worse_unseen
+from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
+from fieldsid.diagnosis.evidence.acceptance import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, validation_error_ratio
+from fieldsid.diagnosis.evidence.likelihood_fit import JOINT_NOISE, LikelihoodFit
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.residual_tests.residual_tests import MIN_P_VALUE, ResidualTests
+from fieldsid.diagnosis.search.search import Search
 from fieldsid.models.model import Noise
 
-TEMPER = 2.0
-"""Log evidence is divided by this before it becomes a probability: forms are never exact, evidence then overstates."""
-RIVAL = 3.0
-"""Log evidence within which two hypotheses are rivals (odds of 20 to 1 before tempering); twice that from one run."""
-BESIDE = ((0.7, 1e-5), (0.6, 1e-3), (0.3, BEYOND_CHANCE))
-"""Share of the excess error an effect must explain to be named where what is left is less likely than this p-value: a form
-is never exact, but the less it explains the less it may leave."""
-LEAVES, BESIDE_SOME = 1.6, ((0.85, 1e-6),)
-"""Error over the noise floor that a form of the right effect hardly leaves, and the share to be explained beyond it."""
-BESIDE_MUCH = ((0.97, 1e-6),)
-"""The same where what is left is beyond any sea: most of a base that is far off is explained by whatever bends."""
-LIKELY = 0.05
-"""Probability over a hypothesis's own from which on another is its rival: beyond odds of 20 to 1 they are told apart."""
-VISIBLE = 1.15
-"""Free-run error over the noise floor below which nothing worth naming is left."""
-FILTER_S = 1.0
-"""Time constant of coloured sensors, in s, below which their colour is their own, and no error: a motion that is missing lasts as
-long as a maneuver."""
-FAINT, STORM = 2.0, 4.0
-"""Error over the noise floor below which only what moves with the vehicle is told from the sea, since gusts come in bursts
-too; and the error above which no sea is taken for granted."""
-MOSTLY = BESIDE[0][0]
+EVIDENCE_TEMPERATURE = 2.0
+"""Divisor of the log evidence before it becomes a probability: the evidence of models that are never exact is overstated."""
+MAX_RIVAL_LOG_ODDS = 3.0
+"""Difference in log evidence within which two models are rivals (odds of 20 to 1 before tempering); twice that for one run."""
+VERDICT_TABLE = ((0.7, 1e-5), (0.6, 1e-3), (0.3, MIN_P_VALUE))
+"""Least share of the excess error that a named effect must explain, and the p-value of the residual tests below which it must: a
+model is never exact, but the less it explains the less it may leave."""
+HIGH_ERROR_RATIO, VERDICT_TABLE_HIGH_ERROR = 1.6, ((0.85, 1e-6),)
+"""Error over the noise floor that the right effect rarely leaves, and the share to be explained above it."""
+VERDICT_TABLE_EXTREME_ERROR = ((0.97, 1e-6),)
+"""The same for errors above ERROR_HIGH: there, any effect that bends the response explains most of the excess."""
+MIN_RIVAL_PROBABILITY_RATIO = 0.05
+"""Ratio of two models' probabilities above which they are rivals: odds of 20 to 1."""
+SUFFICIENT_ERROR_RATIO = 1.15
+"""Free-run error over the noise floor below which the model is sufficient."""
+MAX_SENSOR_COLOUR_S = 1.0
+"""Time constant of coloured sensor noise, in s, below which it counts as noise: a missing motion lasts as long as a maneuver."""
+ERROR_LOW, ERROR_HIGH = 2.0, 4.0
+"""Error over the noise floor below which only dependence on the motion tells an effect from a disturbance, since gusts come in
+bursts too; and the error above which a disturbance alone is implausible."""
+MIN_EXPLAINED_SHARE = VERDICT_TABLE[0][0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,53 +44,60 @@ class Verdict:
 
     word: str
     effects: tuple[str, ...]
-    rivals: tuple[Hypothesis, ...] = ()
+    rivals: tuple[ScoredModel, ...] = ()
 
 
-def verdict_of(search: Search, found: Hypothesis, left: Remainder, judged: Judged) -> Verdict:
-    """Return the verdict on the hypothesis a search ended at, with what is left of it judged in its weather.
+def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: LikelihoodFit) -> Verdict:
+    """Return the verdict on the model a search ended at, from its errors and the tests of its innovations.
 
-    Where sea and sensors are told apart, errors are over the sensors' noise with its colour, else over its white part.
-    Sufficient is only what predicts fitted and unseen runs alike that well; `disturbed` where what it leaves is a disturbance.
+    Errors are over the sensors' noise; its coloured part counts where the noise is fitted jointly with a disturbance. Without an
+    effect, `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is
+    `disturbed` where the innovations pass the tests of a disturbance, else `unexplained`.
     """
-    noise, floor = judged.noise, shown_floor(search.floor, judged.noise)
-    least = floor if judged.family == BOTH else search.floor
-    error = found.judging.over(least)
+    noise, floor = ml_fit.noise, reported_noise_floor(search.floor, ml_fit.noise)
+    least = floor if ml_fit.noise_kind == JOINT_NOISE else search.floor
+    error = found.selection_errors.over(least)
     if frozenset(found.names) == search.root:
         worst = max(error, found.train.over(least))
-        if worst <= VISIBLE:
+        if worst <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
-        sea = max(found.judging.over(floor), found.train.over(floor))
-        p = 3.0 * left.relation if worst < FAINT else left.p
-        odd = p < BEYOND_CHANCE or sea > STORM or worse_unseen(found, least) > WORSE
+        sea = max(found.selection_errors.over(floor), found.train.over(floor))
+        p = 3.0 * left.dependence if worst < ERROR_LOW else left.p
+        odd = p < MIN_P_VALUE or sea > ERROR_HIGH or validation_error_ratio(found, least) > MAX_VALIDATION_ERROR_RATIO
         return Verdict("unexplained" if odd else "disturbed", ())
-    visible = (found.judging.over(floor) if noise.coloured_time < FILTER_S else error) > VISIBLE
-    share = explained(search, found, least)
-    asked = BESIDE if error <= LEAVES or search.is_noiseless else (*BESIDE, *(BESIDE_SOME if error <= STORM else BESIDE_MUCH))
+    visible = (
+        found.selection_errors.over(floor) if noise.coloured_time < MAX_SENSOR_COLOUR_S else error
+    ) > SUFFICIENT_ERROR_RATIO
+    share = excess_explained(search, found, least)
+    asked = (
+        VERDICT_TABLE
+        if error <= HIGH_ERROR_RATIO or search.is_noiseless
+        else (*VERDICT_TABLE, *(VERDICT_TABLE_HIGH_ERROR if error <= ERROR_HIGH else VERDICT_TABLE_EXTREME_ERROR))
+    )
     if visible and any(left.p < p and share < enough for enough, p in asked):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:
-        return Verdict("undecided", added(search, found), rivals)
-    return Verdict("effect", added(search, found))
+        return Verdict("undecided", added_effects(search, found), rivals)
+    return Verdict("effect", added_effects(search, found))
 
 
-def added(search: Search, h: Hypothesis) -> tuple[str, ...]:
-    """Return the effects of a hypothesis that were not known before, the one whose lack costs most on unseen runs first.
+def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
+    """Return the effects that a model adds to the base, in order of the validation error without each of them, largest first.
 
-    What is left without one was tried unless it promised nothing.
+    An effect whose removal was not tried comes first.
     """
 
     def lack(name: str) -> float:
         without = search.tried.get(frozenset(h.names) - {name})
-        return without.judging.mean if without is not None else float("inf")
+        return without.selection_errors.mean if without is not None else float("inf")
 
     return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -lack(n)))
 
 
-def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
-    """Return hypotheses of the same size that the data cannot tell from the one found."""
-    margin, sums = RIVAL if len(search.records) > 1 else 2.0 * RIVAL, search.evidences()
+def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
+    """Return the models of the same size that the data cannot distinguish from the final one."""
+    margin, sums = MAX_RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * MAX_RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
     return tuple(
         h
@@ -99,24 +105,24 @@ def rivals_of(search: Search, found: Hypothesis) -> tuple[Hypothesis, ...]:
         if h is not found
         and len(h.names) == len(found.names)
         and best - sums.get(frozenset(h.names), -np.inf) < margin
-        and h.judging.mean < ALIKE * found.judging.mean
+        and h.selection_errors.mean < EQUAL_ERROR_RATIO * found.selection_errors.mean
     )
 
 
-def explained(search: Search, h: Hypothesis, floor: Noise | None = None) -> float:
-    """Return the share of the base's excess over a noise floor, by default the search's, that a hypothesis takes away, 0..1."""
-    base, now = (x.judging.over(floor or search.floor) for x in (search.base(), h))
+def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:
+    """Return the share (0..1) that a model removes of the base's excess squared error over a noise floor."""
+    base, now = (x.selection_errors.over(floor or search.floor) for x in (search.base(), h))
     excess = base**2 - 1.0
     return float(np.clip((base**2 - now**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
 
 
-def worsens(search: Search, h: Hypothesis, floor: Noise) -> bool:
-    """Whether a hypothesis raises the error over a noise floor, by more than hypotheses that predict alike differ."""
-    return bool(h.judging.over(floor) > ALIKE * search.base().judging.over(floor))
+def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:
+    """Whether a model raises the error over a noise floor by more than EQUAL_ERROR_RATIO."""
+    return bool(h.selection_errors.over(floor) > EQUAL_ERROR_RATIO * search.base().selection_errors.over(floor))
 
 
 def probabilities(evidences: Mapping[frozenset[str], float]) -> dict[frozenset[str], float]:
-    """Return the probability of each set of effects among all that were tried, from their tempered log evidence."""
-    scores = np.array(list(evidences.values())) / TEMPER
+    """Return the posterior probability of each set of effects: proportional to exp(log evidence / EVIDENCE_TEMPERATURE)."""
+    scores = np.array(list(evidences.values())) / EVIDENCE_TEMPERATURE
     weights = np.exp(scores - scores.max())
     return dict(zip(evidences, (weights / weights.sum()).tolist(), strict=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fieldsid.effects._user import travelled
+from fieldsid.effects._user_file import travelled
 from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import REGISTRY, Effect, effect_named, shared_name

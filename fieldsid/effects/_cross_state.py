@@ -1,7 +1,7 @@
 """The hidden cross state that sway and heave share: x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p.
 
 A run starts from x = -(cross_rate / cross_damping) f r0, where a steady rate r0 before it had led to: each run's own
-number (`rate_before` in fitting/layout.py). No motion within that rate leaves x further from zero.
+number (`rate_before` in fitting/problem/parameters.py). No motion within that rate leaves x further from zero.
 In its other forms it has a power of the speed of its own, and drag that grows with the square of the cross speed,
     x' = -cross_damping f x - (cross_quadratic / f) x|x| - cross_rate f^2 r + cross_fin f^3 delta
 With x = -a21 v, a21 ~ f: the drag D v|v| becomes D/|a21| x|x|. Then the fin's own lift no longer drops out of the
@@ -10,7 +10,7 @@ transfer function. Source: Prestero 2001, table of coefficients (the cross flow 
 
 from __future__ import annotations
 
-from fieldsid.models.effect import Coefficient, Core, Form, Values
+from fieldsid.models.effect import Coefficient, Core, Values, Variant
 
 
 def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
@@ -27,7 +27,7 @@ def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
             0.8,
             scan=(0.25, 0.7, 2.0),
             step=1e-3,
-            pace=1,
+            rate_exponent=1,
             says=f"damping of the {cross} speed",
         ),
         Coefficient(
@@ -37,7 +37,7 @@ def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
             20.0,
             0.1,
             scan=(-0.2, 0.2),
-            pace=2,
+            rate_exponent=2,
             says=f"Munk moment {builds_up}",
         ),
     )
@@ -50,10 +50,12 @@ SQUARE = Coefficient(
 OF_FIN = Coefficient("cross_fin", "1/s^3", -50.0, 50.0, 0.0, says="what the fin's own lift does to it")
 MUNK_POWER = Coefficient("munk_exponent", "1", -1.0, 6.0, 2.0, step=1e-3, says="power of the speed its moment goes with")
 FORMS = (
-    Form("its moment has a power of the speed of its own", (MUNK_POWER,)),
-    Form("it has a power of the speed of its own", (OWN_POWER,)),
-    Form("its drag grows with the square of its speed", (SQUARE, OF_FIN)),
-    Form("its drag grows with the square of its speed, and it has a power of the speed of its own", (SQUARE, OF_FIN, OWN_POWER)),
+    Variant("its moment has a power of the speed of its own", (MUNK_POWER,)),
+    Variant("it has a power of the speed of its own", (OWN_POWER,)),
+    Variant("its drag grows with the square of its speed", (SQUARE, OF_FIN)),
+    Variant(
+        "its drag grows with the square of its speed, and it has a power of the speed of its own", (SQUARE, OF_FIN, OWN_POWER)
+    ),
 )
 
 

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.errors import EffectError
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 Operation = Callable[..., FloatArray]

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
-from fieldsid.models.effect import FinPath
-from fieldsid.models.jit import inner, jit
+from fieldsid.models.fin_path import FinPath
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import inner, jit
 
 Map = Callable[[FloatArray], FloatArray]
 Part = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], object]

@@ -11,7 +11,8 @@ import numpy as np
 
 from fieldsid.effects._paths import through_map
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 
 
@@ -41,8 +42,8 @@ EFFECT = Effect(
     source="Bertram 2012, Practical Ship Hydrodynamics, chapter 6",
     order=60,
     fin=fin,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "the two sides part gradually",
             (Coefficient("lift_bend", "1/rad", -5.0, 5.0, 0.0, says="gain of the one side over the other, per rad of fin"),),
         ),

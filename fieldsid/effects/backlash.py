@@ -6,13 +6,14 @@ The fin starts in the middle of the play. Source: Nordin and Gutman 2002, Contro
 
 from __future__ import annotations
 
+from fieldsid.effects._fin_reach import shares_of_reach
 from fieldsid.effects._paths import line_of_two_pieces, through
-from fieldsid.effects._reach import shares_of_reach
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
-from fieldsid.models.jit import jit
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 
 @jit
@@ -56,5 +57,5 @@ EFFECT = Effect(
     source="Nordin and Gutman 2002, Automatica 38, Controlling mechanical systems with backlash",
     order=40,
     fin=fin,
-    suggest=shares_of_reach(GAP, (0.015, 0.06, 0.2, 0.5)),
+    initial_guesses=shares_of_reach(GAP, (0.015, 0.06, 0.2, 0.5)),
 )

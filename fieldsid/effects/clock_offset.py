@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 
 def _then(values: Values, record: Record) -> FloatArray:
@@ -28,7 +28,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
     return Motion(np.interp(then, record.time, motion.angle), np.interp(then, record.time, motion.rate))
 
 
-def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as they are logged, `offset` seconds later."""
     time = record.time
     then = np.clip(_then(values, record), time[0], time[-1])
@@ -53,12 +53,12 @@ EFFECT = Effect(
     mistaken_for=("delay", "servo_lag", "rate_limit"),
     source="Ljung 1999, System Identification, chapter 14",
     measure=measure,
-    carry=carry,
-    forms=(
-        Form(
+    sensor_jvp=sensor_jvp,
+    variants=(
+        Variant(
             "the clock runs fast or slow",
             (Coefficient("clock_drift", "1", -0.05, 0.05, 0.0, step=1e-4, says="what the sensors fall behind in a second"),),
         ),
     ),
-    handicap=15.0,
+    log_prior_penalty=15.0,
 )

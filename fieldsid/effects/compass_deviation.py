@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
@@ -24,7 +24,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
     return Motion(shown, motion.rate)
 
 
-def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as the compass shows them."""
     psi = motion.angle
     slope = 1.0 + values["deviation_sin"] * np.cos(psi) - values["deviation_cos"] * np.sin(psi)
@@ -48,9 +48,9 @@ EFFECT = Effect(
     mistaken_for=("current", "gyro_scale", "gyro_bias"),
     source="Groves 2013, chapter 6",
     measure=measure,
-    carry=carry,
-    forms=(
-        Form(
+    sensor_jvp=sensor_jvp,
+    variants=(
+        Variant(
             "it goes twice around with the heading as well",
             (
                 Coefficient("deviation_sin2", "rad", -0.5, 0.5, 0.0, says="quadrantal error, greatest on north-east"),

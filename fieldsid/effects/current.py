@@ -10,7 +10,7 @@ Source: Fossen 2011, section 8.3 (ocean current forces and moments).
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Form, Stage, Values
+from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values, Variant
 
 
 def core(values: Values, scale: float) -> Core:
@@ -40,19 +40,19 @@ EFFECT = Effect(
     mistaken_for=("compass_deviation", "trim_drift", "wave", "asymmetric_fin"),
     source="Fossen 2011, section 8.3",
     core=core,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "it goes twice per turn of the compass as well",
             (
                 Coefficient("current_sin2", "rad/s^2", -1.0, 1.0, 0.0, says="its part with the sine of twice the heading"),
                 Coefficient("current_cos2", "rad/s^2", -1.0, 1.0, 0.0, says="its part with the cosine of twice the heading"),
             ),
         ),
-        Form(
+        Variant(
             "it grows with the speed",
             (Coefficient("current_power", "1", -1.0, 3.0, 1.0, step=1e-3, says="power of the run's speed it goes with"),),
         ),
-        Form(
+        Variant(
             "its direction turns",
             (Coefficient("current_turn", "rad/s", -0.1, 0.1, 0.0, scan=(-0.01, 0.01), says="how fast its direction turns"),),
         ),

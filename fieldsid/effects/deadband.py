@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.effects._fin_reach import shares_of_reach
 from fieldsid.effects._paths import Beyond, through, through_map
-from fieldsid.effects._reach import shares_of_reach
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
-from fieldsid.models.jit import jit
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 
 @jit
@@ -95,8 +96,8 @@ EFFECT = Effect(
     mistaken_for=("backlash", "stall", "quadratic_damping", "asymmetric_fin"),
     source="Tao and Kokotovic 1996, Adaptive Control of Systems with Actuator and Sensor Nonlinearities",
     order=50,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "the edge is smooth",
             (
                 Coefficient(
@@ -111,7 +112,7 @@ EFFECT = Effect(
                 ),
             ),
         ),
-        Form(
+        Variant(
             "the fin jumps at the edge",
             (
                 Coefficient(
@@ -119,7 +120,7 @@ EFFECT = Effect(
                 ),
             ),
         ),
-        Form(
+        Variant(
             "the fin jumps at the edge, and stays out until the command is well inside it",
             (
                 Coefficient("deadband_jump", "1", 0.0, 1.0, 1.0, step=1e-3, says="share of the width it jumps by"),
@@ -135,7 +136,7 @@ EFFECT = Effect(
                 ),
             ),
         ),
-        Form(
+        Variant(
             "its middle is off zero",
             (
                 Coefficient(
@@ -152,5 +153,5 @@ EFFECT = Effect(
         ),
     ),
     fin=fin,
-    suggest=shares_of_reach(WIDTH, (0.015, 0.05, 0.1, 0.2, 0.32, 0.5)),
+    initial_guesses=shares_of_reach(WIDTH, (0.015, 0.05, 0.1, 0.2, 0.32, 0.5)),
 )

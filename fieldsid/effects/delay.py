@@ -9,11 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.effects._paths import through
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Stage, Values
-from fieldsid.models.jit import jit
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 
 @jit

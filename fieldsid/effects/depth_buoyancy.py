@@ -8,7 +8,7 @@ Source: Fossen 2011, section 4.1 (restoring moment), with a buoyancy linear in d
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
 
 
@@ -31,8 +31,8 @@ EFFECT = Effect(
     source="Fossen 2011, section 4.1",
     needs=("depth",),
     terms=terms,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "a part goes with the square of the depth",
             (Coefficient("depth_square", "1/(m^2 s^2)", -2.0, 2.0, 0.0, says="pitch moment per square metre of depth"),),
         ),

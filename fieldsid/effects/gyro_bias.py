@@ -7,10 +7,10 @@ sample. Shows only where the angle is measured beside the rate, or where the tri
 
 from __future__ import annotations
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 MINUTE_S = 60.0
 
@@ -23,7 +23,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
     return Motion(motion.angle, motion.rate + values["bias"] + values["bias_drift"] * minutes)
 
 
-def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as the gyro shows them: an offset leaves them."""
     return moves
 
@@ -40,9 +40,9 @@ EFFECT = Effect(
     mistaken_for=("gyro_scale", "asymmetric_fin", "trim_drift"),
     source="Groves 2013, chapter 4",
     measure=measure,
-    carry=carry,
-    forms=(
-        Form(
+    sensor_jvp=sensor_jvp,
+    variants=(
+        Variant(
             "it drifts",
             (Coefficient("bias_drift", "rad/s per minute", -0.2, 0.2, 0.0, says="what the offset grows by in a minute"),),
         ),

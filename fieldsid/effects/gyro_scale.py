@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Motion, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
@@ -22,7 +22,7 @@ def measure(motion: Motion, values: Values, record: Record) -> Motion:
     return Motion(motion.angle, motion.rate * (1.0 + values["scale_error"] + bent) + side)
 
 
-def carry(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
+def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as the gyro shows them."""
     slope = 1.0 + values["scale_error"] + 3.0 * values.get("scale_cubic", 0.0) * motion.rate**2
     slope += values.get("scale_side", 0.0) * np.sign(motion.rate)
@@ -41,13 +41,13 @@ EFFECT = Effect(
     mistaken_for=("gyro_bias", "compass_deviation", "speed_varying"),
     source="Groves 2013, chapter 4",
     measure=measure,
-    carry=carry,
-    forms=(
-        Form(
+    sensor_jvp=sensor_jvp,
+    variants=(
+        Variant(
             "the error grows with the rate",
             (Coefficient("scale_cubic", "s^2/rad^2", -1e4, 1e4, 0.0, says="share of error per square of the rate"),),
         ),
-        Form(
+        Variant(
             "the error differs from side to side",
             (Coefficient("scale_side", "1", -0.5, 0.5, 0.0, says="half the difference of the two sides' scales"),),
         ),

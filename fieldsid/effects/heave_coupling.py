@@ -25,5 +25,5 @@ EFFECT = Effect(
     source="Prestero 2001, chapter 6: the pitch model before heave is dropped",
     extra_states=("heave",),
     core=core,
-    forms=FORMS,
+    variants=FORMS,
 )

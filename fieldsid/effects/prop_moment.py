@@ -10,9 +10,9 @@ both. In pitch `speed_moment` says both. Source: Carlton 2018, Marine Propellers
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
-from fieldsid.models.lag import behind
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.first_order_lag import first_order_lag
 
 FASTEST_S = 1e-6
 """A lag below this changes nothing."""
@@ -22,7 +22,7 @@ def terms(values: Values, record: Record) -> Terms:
     """Return the moment of the propeller, (n,) rad/s^2."""
     thrust, lag = record["thrust"], float(values.get("build_up", 0.0))
     if lag > FASTEST_S:
-        thrust = behind(record.steps, thrust, lag)
+        thrust = first_order_lag(record.steps, thrust, lag)
     moment = values["prop_moment"] * thrust + values.get("prop_square", 0.0) * thrust * thrust
     trimmed = float(values.get("prop_trimmed", 0.0))
     return Terms(moment=moment + trimmed * (record.speed**2 - 1.0) if trimmed else moment)
@@ -46,15 +46,15 @@ EFFECT = Effect(
     source="Carlton 2018, Marine Propellers and Propulsion, chapter 6",
     needs=("thrust",),
     terms=terms,
-    forms=(
-        Form("a part goes with the square of the thrust", (SQUARE,)),
-        Form(
+    variants=(
+        Variant("a part goes with the square of the thrust", (SQUARE,)),
+        Variant(
             "it builds up behind the thrust",
             (Coefficient("build_up", "s", 0.0, 20.0, 1.0, scan=(0.5, 2.0, 6.0), step=1e-3, says="time it builds up in"),),
             axes=(Axis.YAW,),
         ),
-        Form("the rudder is trimmed against it", (TRIMMED,), axes=(Axis.YAW,), needs=("surge",)),
-        Form(
+        Variant("the rudder is trimmed against it", (TRIMMED,), axes=(Axis.YAW,), needs=("surge",)),
+        Variant(
             "a part goes with the square of the thrust, and the rudder is trimmed against it",
             (SQUARE, TRIMMED),
             axes=(Axis.YAW,),

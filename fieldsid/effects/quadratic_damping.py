@@ -7,7 +7,7 @@ In its other form the power is free: -quadratic p |p| (|p| / 0.2 rad/s)^(rate_po
 from __future__ import annotations
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Form, Stage, Values
+from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values, Variant
 
 SQUARE = 2.0
 POWER = Coefficient(
@@ -31,6 +31,6 @@ EFFECT = Effect(
     excited_by=("zigzag", "turning_circle", "stairs", "multisine"),
     mistaken_for=("stall", "crossflow_drag", "speed_varying", "deadband", "sway_coupling", "heave_coupling"),
     source="Fossen 2011, section 6.4",
-    forms=(Form("its drag goes with another power of the rate than the square", (POWER,)),),
+    variants=(Variant("its drag goes with another power of the rate than the square", (POWER,)),),
     core=core,
 )

@@ -8,11 +8,12 @@ Source: Van Amerongen 1982 (the steering machine).
 from __future__ import annotations
 
 from fieldsid.effects._paths import line_of_two_pieces, through
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
-from fieldsid.models.jit import jit
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 
 @jit
@@ -68,5 +69,5 @@ EFFECT = Effect(
     source="Van Amerongen 1982, Adaptive Steering of Ships (steering machine)",
     order=20,
     fin=fin,
-    forms=(Form("it turns faster to one side than to the other", (FALLING,)),),
+    variants=(Variant("it turns faster to one side than to the other", (FALLING,)),),
 )

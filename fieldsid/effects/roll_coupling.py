@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
 
 
@@ -35,12 +35,12 @@ EFFECT = Effect(
     source="Fossen 2011, section 7.5",
     needs=("roll",),
     terms=terms,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "the roll rate has a part of its own",
             (Coefficient("roll_rate_moment", "1/s", -20.0, 20.0, 0.0, says="yaw moment per rad/s of roll rate"),),
         ),
-        Form(
+        Variant(
             "it bends with the angle of roll",
             (Coefficient("roll_cubic", "1/s^2", -1e4, 1e4, 0.0, says="yaw moment per cube of the roll in rad"),),
         ),

@@ -11,15 +11,16 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.effects._paths import through
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
-from fieldsid.models.jit import jit
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 FASTEST_S = 1e-6
 """A lag below this moves nothing that can be measured; the command is returned as it is."""
-ALIKE = 1e-12
+EQUAL_STEP_SHARE = 1e-12
 """Steps that differ by less, of themselves, decay alike: the exponential of the last one is taken."""
 
 
@@ -36,7 +37,7 @@ def lagged(steps: FloatArray, start: FloatArray, end: FloatArray, rising: float,
         lag = rising if start[i] >= fin else falling
         slope = (end[i] - start[i]) / h
         c = fin - start[i] + slope * lag
-        if abs(h / lag - x) > ALIKE * x:
+        if abs(h / lag - x) > EQUAL_STEP_SHARE * x:
             x = h / lag
             gone = -np.expm1(-x)
             if x < 1e-2:
@@ -96,7 +97,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     return through(path, record.steps, lambda steps, start, end, out: lagged(steps, start, end, lag, falling, out))
 
 
-def twin(values: Values, axis: Axis) -> dict[str, float] | None:
+def equivalent_solution(values: Values, axis: Axis) -> dict[str, float] | None:
     """Return the start with the servo's pole and the hull's exchanged: in yaw the same response at one speed."""
     damping, lag = values[NAMES[axis].damping], values["lag"]
     if axis is not Axis.YAW or damping <= 0.0 or lag <= FASTEST_S:
@@ -125,9 +126,9 @@ EFFECT = Effect(
     source="Van Amerongen 1982, Adaptive Steering of Ships (steering machine)",
     order=30,
     fin=fin,
-    twin=twin,
-    forms=(
-        Form(
+    equivalent_solution=equivalent_solution,
+    variants=(
+        Variant(
             "a servo with inertia, of second order",
             (
                 Coefficient(
@@ -135,6 +136,6 @@ EFFECT = Effect(
                 ),
             ),
         ),
-        Form("it follows faster to one side than to the other", (SLACKENING,)),
+        Variant("it follows faster to one side than to the other", (SLACKENING,)),
     ),
 )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
 
 
@@ -34,8 +34,8 @@ EFFECT = Effect(
     source="Prestero 2001, chapter 4",
     needs=("surge",),
     terms=terms,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "it goes with another power of the speed",
             (Coefficient("speed_power", "1", 0.5, 4.0, 2.0, step=1e-3, says="power of the speed it goes with"),),
         ),

@@ -13,7 +13,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
 from fieldsid.models.record import Record
 
-SLOWEST = 0.05
+MIN_SPEED_RATIO = 0.05
 """Share of the run's speed below which a hull that stops or backs is held, since the law has no meaning there."""
 
 
@@ -26,7 +26,7 @@ def terms(values: Values, record: Record) -> Terms:
             found=f"median surge {record.speed:.3g} m/s",
             hint="leave `speed_varying` out, or check the sign of the surge speed on import",
         )
-    factor = np.maximum(surge / record.speed, SLOWEST) ** values["speed_share"]
+    factor = np.maximum(surge / record.speed, MIN_SPEED_RATIO) ** values["speed_share"]
     return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.effects._fin_reach import shares_of_reach
 from fieldsid.effects._paths import Beyond, through_map
-from fieldsid.effects._reach import shares_of_reach
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, FinPath, Form, Stage, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 
 
@@ -46,8 +47,8 @@ EFFECT = Effect(
     mistaken_for=("quadratic_damping", "deadband", "rate_limit", "crossflow_drag", "asymmetric_fin"),
     source="Whicker and Fehlner 1958, DTMB report 933",
     order=70,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "the lift bends off smoothly",
             (
                 Coefficient(
@@ -62,11 +63,11 @@ EFFECT = Effect(
                 ),
             ),
         ),
-        Form(
+        Variant(
             "the lift drops at the angle",
             (Coefficient("stall_drop", "1", 0.0, 1.0, 0.2, scan=(0.1, 0.3, 0.6), step=1e-3, says="share of lift lost at once"),),
         ),
     ),
     fin=fin,
-    suggest=shares_of_reach(ANGLE, (0.3, 0.5, 0.7, 0.85, 0.95)),
+    initial_guesses=shares_of_reach(ANGLE, (0.3, 0.5, 0.7, 0.85, 0.95)),
 )

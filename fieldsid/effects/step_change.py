@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 GRID = tuple(round(0.05 * i, 2) for i in range(1, 21))
 """Shares of a run; at the last of them nothing has happened in it."""
@@ -50,9 +50,9 @@ EFFECT = Effect(
     mistaken_for=("trim_drift", "speed_varying", "asymmetric_fin", "prop_moment", "wave"),
     source="Blanke, Kinnaert, Lunze and Staroswiecki 2016, Diagnosis and Fault-Tolerant Control",
     terms=terms,
-    handicap=5.0,
-    forms=(
-        Form(
+    log_prior_penalty=5.0,
+    variants=(
+        Variant(
             "it comes on gradually",
             (
                 Coefficient(

@@ -26,5 +26,5 @@ EFFECT = Effect(
     source="Fossen 2011, section 7.2: the yaw model before sway is dropped",
     extra_states=("sway",),
     core=core,
-    forms=FORMS,
+    variants=FORMS,
 )

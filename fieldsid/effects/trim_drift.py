@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
 
 MINUTE_S = 60.0
-SLOWEST = 1e-6
+MIN_LEVELLING_RATE_1_S = 1e-6
 """Rate of levelling off in 1/s, of either sign, below which a drift is steady."""
 
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the drifting moment, (n,) rad/s^2."""
     since, rate = record.time - record.time[0], values.get("levelling", 0.0)
-    grown = since if abs(rate) <= SLOWEST else -np.expm1(-rate * since) / rate
+    grown = since if abs(rate) <= MIN_LEVELLING_RATE_1_S else -np.expm1(-rate * since) / rate
     return Terms(moment=values["drift"] * grown / MINUTE_S)
 
 
@@ -37,8 +37,8 @@ EFFECT = Effect(
     mistaken_for=("step_change", "speed_moment", "depth_buoyancy", "prop_moment", "gyro_bias", "wave"),
     source="Fossen 2011, section 4.1",
     terms=terms,
-    forms=(
-        Form(
+    variants=(
+        Variant(
             "it levels off, or gathers pace",
             (
                 Coefficient(

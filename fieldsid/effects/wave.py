@@ -13,10 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Form, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 SHORTEST_S, LONGEST_S, TRIED, KEPT = 1.0, 30.0, 60, 2
 
@@ -53,7 +53,7 @@ def slope(name: str, values: Values, record: Record) -> FloatArray:
     return np.asarray(by_angle * of_angle[name])
 
 
-def suggest(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
+def initial_guesses(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
     """Return the wave of each period that stands out of what is left."""
     return [{"period": period, "amplitude": 0.02} for period in swings(records, residuals)]
 
@@ -80,7 +80,7 @@ def swings(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[f
 
 SECOND = "rad/s^2", -2.0, 2.0, 0.0
 FORMS = (
-    Form(
+    Variant(
         "a second component of another period joins it",
         (
             Coefficient("second_period", "s", 1.0, 30.0, 4.0, step=1e-3, says="period of the second component"),
@@ -89,7 +89,7 @@ FORMS = (
         ),
         suggest_second,
     ),
-    Form(
+    Variant(
         "its frequency shifts over a run",
         (
             Coefficient(
@@ -141,6 +141,6 @@ EFFECT = Effect(
     source="Fossen 2011, section 8.2",
     terms=terms,
     slope=slope,
-    suggest=suggest,
-    forms=FORMS,
+    initial_guesses=initial_guesses,
+    variants=FORMS,
 )

@@ -1,6 +1,6 @@
 """Output error: free-run simulation, least squares on angle and rate weighted by their own residual noise.
 
-Standard errors are those of the residuals' own colour (fitting/uncertainty.py), so that a disturbance or a
+Standard errors are those of the residuals' own colour (noise/sandwich_covariance.py), so that a disturbance or a
 missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2006, chapter 6.
 """
 
@@ -10,31 +10,36 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldsid.fitting.colour import chosen_noise
-from fieldsid.fitting.descent import Descent, covariance, descend, normal_equations, sandwich
-from fieldsid.fitting.grow import grown_start
-from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
-from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.problem import Problem, RunResult
-from fieldsid.fitting.restricted import lines_of, restricted_likelihood
-from fieldsid.fitting.small_sample import FEWEST_DEGREES_PLAIN, LONG, noise_spread, widened
-from fieldsid.fitting.unbounded import refuse_unbounded
-from fieldsid.fitting.uncertainty import middle
-from fieldsid.fitting.weights import squares_of
-from fieldsid.fitting.whitening import noise_vector
-from fieldsid.logs.run import FloatArray
+from fieldsid.fitting.covariance.kenward_roger import (
+    KNOWN_NOISE_SAMPLES,
+    MIN_DEGREES_WHITE_NOISE,
+    kenward_roger,
+    noise_covariance,
+)
+from fieldsid.fitting.covariance.noise_selection import chosen_noise
+from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood
+from fieldsid.fitting.initial.forward_build import forward_build
+from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations, sandwich
+from fieldsid.fitting.optimise.residual_weights import squares_of
+from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
+from fieldsid.fitting.problem.estimator import Estimator, Options, Solution, shared_covariance
+from fieldsid.fitting.problem.problem import Problem, RunResult
 from fieldsid.models.model import Noise
+from fieldsid.noise.sandwich_covariance import score_covariance
+from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.whiten import noise_vector
+from fieldsid.numerics.arrays import FloatArray
 
-REWEIGHTINGS = 2
-ROUGH = 1e-3
+MAX_REWEIGHTINGS = 2
+PROVISIONAL_COST_TOLERANCE = 1e-3
 """Relative change of the cost at which a descent under provisional weights ends."""
-NEGLIGIBLE = 0.02
+NEGLIGIBLE_LOG_WEIGHT_CHANGE = 0.02
 """Change of both weights, in logs, that does not move the minimum."""
-CLOSE = 1e-4
+LONG_RECORD_COST_TOLERANCE = 1e-4
 """The same on a long record, whose start is near the end."""
-NEAR = 1e-9
+INITIAL_DAMPING = 1e-9
 """Marquardt's damping of its first step: a larger one would stop short of the minimum by more than its error."""
-FIRST_PARTS = (5_000, 50_000)
+FIRST_PART_SAMPLES = (5_000, 50_000)
 """Samples of the first parts of a long record."""
 
 
@@ -43,93 +48,99 @@ def residual_noise(problem: Problem, x: FloatArray, parameters: int) -> Noise:
     squares, counts = squares_of(problem, x)
     lost = parameters * counts / max(float(counts.sum()), 1.0)
     sigma = np.sqrt(squares / np.maximum(counts - lost, 1.0))
-    floor = floor_of(problem.records)
+    floor = white_noise_floor(problem.records)
     return Noise(
         float(sigma[0]) if sigma[0] > 0 else floor.angle,
         float(sigma[1]) if sigma[1] > 0 else floor.rate,
     )
 
 
-def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Descent, Noise]:
+def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Minimum, Noise]:
     """Return the output-error minimum from a start, with weights from its own residuals."""
-    found = descend(problem, start, noise, tolerance=ROUGH)
-    for _ in range(REWEIGHTINGS):
+    found = levenberg_marquardt(problem, start, noise, tolerance=PROVISIONAL_COST_TOLERANCE)
+    for _ in range(MAX_REWEIGHTINGS):
         new = residual_noise(problem, found.x, len(found.free))
-        found = descend(problem, found.x, new)
+        found = levenberg_marquardt(problem, found.x, new)
         change = abs(np.log(new.angle / noise.angle)) + abs(np.log(new.rate / noise.rate))
         noise = new
-        if change < NEGLIGIBLE:
+        if change < NEGLIGIBLE_LOG_WEIGHT_CHANGE:
             break
     return found, noise
 
 
-def found_minimum(problem: Problem) -> tuple[Descent, Noise]:
+def found_minimum(problem: Problem) -> tuple[Minimum, Noise]:
     """Return the output-error minimum of a problem and its weights; raises DivergenceError where no start leads to any."""
     found, weights = _found_over_parts(problem)
-    refuse_unbounded(problem, found.x, ESTIMATOR.name, instead="leave effects out")
+    refuse_unbounded_motion(problem, found.x, ESTIMATOR.name, instead="leave effects out")
     return found, weights
 
 
-def _found_over_parts(problem: Problem) -> tuple[Descent, Noise]:
+def _found_over_parts(problem: Problem) -> tuple[Minimum, Noise]:
     """Return the minimum that a long record comes to over the minima of ever longer first parts, a short one at once.
 
     Each is so near the next one's that a step or two lead there.
     """
-    floor, longest = floor_of(problem.records), max(len(r) for r in problem.records)
-    first = problem if longest <= 2 * FIRST_PARTS[0] else problem.first(FIRST_PARTS[0])
-    found, weights = minimise(first, grown_start(first, floor), floor)
+    floor, longest = white_noise_floor(problem.records), max(len(r) for r in problem.records)
+    first = problem if longest <= 2 * FIRST_PART_SAMPLES[0] else problem.first(FIRST_PART_SAMPLES[0])
+    found, weights = minimise(first, forward_build(first, floor), floor)
     if first is problem:
         return found, weights
-    for samples in FIRST_PARTS[1:]:
+    for samples in FIRST_PART_SAMPLES[1:]:
         if longest > 2 * samples:
-            found = descend(problem.first(samples), found.x, weights, tolerance=ROUGH, damping=NEAR)
-    found = descend(problem, found.x, weights, tolerance=CLOSE, damping=NEAR)
+            found = levenberg_marquardt(
+                problem.first(samples), found.x, weights, tolerance=PROVISIONAL_COST_TOLERANCE, damping=INITIAL_DAMPING
+            )
+    found = levenberg_marquardt(problem, found.x, weights, tolerance=LONG_RECORD_COST_TOLERANCE, damping=INITIAL_DAMPING)
     new = residual_noise(problem, found.x, len(found.free))
-    if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) < NEGLIGIBLE:
+    if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) < NEGLIGIBLE_LOG_WEIGHT_CHANGE:
         return found, weights
-    return descend(problem, found.x, new, tolerance=CLOSE, damping=NEAR), new
+    return levenberg_marquardt(problem, found.x, new, tolerance=LONG_RECORD_COST_TOLERANCE, damping=INITIAL_DAMPING), new
 
 
-def coloured_covariance(problem: Problem, found: Descent, weights: Noise, noise: Noise) -> FloatArray:
+def coloured_covariance(problem: Problem, found: Minimum, weights: Noise, noise: Noise) -> FloatArray:
     """Return the covariance (F, F) of an output-error estimate under a noise model of any colour."""
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
     return _sandwich(problem, found, weights, noise_vector(noise), normal, results)
 
 
 def _sandwich(
-    problem: Problem, found: Descent, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult]
+    problem: Problem, found: Minimum, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult]
 ) -> FloatArray:
     sigma = np.array([weights.angle, weights.rate])
     place = {slot: i for i, slot in enumerate(found.free)}
     centre = np.zeros_like(normal)
     for record, result in zip(problem.records, results, strict=True):
         weighted = np.where(record.ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
-        index = np.array([place[s] for s in result.slots])
-        centre[np.ix_(index, index)] += middle(record, noise, result.base.damping, result.base.stiffness, weighted)
+        index = np.array([place[s] for s in result.columns])
+        centre[np.ix_(index, index)] += score_covariance(record, noise, result.base.damping, result.base.stiffness, weighted)
     return sandwich(normal, centre)
 
 
-def errors(problem: Problem, found: Descent, weights: Noise, noise: Noise, family: str) -> FloatArray:
+def errors(problem: Problem, found: Minimum, weights: Noise, noise: Noise, noise_kind: str) -> FloatArray:
     """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
-    if family == "white":
+    if noise_kind == "white":
         return covariance(found.normal)
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
     vector = noise_vector(noise)
-    if sum(len(r) for r in problem.records) > LONG:
+    if sum(len(r) for r in problem.records) > KNOWN_NOISE_SAMPLES:
         return _sandwich(problem, found, weights, vector, normal, results)
-    lines, count = lines_of(problem, found.x), len(problem.layout.slots)
-    spread = noise_spread(lambda v: restricted_likelihood(lines, count, v), vector, family)
+    lines, count = linearise_runs(problem, found.x), len(problem.layout.parameters)
+    spread = noise_covariance(lambda v: reml_likelihood(lines, count, v), vector, noise_kind)
     still = found.x[list(found.free)]
-    return widened(
-        lambda v: (still, _sandwich(problem, found, weights, v, normal, results)), vector, family, spread, FEWEST_DEGREES_PLAIN
+    return kenward_roger(
+        lambda v: (still, _sandwich(problem, found, weights, v, normal, results)),
+        vector,
+        noise_kind,
+        spread,
+        MIN_DEGREES_WHITE_NOISE,
     )
 
 
 def solve(problem: Problem, _options: Options) -> Solution:
     """Return the output-error solution of a joint problem."""
     found, weights = found_minimum(problem)
-    family, noise, notes = chosen_noise(problem, found.x, weights)
-    full = errors(problem, found, weights, noise, family)
+    noise_kind, noise, notes = chosen_noise(problem, found.x, weights)
+    full = errors(problem, found, weights, noise, noise_kind)
     return Solution(found.x, shared_covariance(problem, full, found.free), noise, ESTIMATOR.name, notes)
 
 

@@ -9,17 +9,25 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.estimators.output_error import found_minimum
-from fieldsid.fitting.descent import Descent, covariance, descend
-from fieldsid.fitting.method import Estimator, Options, Solution, shared_covariance
-from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.restricted import ENOUGH, best_noise, generalised, lines_of, restricted_likelihood, restricted_noise
-from fieldsid.fitting.small_sample import LONG, noise_spread, widened
-from fieldsid.fitting.whitening import noise_vector
-from fieldsid.logs.run import FloatArray, Note
+from fieldsid.fitting.covariance.kenward_roger import KNOWN_NOISE_SAMPLES, kenward_roger, noise_covariance
+from fieldsid.fitting.covariance.reml import (
+    MAX_NOISE_SAMPLES,
+    gls_step,
+    linearise_runs,
+    reml_likelihood,
+    reml_noise,
+    select_noise,
+)
+from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt
+from fieldsid.fitting.problem.estimator import Estimator, Options, Solution, shared_covariance
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Note
 from fieldsid.models.model import Noise
+from fieldsid.noise.whiten import noise_vector
+from fieldsid.numerics.arrays import FloatArray
 
-ROUNDS = 8
-SETTLED = 1e-2
+MAX_ALTERNATIONS = 8
+CONVERGED_STD_ERRORS = 1e-2
 """Largest movement, in standard errors, at which noise and parameters count as agreed."""
 
 
@@ -35,31 +43,31 @@ def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
     The family of the noise is chosen again after the first step away from that minimum, whose residuals a
     disturbance fed back through the fin has bent.
     """
-    part = problem.first(ENOUGH // len(problem.records))
-    found = descend(problem, x, best_noise(problem, x, weights)[1])
-    family, noise, _ = best_noise(problem, found.x, weights)
-    for _ in range(ROUNDS):
+    part = problem.first(MAX_NOISE_SAMPLES // len(problem.records))
+    found = levenberg_marquardt(problem, x, select_noise(problem, x, weights)[1])
+    noise_kind, noise, _ = select_noise(problem, found.x, weights)
+    for _ in range(MAX_ALTERNATIONS):
         before = found.x
-        found = descend(problem, before, noise)
-        settled = _moved(found, before) < SETTLED
+        found = levenberg_marquardt(problem, before, noise)
+        settled = _moved(found, before) < CONVERGED_STD_ERRORS
         if settled:
             break
-        noise, _ = restricted_noise(problem, lines_of(part, found.x), family, noise)
-    notes = (Note("noise_model", f"noise model: {family}", {"family": family}),)
-    known = shared_covariance(problem, errors(problem, found, noise, family), found.free)
+        noise, _ = reml_noise(problem, linearise_runs(part, found.x), noise_kind, noise)
+    notes = (Note("noise_model", f"noise model: {noise_kind}", {"family": noise_kind}),)
+    known = shared_covariance(problem, errors(problem, found, noise, noise_kind), found.free)
     return Solution(found.x, known, noise, ESTIMATOR.name, notes, weights=noise)
 
 
-def errors(problem: Problem, found: Descent, noise: Noise, family: str) -> FloatArray:
+def errors(problem: Problem, found: Minimum, noise: Noise, noise_kind: str) -> FloatArray:
     """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
-    if family == "white" or sum(len(r) for r in problem.records) > LONG:
+    if noise_kind == "white" or sum(len(r) for r in problem.records) > KNOWN_NOISE_SAMPLES:
         return covariance(found.normal)
-    lines, count, vector = lines_of(problem, found.x), len(problem.layout.slots), noise_vector(noise)
-    spread = noise_spread(lambda v: restricted_likelihood(lines, count, v), vector, family)
-    return widened(lambda v: generalised(lines, count, v), vector, family, spread)
+    lines, count, vector = linearise_runs(problem, found.x), len(problem.layout.parameters), noise_vector(noise)
+    spread = noise_covariance(lambda v: reml_likelihood(lines, count, v), vector, noise_kind)
+    return kenward_roger(lambda v: gls_step(lines, count, v), vector, noise_kind, spread)
 
 
-def _moved(found: Descent, before: FloatArray) -> float:
+def _moved(found: Minimum, before: FloatArray) -> float:
     spread = np.sqrt(np.maximum(np.diag(covariance(found.normal)), 0.0))
     return float(np.max(np.abs(found.x - before)[list(found.free)] / np.maximum(spread, 1e-12)))
 

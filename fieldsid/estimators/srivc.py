@@ -13,23 +13,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.dynamics import integrate
+from fieldsid.dynamics.assemble import pieces_for
 from fieldsid.errors import DataError, DivergenceError
-from fieldsid.estimators.svf_ls import base_slots, finished, inverse_of_normal, median_step, regress, theta_of
-from fieldsid.fitting.equation import Theta, measured_signals
-from fieldsid.fitting.method import Estimator, Options, Solution
-from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.sample_noise import Transfer
-from fieldsid.fitting.series_errors import Series, coloured_covariance
-from fieldsid.logs.run import FloatArray, Note
-from fieldsid.models import kernels
+from fieldsid.estimators.svf_ls import base_slots, finished, inverse_of_normal, median_step, parameters_of, regress
+from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.fitting.regression.bias_compensation import Transfer
+from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
+from fieldsid.fitting.regression.svf_equation import RegressionParameters, measured_signals
+from fieldsid.logs.run import Note
 from fieldsid.models.record import Record
-from fieldsid.models.signal_path import pieces_for
+from fieldsid.numerics.arrays import FloatArray
 
-ROUNDS = 30
-SETTLED = 1e-7
-SLOWEST, SOFTEST = 0.05, 0.0
+MAX_SRIVC_ITERATIONS = 30
+CONVERGED_RELATIVE_CHANGE = 1e-7
+MIN_FILTER_DAMPING, MIN_FILTER_STIFFNESS = 0.05, 0.0
 """Least damping (1/s) and stiffness (1/s^2) of the filter: an unstable estimate must not become an unstable filter."""
-FINE_S = 0.0125
+MAX_SIMULATION_STEP_S = 0.0125
 """Longest step of the simulation between samples."""
 
 
@@ -59,8 +60,8 @@ def solve(problem: Problem, options: Options) -> Solution:
     use = measured_signals(record, options.bandwidth).use & record.angle_ok
     state = np.array([problem.state_of(x, 0)[0], 0.0])
     moved, rounds = np.inf, 0
-    while moved > SETTLED and rounds < ROUNDS:
-        theta, rounds = theta_of(problem, x, 0), rounds + 1
+    while moved > CONVERGED_RELATIVE_CHANGE and rounds < MAX_SRIVC_ITERATIONS:
+        theta, rounds = parameters_of(problem, x, 0), rounds + 1
         rows, instruments = filtered_rows(record, theta, state)
         phi, z = rows.columns[use][:, keep], instruments.columns[use][:, keep]
         if not (np.isfinite(z).all() and np.isfinite(phi).all()):
@@ -69,7 +70,7 @@ def solve(problem: Problem, options: Options) -> Solution:
         found = np.linalg.lstsq((z * scale).T @ (phi * scale), (z * scale).T @ rows.target[use], rcond=1e-13)[0] * scale
         moved = float(np.max(np.abs(found[: len(slots)] - x[slots]) / (np.abs(x[slots]) + 1e-3)))
         x[slots] = found[: len(slots)]
-        damping = max(theta.damping, SLOWEST)
+        damping = max(theta.damping, MIN_FILTER_DAMPING)
         # the start terms are y0 of f' and y'(0) + a y0 of f, with f the filter's impulse response
         state = np.array([found[-1], found[-2] - damping * found[-1]])
     residual = rows.target[use] - phi @ found
@@ -80,15 +81,15 @@ def solve(problem: Problem, options: Options) -> Solution:
     return finished(problem, x, covariance, ESTIMATOR.name, notes_of(rounds, moved))
 
 
-def filtered_rows(record: Record, theta: Theta, state: FloatArray) -> tuple[Rows, Rows]:
+def filtered_rows(record: Record, theta: RegressionParameters, state: FloatArray) -> tuple[Rows, Rows]:
     """Return the rows of the measurement and those of the noise-free simulation from a state (angle, rate)."""
     measured, path = measured_signals(record, 4.0).angle, record.commanded
-    pieces = max(1, int(np.ceil(float(np.max(record.steps)) / FINE_S)))
+    pieces = max(1, int(np.ceil(float(np.max(record.steps)) / MAX_SIMULATION_STEP_S)))
     fine = np.repeat(record.steps / pieces, pieces)
     part = np.tile(np.arange(pieces) / pieces, record.steps.size)
     start, change = np.repeat(path.start, pieces), np.repeat(path.end - path.start, pieces)
     fin = start + change * part, start + change * (part + 1.0 / pieces)
-    a, k = max(theta.damping, SLOWEST), max(theta.stiffness, SOFTEST)
+    a, k = max(theta.damping, MIN_FILTER_DAMPING), max(theta.stiffness, MIN_FILTER_STIFFNESS)
     push = [theta.authority * f + theta.trim for f in fin]
     motion = through(fine, a, k, push[0], push[1], state)[:, 0]
     every = slice(None, None, pieces)
@@ -109,16 +110,16 @@ def through(
     steps: FloatArray, a: float, k: float, start: FloatArray, end: FloatArray, state: FloatArray | None = None
 ) -> FloatArray:
     """Return a signal, straight over each interval, through 1/(s^2 + a s + k), and its slope: (n, 2)."""
-    drive = np.zeros((steps.size, len(kernels.DRIVES)))
+    drive = np.zeros((steps.size, len(integrate.DRIVES)))
     drive[:, 0], drive[:, 1], drive[:, 2], drive[:, 3] = a, k, start, end
     first = np.zeros(3) if state is None else np.array([state[0], state[1], 0.0])
     out = np.empty((steps.size + 1, 3))
     pieces = pieces_for(float(steps.max()), a, k**0.5)
-    kernels.simulate(steps, drive, np.zeros(len(kernels.CONSTANTS)), first, pieces, out)
+    integrate.integrate_motion(steps, drive, np.zeros(len(integrate.CONSTANTS)), first, pieces, out)
     return out[:, :2]
 
 
-def _astray(record: Record, theta: Theta, rounds: int) -> DivergenceError:
+def _astray(record: Record, theta: RegressionParameters, rounds: int) -> DivergenceError:
     return DivergenceError(
         f"the instrumental variables of run {record.name!r} grow without bound",
         found=f"round {rounds}: damping {theta.damping:.3g}, stiffness {theta.stiffness:.3g}, authority {theta.authority:.3g}",

@@ -13,21 +13,22 @@ import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.estimators.output_error import residual_noise
-from fieldsid.fitting.equation import Equation, Measured, Theta, filtered_equation, measured_signals
-from fieldsid.fitting.layout import group_name
-from fieldsid.fitting.method import Estimator, Options, Solution
-from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.predict import refit_own
-from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.sample_noise import noise_share, transfer_of
-from fieldsid.fitting.series_errors import Series, coloured_covariance
-from fieldsid.fitting.unbounded import refuse_unbounded
-from fieldsid.logs.run import FloatArray, Note
+from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
+from fieldsid.fitting.predict.predict import refit_nuisances
+from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
+from fieldsid.fitting.problem.parameters import group_name
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.fitting.regression.bias_compensation import noise_share, transfer_of
+from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
+from fieldsid.fitting.regression.svf_equation import Equation, Measured, RegressionParameters, filtered_equation, measured_signals
+from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
+from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.numerics.arrays import FloatArray
 
-PASSES = 3
-WIDEST_BY_ANGLE = 4.0
+BIAS_CORRECTION_PASSES = 3
+MAX_ANGLE_ONLY_BANDWIDTH_RAD_S = 4.0
 """Filter bandwidth (rad/s) above which the noise of an angle alone biases the damping."""
 
 
@@ -38,11 +39,11 @@ def solve(problem: Problem, options: Options) -> Solution:
 
 
 def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray, list[Measured]]:
-    """Return the vector (N,), covariance (S, S) of its shared slots, and the signals of each run."""
+    """Return the vector (N,), covariance (S, S) of its shared parameters, and the signals of each run."""
     signals = [measured_signals(r, bandwidth) for r in problem.records]
     slots = base_slots(problem)
-    theta: list[Theta] | None = None
-    for _ in range(PASSES):
+    theta: list[RegressionParameters] | None = None
+    for _ in range(BIAS_CORRECTION_PASSES):
         blocks = [
             filtered_equation(r, s, bandwidth, None if theta is None else theta[i])
             for i, (r, s) in enumerate(zip(problem.records, signals, strict=True))
@@ -52,7 +53,7 @@ def regress(problem: Problem, bandwidth: float) -> tuple[FloatArray, FloatArray,
         found, inverse = without_noise_bias(problem, rows, found, signals, bandwidth)
         x = problem.start()
         x[list(slots.values())] = found[: len(slots)]
-        theta = [theta_of(problem, x, run) for run in range(len(problem.records))]
+        theta = [parameters_of(problem, x, run) for run in range(len(problem.records))]
     residual = rows.target - rows.matrix @ found
     series = [
         Series(rows.matrix[part], residual[part], transfer_of(s.order, bandwidth, median_step(r), t), median_step(r))
@@ -124,7 +125,7 @@ def without_noise_bias(
     normal = rows.matrix.T @ rows.matrix
     gram, cross = np.zeros_like(normal), np.zeros(normal.shape[0])
     for record, s, part, own in zip(problem.records, signals, rows.parts, rows.maps, strict=True):
-        floor = floor_of([record])
+        floor = white_noise_floor([record])
         share = noise_share(s.order, bandwidth, median_step(record), floor.angle, floor.rate)
         count = part.stop - part.start
         gram += count * own.T @ share.gram @ own
@@ -171,10 +172,10 @@ def least_squares(rows: Stacked, wanted: int) -> FloatArray:
     return np.asarray(solution / np.maximum(scale, 1e-300))
 
 
-def theta_of(problem: Problem, x: FloatArray, run: int) -> Theta:
+def parameters_of(problem: Problem, x: FloatArray, run: int) -> RegressionParameters:
     """Return a run's own base parameters."""
     base = problem.base_of(x, run)
-    return Theta(base.damping, base.stiffness, base.authority, base.trim)
+    return RegressionParameters(base.damping, base.stiffness, base.authority, base.trim)
 
 
 def finished(problem: Problem, x: FloatArray, covariance: FloatArray, method: str, notes: tuple[Note, ...]) -> Solution:
@@ -185,21 +186,21 @@ def finished(problem: Problem, x: FloatArray, covariance: FloatArray, method: st
     layout = problem.layout
     x = np.clip(x, layout.low, layout.high)
     for run, record in enumerate(problem.records):
-        x = refit_own(problem, x, run, floor_of([record]))
-    refuse_unbounded(problem, x, method, instead="use `--method output_error`, which keeps to motions that stay bounded")
+        x = refit_nuisances(problem, x, run, white_noise_floor([record]))
+    refuse_unbounded_motion(problem, x, method, instead="use `--method output_error`, which keeps to motions that stay bounded")
     noise = residual_noise(problem, x, len(base_slots(problem)))
     return Solution(x, covariance, noise, method, notes)
 
 
 def bandwidth_notes(signals: list[Measured], bandwidth: float) -> tuple[Note, ...]:
     """Return the remark on a filter too wide for a log without a rate."""
-    if bandwidth <= WIDEST_BY_ANGLE or all(s.order == 1 for s in signals):
+    if bandwidth <= MAX_ANGLE_ONLY_BANDWIDTH_RAD_S or all(s.order == 1 for s in signals):
         return ()
     message = (
-        f"no rate was measured and the filter is wide (lambda = {bandwidth:g}, limit {WIDEST_BY_ANGLE:g} rad/s): "
+        f"no rate was measured and the filter is wide (lambda = {bandwidth:g}, limit {MAX_ANGLE_ONLY_BANDWIDTH_RAD_S:g} rad/s): "
         "noise of the angle biases the damping; use `--method srivc` or a smaller lambda"
     )
-    return (Note("wide_filter_angle_only", message, {"lambda": bandwidth, "limit": WIDEST_BY_ANGLE}),)
+    return (Note("wide_filter_angle_only", message, {"lambda": bandwidth, "limit": MAX_ANGLE_ONLY_BANDWIDTH_RAD_S}),)
 
 
 ESTIMATOR = Estimator(

@@ -11,16 +11,25 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.estimators.svf_ls import bandwidth_notes, base_slots, finished, inverse_of_normal, median_step, regress, theta_of
-from fieldsid.fitting.equation import Measured, Theta, measured_signals
-from fieldsid.fitting.method import Estimator, History, Options, Solution
-from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.recursive import MEMORY, A, B, C, K, fresh, noise_of, sweep
-from fieldsid.fitting.sample_noise import NoiseShare, noise_share, transfer_of
-from fieldsid.fitting.series_errors import Series, coloured_covariance
-from fieldsid.logs.run import FloatArray, Note
+from fieldsid.estimators.svf_ls import (
+    bandwidth_notes,
+    base_slots,
+    finished,
+    inverse_of_normal,
+    median_step,
+    parameters_of,
+    regress,
+)
+from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.fitting.regression.bias_compensation import NoiseShare, noise_share, transfer_of
+from fieldsid.fitting.regression.recursive_ls import MEMORY, A, B, C, K, initial_memory, noise_of, sweep
+from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
+from fieldsid.fitting.regression.svf_equation import Measured, RegressionParameters, measured_signals
+from fieldsid.logs.run import Note
 from fieldsid.models.record import Record
+from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.numerics.arrays import FloatArray
 
 SETTLED_SHARE = 0.05
 """A parameter is settled while it stays within this share of its last value, or within its last two standard errors."""
@@ -36,7 +45,7 @@ def solve(problem: Problem, options: Options) -> Solution:
         )
     signals = measured_signals(record, options.bandwidth)
     block, _, _ = regress(problem, options.bandwidth)
-    values, spread, rows = run(record, signals, options, theta_of(problem, block, 0), stiff=len(slots) == 4)
+    values, spread, rows = run(record, signals, options, parameters_of(problem, block, 0), stiff=len(slots) == 4)
     used = np.isfinite(rows[:, -1])
     if used.sum() <= 2 * len(slots):
         raise DataError(
@@ -58,12 +67,12 @@ def solve(problem: Problem, options: Options) -> Solution:
 
 def share_of(record: Record, signals: Measured, bandwidth: float) -> NoiseShare:
     """Return the share of the record's own white noise in one row's products."""
-    floor = floor_of([record])
+    floor = white_noise_floor([record])
     return noise_share(signals.order, bandwidth, median_step(record), floor.angle, floor.rate)
 
 
 def run(
-    record: Record, signals: Measured, options: Options, theta: Theta, *, stiff: bool
+    record: Record, signals: Measured, options: Options, theta: RegressionParameters, *, stiff: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return estimates and plain standard deviations after every sample (n, p), and rows of phi and target (n, p + 1).
 
@@ -79,7 +88,7 @@ def run(
     settings = (options.bandwidth, options.forgetting, signals.order)
     memory = np.zeros(MEMORY)
     memory[[A, K, B, C]] = theta.damping, theta.stiffness, theta.authority, theta.trim
-    sweep(memory, fresh(stiff=stiff), *settings, 4 if stiff else 3, noise, samples, values, spread, rows)
+    sweep(memory, initial_memory(stiff=stiff), *settings, 4 if stiff else 3, noise, samples, values, spread, rows)
     keep = [0, 1, 2, 3] if stiff else [0, 2, 3]
     return values[:, keep], spread[:, keep], rows[:, [*keep, 4]]
 
@@ -95,7 +104,7 @@ def errors_of(
     keep = [0, 1, 2, 3] if theta.size == 4 else [0, 2, 3]
     gram = share_of(record, signals, options.bandwidth).gram[np.ix_(keep, keep)] * weight.sum()
     plain_inverse, inverse = inverse_of_normal(weighted.T @ columns, 0.0 * gram), inverse_of_normal(weighted.T @ columns, gram)
-    transfer = transfer_of(signals.order, options.bandwidth, h, theta_of(problem, x, 0))
+    transfer = transfer_of(signals.order, options.bandwidth, h, parameters_of(problem, x, 0))
     power = float(weight @ residual**2) / max(float(weight.sum()) - theta.size, 1.0)
     plain = plain_inverse * (power * float((weight**2).sum() / weight.sum()))
     return coloured_covariance([Series(weighted, residual, transfer, h)], inverse), plain

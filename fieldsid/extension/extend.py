@@ -11,30 +11,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.diagnosis.floor import shown_floor
-from fieldsid.diagnosis.hypothesis import Hypothesis, hypothesis_of, with_free_run
+from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.diagnosis.data.holdout_split import holdout_split
+from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
+from fieldsid.diagnosis.evidence.acceptance import MAX_ERROR_RATIO
+from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood, fit_output_error
+from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.records import Pair
-from fieldsid.diagnosis.refitted import refitted_model
-from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.split import held_back
-from fieldsid.diagnosis.trial import judge, refine
-from fieldsid.diagnosis.usable import usable
-from fieldsid.diagnosis.weather import in_its_weather
-from fieldsid.diagnosis.worth import MATTERS
+from fieldsid.diagnosis.report.final_model import final_model
+from fieldsid.diagnosis.search.search import Search
 from fieldsid.display import Brief, Plotted
 from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import DataError, UsageError
 from fieldsid.fitting.fit_runs import records_of
-from fieldsid.fitting.predict import as_flown
+from fieldsid.fitting.predict.predict import as_flown
 from fieldsid.logs.run import Note, Run
-from fieldsid.logs.sifting import Refused
+from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.effect import Effect, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
 
-SAME = 1e-3
+EQUAL_LOG_LIKELIHOOD = 1e-3
 """Log likelihoods that differ by less are one optimum."""
-WIDTH = 2
+BEAM_WIDTH = 2
 """Orders in which several effects are added that are followed from one addition to the next."""
 
 
@@ -60,7 +60,7 @@ class Gain(Brief):
         return before.over(self.noise_floor), after.over(self.noise_floor)
 
     def left(self, *, kept: bool) -> tuple[float, float]:
-        """Return the error over the noise floor that the addition leaves, or its lack where not kept: fitted, unseen runs.
+        """Return the error over the noise floor that the addition leaves, or its lack where not kept: fitted, validation runs.
 
         NaN for the unseen where there are none.
         """
@@ -81,7 +81,7 @@ class Extension(Plotted):
     def pays(self) -> bool:
         """Whether the error falls by more than a trifle; where all data were fitted the evidence must pay as well."""
         before, after = self.gain.over_floor
-        return after < MATTERS * before and (self.gain.unseen or self.evidence > 0.0)
+        return after < MAX_ERROR_RATIO * before and (self.gain.unseen or self.evidence > 0.0)
 
 
 def extend(
@@ -104,53 +104,53 @@ def extend(
     new = new_effects(parent, add)
     fitted, checked = records_of([training, validation], parent.axis, unfit)
     records, unseen = [record for _, record in fitted], tuple(record for _, record in checked)
-    learned, judged, notes = (tuple(records), unseen, ()) if unseen else held_back(records)
+    learned, judged, notes = (tuple(records), unseen, ()) if unseen else holdout_split(records)
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
     before = base_from(work, parent)
     after = _with_all(work)
-    work.hear(after.judged.trial)
+    work.update_noise_floor(after.likelihood_fit.fitted)
     gain = Gain(
         added=tuple(e.name for e in new),
         before=before.errors,
         after=after.errors,
-        noise_floor=shown_floor(work.floor, in_its_weather(after.judged, work.beside).noise),
+        noise_floor=reported_noise_floor(work.floor, joint_noise_fit(after.likelihood_fit, work.parallel).noise),
         unseen=bool(judged),
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),
     )
-    model = refitted_model(after)
+    model = final_model(after)
     notes = (*notes, *as_flown(model, judged), *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
-    return Extension(model, gain, after.score - before.score, notes)
+    return Extension(model, gain, after.log_evidence - before.log_evidence, notes)
 
 
-def base_from(work: Search, parent: Model) -> Hypothesis:
+def base_from(work: Search, parent: Model) -> ScoredModel:
     """Return the search's base, refitted from the parent's own values as well where that ends better.
 
     Effects whose cost is not smooth have their scanned start in the parent, not in their declaration.
     """
     base = work.base()
-    problem = base.judged.trial.problem
+    problem = base.likelihood_fit.fitted.problem
     layout, reference = problem.layout, problem.layout.groups.speeds[problem.layout.groups.reference]
     given = {**parent.values, **parent.at_speed(reference)}
     if not parent.effects or not all(np.isfinite(v) for v in given.values()):
         return base
-    x = base.judged.trial.x.copy()
+    x = base.likelihood_fit.fitted.x.copy()
     for i, name in enumerate(layout.names):
         x[i] = given.get(name, x[i])
-    start = refine(problem, x, base.judged.trial.weights)
-    again = judge(problem, start.x, base.judged.noise, work.told, work.family)
-    if again.likelihood > base.judged.likelihood + SAME:
-        work.tried[work.root] = with_free_run(hypothesis_of(again, work.validation), work.floor)
+    start = fit_output_error(problem, x, base.likelihood_fit.fitted.weights)
+    again = fit_maximum_likelihood(problem, start.x, base.likelihood_fit.noise, work.resolution_floor, work.noise_kind)
+    if again.log_likelihood > base.likelihood_fit.log_likelihood + EQUAL_LOG_LIKELIHOOD:
+        work.tried[work.root] = prefer_output_error(score_model(again, work.validation), work.floor)
     return work.base()
 
 
-def _with_all(work: Search) -> Hypothesis:
-    """Return the hypothesis of all effects of the search's catalogue, grown one effect at a time."""
+def _with_all(work: Search) -> ScoredModel:
+    """Return the model of all effects of the search's catalogue, grown one effect at a time."""
     front = [work.base()]
     for _ in range(len(work.catalogue) - len(work.known)):
-        children = {frozenset(c.names): c for parent in front for c in work.grow(parent, forced=True)}
-        front = sorted(children.values(), key=lambda h: -h.score)[:WIDTH]
+        children = {frozenset(c.names): c for parent in front for c in work.forward_step(parent, forced=True)}
+        front = sorted(children.values(), key=lambda h: -h.log_evidence)[:BEAM_WIDTH]
     return front[0]
 
 
@@ -179,7 +179,7 @@ def new_effects(parent: Model, add: Sequence[str]) -> tuple[Effect, ...]:
 
 def _with_signals(parts: Sequence[Effect], records: Sequence[Record]) -> tuple[Effect, ...]:
     """Return the effects with the forms that can be tried; raises DataError for one whose signals the records lack."""
-    kept, skipped = usable(parts, records)
+    kept, skipped = applicable_effects(parts, records)
     for name, why in skipped.items():
         raise DataError(
             f"effect `{name}` {why}",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from fieldsid.errors import UsageError
-from fieldsid.face.given import File
+from fieldsid.face.arguments import File
 from fieldsid.logs import Run, save_run
 from fieldsid.models import model as models
 from fieldsid.models.model import Model

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fieldsid.errors import UsageError
-from fieldsid.face.given import File, axis_of, names_of, own_effects, vehicle_of
+from fieldsid.face.arguments import File, axis_of, names_of, own_effects, vehicle_of
 from fieldsid.face.models import AnyModel, model_of
 from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.several import Several
@@ -43,7 +43,7 @@ def identify(
     UsageError for a method or effect that cannot do what is asked, and as `load` does.
     """
     from fieldsid.fitting.identify import identify as fit_runs
-    from fieldsid.fitting.method import Options
+    from fieldsid.fitting.problem.estimator import Options
 
     own_effects()
     return Several(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldsid.face.given import File, designed_from, fin_limits_of, own_effects, rudder_of, run_files, vehicle_of
+from fieldsid.face.arguments import File, designed_from, fin_limits_of, own_effects, rudder_of, run_files, vehicle_of
 from fieldsid.face.models import Models, source_of
 from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.speeds import speeds_of
@@ -93,7 +93,7 @@ def design_schedule(
     """
     from fieldsid.schedule import FinLimits, Wish
     from fieldsid.schedule import design_schedule as design
-    from fieldsid.schedule.verify import STEP
+    from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
@@ -102,7 +102,7 @@ def design_schedule(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller, damping, phase_margin, STEP[source.axis]),
+        wish=Wish(controller, damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
         limits=FinLimits(fin_lag, delay, rate),
         depth=depth,
     )

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from fieldsid.diagnosis import Diagnosis
     from fieldsid.extension import Extension
     from fieldsid.fitting.fit import Fit
-    from fieldsid.turning import Laws, Source
+    from fieldsid.turning import Laws, ParameterSource
 
 OneModel: TypeAlias = "Model | Fit | Extension | Diagnosis | str | PathLike[str]"
 AnyModel: TypeAlias = "OneModel | Sequence[Model] | Sequence[Fit]"
@@ -30,13 +30,13 @@ def model_of(given: AnyModel) -> Model:
     raise UsageError("this takes one model", found=found, hint="take one of them, `[0]`, or fit the runs together, `joint=True`")
 
 
-def source_of(given: Models, law: str | Sequence[str] = ()) -> Source:
+def source_of(given: Models, law: str | Sequence[str] = ()) -> ParameterSource:
     """Return where the parameters at a speed come from: models, a table of parameters, a fit file, or laws.
 
     law: laws of one's own, `NAME=c0[,c1]`, as the option. Raises UsageError, DataError and ArtifactError.
     """
+    from fieldsid.plant.parameter_source import load_parameter_source, source_of_laws, source_of_models
     from fieldsid.turning import Laws
-    from fieldsid.turning.source import load_source, source_of_laws, source_of_models
 
     own = (law,) if isinstance(law, str) else tuple(law)
     items = [given] if isinstance(given, (str, PathLike, Model)) or not isinstance(given, Iterable) else list(given)
@@ -44,7 +44,7 @@ def source_of(given: Models, law: str | Sequence[str] = ()) -> Source:
         return source_of_laws(items[0], laws=own)
     named = [item for item in items if isinstance(item, (str, PathLike))]
     if len(named) == len(items):
-        return load_source([path for item in named for path in files_of(item, "model")], laws=own)
+        return load_parameter_source([path for item in named for path in files_of(item, "model")], laws=own)
     models = [model for item in items for model in _models(item)]
     return source_of_models(models, [_name(m, i) for i, m in enumerate(models)], laws=own)
 

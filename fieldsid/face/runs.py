@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeGuard, cast
 
 from fieldsid.errors import LogError, UsageError
-from fieldsid.face.given import File, signal_limits, vehicle_of
+from fieldsid.face.arguments import File, signal_limits, vehicle_of
 from fieldsid.face.several import Several
 from fieldsid.logs import ChannelMap, Run, Source, load_run
-from fieldsid.logs.conditioning import MAX_GAP_S
+from fieldsid.logs.convert.assemble import WHOLE
+from fieldsid.logs.convert.conditioning import MAX_GAP_S
+from fieldsid.logs.importing import runs_under_way
 from fieldsid.logs.reader import neighbours
 
 if TYPE_CHECKING:
@@ -39,18 +41,24 @@ class Reading:
     fin_max_rad: Mapping[str, float] = field(default_factory=dict)
     start: float | None = None
     end: float | None = None
+    whole: bool = True
 
-    def of_file(self, path: Path) -> Run:
-        """Return the run of a file."""
-        run = load_run(
-            path, self.mapping, channels=self.channels, msg_path=self.msg_path, salvage=self.salvage, max_gap_s=self.max_gap_s,
-            fin_max_rad=self.fin_max_rad,
-        )  # fmt: skip
-        return self.part(run)
+    def of_file(self, path: Path) -> list[Run]:
+        """Return the run of a file, or where not all of it is wanted its stretches under way."""
+
+        def load_part(part: tuple[float, float], max_gap_s: float) -> Run:
+            return load_run(
+                path, self.mapping, channels=self.channels, msg_path=self.msg_path, salvage=self.salvage, max_gap_s=max_gap_s,
+                part=part, fin_max_rad=self.fin_max_rad,
+            )  # fmt: skip
+
+        if self.whole or not (self.start is None and self.end is None):
+            return [self.part(load_part(WHOLE, self.max_gap_s))]
+        return runs_under_way(load_part, self.max_gap_s)
 
     def of_table(self, table: DataFrame, name: str) -> Run:
         """Return the run of a pandas table."""
-        from fieldsid.logs.frame import run_of_frame
+        from fieldsid.logs.pandas_table import run_of_frame
 
         run = run_of_frame(
             table, name, self.mapping, channels=self.channels, salvage=self.salvage, max_gap_s=self.max_gap_s,
@@ -76,15 +84,17 @@ def load(
     end: float | None = None,
     max_gap: float = MAX_GAP_S,
     salvage: bool = False,
+    whole: bool = False,
 ) -> Several[Run]:
     """Return the runs of logs, as `sysid import` reads them: files, patterns as `runs/*.parquet`, pandas tables.
 
     A table has a row per sample; a dictionary of tables names their runs. channel: `SIGNAL=COLUMN:UNIT`, as the option. vehicle:
     its fin limits are for the finding of saturation. start, end: the part of every run, in s. max_gap: the longest gap, in s.
-    salvage: take what is left of a damaged log. Raises LogError for a file that is missing or cannot be read and for a pattern
-    without a file, MappingError where no column is known, DataError where the part is empty, UsageError for what is no log.
+    salvage: take what is left of a damaged log. whole: keep what of a file is not under way, as one run; without it the stretches
+    under way are runs of their own. Raises LogError for a file that is missing or cannot be read and for a pattern without a
+    file, MappingError where no column is known, DataError where the part is empty, UsageError for what is no log.
     """
-    from fieldsid.logs.mapping import channel_of
+    from fieldsid.logs.mapping.mapping_file import channel_of
 
     reading = Reading(
         mapping=_mapping(mapping),
@@ -95,6 +105,7 @@ def load(
         fin_max_rad=signal_limits(vehicle_of(vehicle)),
         start=start,
         end=end,
+        whole=whole,
     )
     return runs_of(logs, reading)
 
@@ -126,7 +137,7 @@ def _read(logs: Logs, reading: Reading) -> Iterator[Run]:
     if isinstance(logs, Run):
         yield reading.part(logs)
     elif isinstance(logs, (str, PathLike)):
-        yield from (reading.of_file(path) for path in files_of(logs))
+        yield from (run for path in files_of(logs) for run in reading.of_file(path))
     elif is_table(logs):
         yield reading.of_table(logs, "")
     elif isinstance(logs, Mapping):

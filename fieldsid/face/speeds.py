@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from fieldsid.errors import UsageError
 
-MOST = 2000
+MAX_SPEEDS = 2000
 
 
 def speeds_of(given: str | Iterable[float] | None) -> list[float]:
@@ -26,8 +26,8 @@ def _read(text: str) -> list[float]:
             if not (0 < low <= high and step > 0):
                 raise _wrong(text, "low, high and step must be above zero, low below high")
             count = math.floor((high - low) / step + 1e-9) + 1
-            if count > MOST:
-                raise _wrong(text, f"{count} speeds, at most {MOST}")
+            if count > MAX_SPEEDS:
+                raise _wrong(text, f"{count} speeds, at most {MAX_SPEEDS}")
             return [round(low + i * step, 9) for i in range(count)]
         speeds = [float(part) for part in text.split(",") if part.strip()]
     except ValueError as error:

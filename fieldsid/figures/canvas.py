@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from fieldsid.artifacts import replacing
-from fieldsid.copies import later
 from fieldsid.figures.kinds import KINDS, TOOL, kind_of
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.runtime.worker_pool import run_in_background
 
 MEASURED = "0.45"
 SIMULATED = "#D55E00"
@@ -81,12 +81,12 @@ def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> Non
 
 
 def save(figure: Figure, path: Path, *, force: bool = False) -> Path:
-    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all, inside `copies.finishing` later.
+    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all, inside `worker_pool.await_background` later.
 
     Raises UsageError for another suffix, ArtifactError where it cannot be written.
     """
     kind_of(path)
-    later(lambda: _write(figure, path, force=force))
+    run_in_background(lambda: _write(figure, path, force=force))
     return path
 
 

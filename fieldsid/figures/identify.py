@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from fieldsid.figures import motion, rls
 from fieldsid.fitting.fit import Fit
-from fieldsid.fitting.merit import merit
-from fieldsid.fitting.method import History
-from fieldsid.fitting.predict import Prediction
+from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+from fieldsid.fitting.predict.predict import Prediction
+from fieldsid.fitting.problem.estimator import History
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.rounding import with_error
@@ -43,7 +43,7 @@ def heading(model: Model, run: str) -> str:
 
 def facts(fit: Fit, shown: Prediction) -> str:
     """Return the second line: speed, method, effects, and how well the free run follows."""
-    m, speed = merit([shown]), shown.record.speed
+    m, speed = goodness_of_fit([shown]), shown.record.speed
     words = [f"{speed:.2f} m/s" if isfinite(speed) else "speed unknown", fit.model.method]
     words += list(fit.model.effects)
     fits = ((f"{n} fit {v:.1f} %") for n, v in (("angle", m.angle_fit), ("rate", m.rate_fit)) if isfinite(v))

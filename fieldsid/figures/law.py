@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
 from fieldsid.models.axis import NAMES
-from fieldsid.turning.law import ParameterLaw
-from fieldsid.turning.laws import Laws
+from fieldsid.plant.laws.axis_laws import Laws
+from fieldsid.plant.laws.parameter_law import ParameterLaw
 
 COLOURS = {
     "affine": canvas.SIMULATED,

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
 
 SYMBOLS = {Axis.YAW: ("yaw", "yaw rate", "rudder"), Axis.PITCH: ("pitch", "pitch rate", "elevator")}
 

@@ -12,20 +12,20 @@ from matplotlib.lines import Line2D
 
 from fieldsid.figures import canvas
 from fieldsid.models.axis import Axis
-from fieldsid.planning.picture import LegView
+from fieldsid.planning.output.figure_data import LegFigure
 
 LIMIT: dict[str, Any] = {"color": "#B2182B", "linewidth": 1.1, "linestyle": (0, (4, 2))}
 MOST_LEGS = 6
 
 
-def draw(view: LegView, axes: Sequence[Axes]) -> None:
+def draw(view: LegFigure, axes: Sequence[Axes]) -> None:
     """Draw one leg on three plots: command, angle with band, track."""
     draw_command(view, axes[0])
     draw_angle(view, axes[1])
     draw_track(view, axes[2])
 
 
-def draw_command(view: LegView, ax: Axes) -> None:
+def draw_command(view: LegFigure, ax: Axes) -> None:
     """Draw the fin in deg, solid where it is commanded, thin where the autopilot is expected to have it."""
     canvas.dress(ax, y=f"{'rudder' if view.axis is Axis.YAW else 'elevator'} [deg]", title=view.title)
     fin, ours = np.degrees(view.fin), view.autopilot < 0.5
@@ -38,7 +38,7 @@ def draw_command(view: LegView, ax: Axes) -> None:
     ax.set_xlim(view.time[0], view.time[-1])
 
 
-def draw_angle(view: LegView, ax: Axes) -> None:
+def draw_angle(view: LegFigure, ax: Axes) -> None:
     """Draw the predicted angle in deg with the 68 and 95 % bands over the prior, and the envelope."""
     yaw = view.axis is Axis.YAW
     canvas.dress(ax, y=f"{'heading' if yaw else 'pitch'} [deg]", title=_errors(view))
@@ -55,7 +55,7 @@ def draw_angle(view: LegView, ax: Axes) -> None:
     ax.set_xlim(view.time[0], view.time[-1])
 
 
-def draw_track(view: LegView, ax: Axes) -> None:
+def draw_track(view: LegFigure, ax: Axes) -> None:
     """Draw the track in m, seen from above for yaw and from the side for pitch, with draws of the prior behind it."""
     yaw = view.axis is Axis.YAW
     canvas.dress(ax, y="across [m]" if yaw else "depth change [m]")
@@ -73,7 +73,7 @@ def draw_track(view: LegView, ax: Axes) -> None:
     ax.invert_yaxis()
 
 
-def save_plan_figure(views: Sequence[LegView], path: Path, *, force: bool = False) -> Path:
+def save_plan_figure(views: Sequence[LegFigure], path: Path, *, force: bool = False) -> Path:
     """Draw up to six legs, one row each, and save; raises ArtifactError."""
     shown = views[:MOST_LEGS]
     figure = canvas.sheet(13.0, 0.9 + 2.3 * len(shown))
@@ -88,6 +88,6 @@ def save_plan_figure(views: Sequence[LegView], path: Path, *, force: bool = Fals
     return canvas.save(figure, path, force=force)
 
 
-def _errors(view: LegView) -> str:
+def _errors(view: LegFigure) -> str:
     """Return the expected errors in words."""
     return "   ".join(f"{name} {error}" for name, error in view.errors.items())

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
 
 BAND = 1.96
 START_UP = 0.15

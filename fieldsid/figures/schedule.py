@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from fieldsid.figures import canvas
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.response import Steps
-from fieldsid.schedule.verify import STEP, Check, Verification
+from fieldsid.schedule.verify import STEP_ANGLE_RAD, Check, Verification
 
 SHOWN_S = 25.0
 
@@ -25,7 +25,7 @@ def figure(schedule: Schedule, verification: Verification) -> Figure:
     draw_forward(schedule, forward)
     draw_margins(verification.scheduled, margins)
     scheduled, constant = np.ravel(right.subplots(2, 1, sharex=True, sharey=True))
-    size = STEP[schedule.axis]
+    size = STEP_ANGLE_RAD[schedule.axis]
     draw_steps([(u, s) for u, s, _ in verification.steps], size, scheduled)
     draw_steps([(u, s) for u, _, s in verification.steps], size, constant)
     scheduled.set_title(f"{schedule.kind} schedule: step of {np.degrees(size):.0f}°", loc="left", fontsize=10)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
-from fieldsid.turning.measured import MeasuredTurn
+from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow
 
 COLOURS = {"port": canvas.SIMULATED, "starboard": canvas.SECOND}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fieldsid.fitting.offset import offset_of
+from fieldsid.fitting.fin_offset import offset_of
 from fieldsid.models.model import Model
 
 TWO_SIDED_95 = 1.96

@@ -1,4 +1,4 @@
-"""A fit: records in, a Model with honest errors out, with each run's free run beside its measurement."""
+"""A fit: from records to a Model with standard errors, with each run's free run and measurement."""
 
 from __future__ import annotations
 
@@ -8,35 +8,36 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldsid.display import Plotted
+from fieldsid.dynamics.assemble import fin_path
 from fieldsid.effects import refuse_clash
 from fieldsid.errors import DataError, UsageError
-from fieldsid.fitting.choice import is_disturbed, keeps_free_run
-from fieldsid.fitting.colour import whiteness
+from fieldsid.fitting.auto_method import keeps_free_run, residuals_are_disturbed
+from fieldsid.fitting.checks.parameter_checks import parameter_checks
+from fieldsid.fitting.checks.record_checks import record_checks
+from fieldsid.fitting.checks.score_tests import score_tests
+from fieldsid.fitting.covariance.noise_selection import residual_whiteness
 from fieldsid.fitting.estimates import estimates
-from fieldsid.fitting.judge import findings
-from fieldsid.fitting.layout import layout_of
-from fieldsid.fitting.method import Estimator, History, Options, Solution
-from fieldsid.fitting.noise import floor_of
-from fieldsid.fitting.predict import Prediction, refit_own
-from fieldsid.fitting.problem import Problem
-from fieldsid.fitting.remarks import remarks
-from fieldsid.fitting.suspects import suspects
-from fieldsid.fitting.trim_law import groups_by_trim
-from fieldsid.fitting.weights import white_weights
-from fieldsid.logs.run import FloatArray, Note
+from fieldsid.fitting.initial.trim_speed_law import groups_by_trim
+from fieldsid.fitting.optimise.residual_weights import white_weights
+from fieldsid.fitting.predict.predict import Prediction, refit_nuisances
+from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
+from fieldsid.fitting.problem.parameters import layout_of
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Note
 from fieldsid.logs.segments import excursions
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, definitions_of, effect_named
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
-from fieldsid.models.signal_path import fin_path
+from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import members, near, pick
 
-SHORTEST = 40
+FEWEST_SAMPLES = 40
 DRAG_EXPONENT = 2.0
 THRUST_EXPONENTS = (0.0, 3.0)
 """What a straight run's thrust can go with: the same command at every speed, up to a drag that steepens."""
-TELLING_SPEEDS = 0.1
+MIN_LOG_SPEED_SPREAD = 0.1
 """Spread of the runs' log speed from which their thrusts say how thrust goes with speed."""
 AUTO = "auto"
 
@@ -100,16 +101,16 @@ def _solve(problem: Problem, method: str, options: Options) -> Solution:
             f"`{chosen.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out"
         )
     solution = chosen.solve(problem, options)
-    if method == AUTO and is_disturbed(problem, solution):
+    if method == AUTO and residuals_are_disturbed(problem, solution):
         finer: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
         refined = finer.solve(problem, options)
         if keeps_free_run(problem, solution, refined, white_weights(problem, solution.x)):
             solution = refined
-    if not solution.own_done:
+    if not solution.nuisances_fitted:
         x = solution.x
         for run, record in enumerate(problem.records):
-            x = refit_own(problem, x, run, floor_of([record]))
-        solution = replace(solution, x=x, own_done=True)
+            x = refit_nuisances(problem, x, run, white_noise_floor([record]))
+        solution = replace(solution, x=x, nuisances_fitted=True)
     return solution
 
 
@@ -119,10 +120,10 @@ def check(records: Sequence[Record], axis: Axis) -> None:
         raise DataError("there is no run to fit", hint="give at least one log file")
     for r in records:
         measured = int(max(r.angle_ok.sum(), r.rate_ok.sum()))
-        if measured < SHORTEST:
+        if measured < FEWEST_SAMPLES:
             raise DataError(
                 f"run {r.name!r} is too short to identify {axis.value}",
-                found=f"{measured} measured samples, at least {SHORTEST} are needed",
+                found=f"{measured} measured samples, at least {FEWEST_SAMPLES} are needed",
                 hint="take a longer run, or part of one: two pulses of 2 s each at least",
             )
         names = NAMES[axis]
@@ -153,9 +154,14 @@ def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Ef
 
 def fitted(problem: Problem, solution: Solution) -> Fit:
     """Return the fit record of a solution."""
-    floor = floor_of(problem.records)
+    floor = white_noise_floor(problem.records)
     names = problem.layout.names
-    notes = (*remarks(problem, solution, floor), *suspects(problem, solution), *findings(problem, solution), *solution.notes)
+    notes = (
+        *parameter_checks(problem, solution, floor),
+        *score_tests(problem, solution),
+        *record_checks(problem, solution),
+        *solution.notes,
+    )
     model = model_of(problem, solution)
     predictions = tuple(prediction_of(problem, solution.x, run) for run in range(len(problem.records)))
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
@@ -178,12 +184,12 @@ def model_of(problem: Problem, solution: Solution) -> Model:
     """Return the model of a solution, its values at the law's reference speed."""
     layout, names = problem.layout, NAMES[problem.layout.axis]
     values = dict(zip(layout.names, solution.x[: layout.shared].tolist(), strict=True))
-    units = {s.name: s.unit for s in layout.slots[: layout.shared]}
+    units = {s.name: s.unit for s in layout.parameters[: layout.shared]}
     law = layout.law(values)
     aside = {n for n in values if n.startswith(f"{names.authority}@")}
     free = tuple(n for n in values if n not in aside)
     order = [layout.names.index(n) for n in free]
-    p = whiteness(problem, solution.x, solution.noise)
+    p = residual_whiteness(problem, solution.x, solution.noise)
     sigma = dict(zip(layout.names, np.sqrt(np.maximum(np.diag(solution.covariance), 0.0)).tolist(), strict=True))
     return Model(
         axis=layout.axis,
@@ -230,7 +236,7 @@ def _thrust_law(records: Sequence[Record]) -> dict[str, float]:
         return {}
     thrust, speed = np.array([r.signals["thrust"].mean() for r in runs]), np.array([r.speed for r in runs])
     mean, exponent = float(np.mean(thrust)), DRAG_EXPONENT
-    if np.ptp(np.log(speed)) > TELLING_SPEEDS and np.all(thrust * mean > 0):
+    if np.ptp(np.log(speed)) > MIN_LOG_SPEED_SPREAD and np.all(thrust * mean > 0):
         faster = np.log(speed) - np.mean(np.log(speed))
         exponent = float(np.clip(faster @ np.log(np.abs(thrust)) / (faster @ faster), *THRUST_EXPONENTS))
     return {"thrust_at_1_m_s": mean / float(np.mean(speed**exponent)), "thrust_exponent": exponent}

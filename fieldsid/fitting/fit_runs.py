@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from fieldsid.copies import each
 from fieldsid.fitting.fit import check
 from fieldsid.logs.run import Run
-from fieldsid.logs.sifting import Refused, attempt, sifted
+from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import Record, record_of
+from fieldsid.runtime.worker_pool import parallel_map
 
 
 def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] | None = None) -> list[list[tuple[Run, Record]]]:
@@ -21,7 +21,7 @@ def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] 
     runs = [run for group in groups for run in group]
     if not runs:
         check([], axis)
-    made = iter(each(partial(attempt, partial(_checked, axis=axis)), runs))
+    made = iter(parallel_map(partial(attempt, partial(_checked, axis=axis)), runs))
     return [sifted(group, [next(made) for _ in group], unfit) for group in groups]
 
 

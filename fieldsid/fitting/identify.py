@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from fieldsid.errors import UsageError
+from fieldsid.fitting.checks.run_checks import offset_findings, run_checks, sign_findings
 from fieldsid.fitting.fit import AUTO, Fit, check, check_signals, fit
-from fieldsid.fitting.judge_run import offset_findings, run_findings, sign_findings
-from fieldsid.fitting.method import Options
+from fieldsid.fitting.problem.estimator import Options
 from fieldsid.logs import Note, Run, segment
-from fieldsid.logs.sifting import Refused, attempt, sifted
+from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import Record, record_of
 from fieldsid.vehicle import Vehicle
@@ -43,7 +43,7 @@ def identify(
         record = record_of(part, axis)
         check([record], axis)
         check_signals([record], effects)
-        return _Judged(run, record, run_findings(part, axis, vehicle))
+        return _Judged(run, record, run_checks(part, axis, vehicle))
 
     def fitted(group: Sequence[_Judged]) -> Fit:
         found = fit([j.record for j in group], axis, method=method, effects=effects, options=options)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
-from fieldsid.logs.frames import Frame
+from fieldsid.logs.convert.frames import Frame
 
 Stamp = Literal["header", "receive"]
 ATTITUDE = "attitude"

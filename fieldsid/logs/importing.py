@@ -12,14 +12,14 @@ import numpy as np
 
 from fieldsid.artifacts import check_output, plain
 from fieldsid.errors import UsageError
-from fieldsid.logs.assemble import WHOLE
 from fieldsid.logs.channels import ChannelMap, Source
-from fieldsid.logs.conditioning import MAIN, ROUNDING, gap_limit, gaps_in
+from fieldsid.logs.convert.assemble import WHOLE
+from fieldsid.logs.convert.conditioning import MAIN, ROUNDING, gap_limit, gaps_in
 from fieldsid.logs.load import load_run
-from fieldsid.logs.naming import names_apart, stem_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
-from fieldsid.logs.stretches import stretches_of
+from fieldsid.logs.several.run_names import names_apart, stem_of
+from fieldsid.logs.several.stretches import stretches_of
 from fieldsid.registry import near
 
 FORMATS = {"parquet": ".parquet", "csv": ".csv", "csv.gz": ".csv.gz"}
@@ -54,6 +54,16 @@ class Imported:
             "signals": {s: int(np.isfinite(v).sum()) for s, v in run.signals.items()},
             "notes": [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in run.notes],
         }
+
+
+def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s: float) -> list[Run]:
+    """Return the stretches of a log under way as runs; load reads a part in s with the longest gap allowed in s."""
+    run = load(WHOLE, np.inf)
+    stretches, notes = stretches_of(run)
+    if not notes:
+        has_gaps = any(_is_long(run, s, max_gap_s) for s in MAIN if run.has(s))
+        return [load(WHOLE, max_gap_s) if has_gaps else run]
+    return [replace(r, notes=(*r.notes, *notes)) for r in (load(s.part, max_gap_s) for s in stretches)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +105,7 @@ class Importer:
         """Return the runs of one log: its stretches under way, each judged by itself, or what `part` or `whole` ask for."""
         if self.whole or self.part != WHOLE:
             return [self._load(log, fin_max_rad, progress, self.part, self.max_gap_s)]
-        run = self._load(log, fin_max_rad, progress, WHOLE, np.inf)
-        stretches, notes = stretches_of(run)
-        if not notes:
-            has_gaps = any(_is_long(run, s, self.max_gap_s) for s in MAIN if run.has(s))
-            return [self._load(log, fin_max_rad, progress, WHOLE, self.max_gap_s) if has_gaps else run]
-        runs = [self._load(log, fin_max_rad, progress, s.part, self.max_gap_s) for s in stretches]
-        return [replace(r, notes=(*r.notes, *notes)) for r in runs]
+        return runs_under_way(lambda part, gap: self._load(log, fin_max_rad, progress, part, gap), self.max_gap_s)
 
     def places(self, target: Path, count: int) -> list[Path]:
         """Return the file of each run of a log: the log's own, and where it has several stretches their numbers behind it."""
@@ -137,7 +141,7 @@ class Importer:
     def _sources(self) -> dict[str, Source]:
         if not self.channels:
             return {}
-        from fieldsid.logs.mapping import channel_of
+        from fieldsid.logs.mapping.mapping_file import channel_of
 
         return dict(channel_of(text) for text in self.channels)
 

@@ -14,7 +14,7 @@ from fieldsid.artifacts import plain, to_yaml, write_text
 from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
-from fieldsid.logs.propose import Proposal, propose
+from fieldsid.logs.mapping.propose import Proposal, propose
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.run import Note, Run
 
@@ -81,7 +81,7 @@ def inspect_log(
     Raises LogError when it cannot be read at all, MappingError for a mapping that does not fit.
     """
     from fieldsid.logs.load import load_run
-    from fieldsid.logs.mapping import load_mapping
+    from fieldsid.logs.mapping.mapping_file import load_mapping
 
     given = None if mapping is None else load_mapping(mapping)
     reader, options = reader_of(path), ReadOptions(msg_path, salvage=True, clock=None if given is None else given.time)

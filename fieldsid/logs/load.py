@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from fieldsid.errors import FieldsidError, MappingError
-from fieldsid.logs.assemble import WHOLE, assemble
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
-from fieldsid.logs.conditioning import MAX_GAP_S
-from fieldsid.logs.names import TIME, canonical, canonical_names
+from fieldsid.logs.convert.assemble import WHOLE, assemble
+from fieldsid.logs.convert.conditioning import MAX_GAP_S
+from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
 from fieldsid.logs.reader import Reader, ReadOptions, reader_of
 from fieldsid.logs.run import Note, Run
 
@@ -52,8 +52,8 @@ def load_run(
     run = assemble(raw, chosen, path, options, part=part, max_gap_s=max_gap_s)
     if raw.finished:
         return run
-    from fieldsid.logs.doctor import examine
-    from fieldsid.logs.stated import stated_by
+    from fieldsid.logs.doctor.examine import examine
+    from fieldsid.logs.doctor.stated import stated_by
 
     return Run(
         run.name, run.time, run.signals, path, (*notes, *run.notes, *examine(run, fin_max_rad or {}, stated_by(chosen, raw)))
@@ -99,7 +99,7 @@ def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channe
 def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
     if isinstance(mapping, ChannelMap):
         return mapping
-    from fieldsid.logs.mapping import load_mapping
+    from fieldsid.logs.mapping.mapping_file import load_mapping
 
     return load_mapping(mapping)
 

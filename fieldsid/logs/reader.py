@@ -14,8 +14,9 @@ from fieldsid.artifacts import near_files
 from fieldsid.display import Brief
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
-from fieldsid.logs.run import FloatArray, Note
-from fieldsid.logs.strangers import COPY_AGAIN, not_a_log
+from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import members
 
 PACKAGE = "fieldsid.logs.readers"

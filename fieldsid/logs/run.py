@@ -17,12 +17,11 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief, Plotted, view_of
 from fieldsid.errors import DataError
+from fieldsid.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 SIGNALS: Mapping[str, str] = MappingProxyType(
     {

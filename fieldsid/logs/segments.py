@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import DataError
-from fieldsid.logs.run import BoolArray, FloatArray, Run
+from fieldsid.logs.run import Run
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 BEFORE_S = 2.0
 AFTER_S = 10.0

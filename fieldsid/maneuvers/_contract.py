@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import UsageError
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 Parameters = Mapping[str, float]

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import UsageError
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameters
+from fieldsid.numerics.arrays import FloatArray
 
 
 class Plant(Protocol):

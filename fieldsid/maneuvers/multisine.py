@@ -10,10 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude
+from fieldsid.numerics.arrays import FloatArray
 
-ROUNDS = 150
+MAX_CREST_ITERATIONS = 150
 
 
 def harmonics(p: Parameters) -> tuple[int, ...]:
@@ -31,12 +31,12 @@ def phases(numbers: tuple[int, ...]) -> FloatArray:
     best = -np.pi * np.arange(count) * (np.arange(count) + 1) / count
     size = 1 << int(np.ceil(np.log2(16 * max(numbers))))
     phase, lowest = best, np.inf
-    for round_ in range(ROUNDS):
+    for round_ in range(MAX_CREST_ITERATIONS):
         wave = _wave(index, phase, size)
         peak = float(np.max(np.abs(wave)))
         if peak < lowest:
             best, lowest = phase, peak
-        clip = peak * (0.75 + 0.2 * round_ / ROUNDS)
+        clip = peak * (0.75 + 0.2 * round_ / MAX_CREST_ITERATIONS)
         phase = np.angle(np.fft.rfft(np.clip(wave, -clip, clip))[index])
     best.setflags(write=False)
     return best

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude
+from fieldsid.numerics.arrays import FloatArray
 
 TAPS = {3: (3, 2), 4: (4, 3), 5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7)}
 """Feedback taps that give the longest sequence, 2^order - 1 bits (Ljung 1999, table 13.1)."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, levels
+from fieldsid.numerics.arrays import FloatArray
 
 
 def _duration(p: Parameters) -> float:

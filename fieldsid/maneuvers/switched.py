@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, levels, side
+from fieldsid.numerics.arrays import FloatArray
 
 COUNT = 16
 HOLDS = tuple(f"t{i}" for i in range(1, COUNT + 1))

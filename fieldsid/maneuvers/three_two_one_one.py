@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, levels
+from fieldsid.numerics.arrays import FloatArray
 
 LENGTHS = np.array([3.0, 2.0, 1.0, 1.0])
 SIDES = np.array([1.0, -1.0, 1.0, -1.0])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, side
+from fieldsid.numerics.arrays import FloatArray
 
 SIDE, SENSE, LEFT = 0, 1, 2
 """Columns of the memory: side of the fin, which way a positive fin turns (0 not known yet), reversals left."""

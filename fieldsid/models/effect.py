@@ -22,23 +22,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fieldsid.artifacts import sha256_of
-from fieldsid.display import Brief
 from fieldsid.errors import EffectError, UsageError
-from fieldsid.logs.run import FloatArray
 from fieldsid.models.axis import Axis
 from fieldsid.models.definition import NONE, Definition
+from fieldsid.models.fin_path import FinPath
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import Outside, define, pick
 
 if TYPE_CHECKING:
     from fieldsid.models.record import Record
 
 Values = Mapping[str, float]
-Suggest = Callable[[Sequence["Record"], Sequence[FloatArray]], list[dict[str, float]]]
+InitialGuesses = Callable[[Sequence["Record"], Sequence[FloatArray]], list[dict[str, float]]]
 MomentHook = Callable[["Motion", Values, "Record"], FloatArray]
 
 
 REGISTRY = "fieldsid.effects"
-ORDINARY, STILL = 0.2, 1e-9
+REFERENCE_RATE_RAD_S, ZERO_RATE_RAD_S = 0.2, 1e-9
 """rad/s: the rate at which drag of another power equals the quadratic one, and the one below which it is nil."""
 
 
@@ -54,10 +54,10 @@ class Stage(StrEnum):
 class Coefficient:
     """One number of an effect: unit, bounds, start value, and the grid to scan where the cost is not smooth.
 
-    `scan` gives start values tried before the descent; `step` the half width of the central difference.
-    `per_run` marks a nuisance (a phase, an event time) that every run has of its own and that is refitted
-    on validation runs; its bounds are then fractions of the run's length when `unit` is "run". `pace` is the power of
-    the hull's own pace (1/s) that the points of the grid are multiples of: a slow hull's numbers are slow too.
+    `scan` gives start values tried before the descent; `step` is the half width of the central difference. `per_run` marks a
+    nuisance (a phase, an event time) that every run has of its own and that is refitted on validation runs; its bounds are
+    fractions of the run's length when `unit` is "run". `rate_exponent` is the power of the hull's characteristic rate (1/s) that
+    scales the points of the grid: the coefficients of a slow hull are small.
     """
 
     name: str
@@ -67,49 +67,25 @@ class Coefficient:
     start: float
     scan: tuple[float, ...] = ()
     step: float = 1e-4
-    pace: int = 0
+    rate_exponent: int = 0
     per_run: bool = False
     says: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
-    """A shape of an effect that is not the textbook's, in a few words, and the coefficients it takes besides.
+class Variant:
+    """A variant of an effect that is not the textbook's, in a few words, with the coefficients it takes besides the effect's.
 
-    The effect's hooks take the textbook's shape where the values lack them. suggest gives the start values of the shared
-    ones as an effect's does, from the residuals that the textbook's shape has left, in place of their scan grids. axes and
-    needs are those of the form, where it has fewer axes than the effect or needs more signals.
+    The effect's hooks compute the textbook's variant where the values lack these coefficients. `initial_guesses` gives start
+    values of the shared ones as an effect's does, from the residuals of the textbook's variant, in place of their scan grids.
+    `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals.
     """
 
     says: str
     coefficients: tuple[Coefficient, ...]
-    suggest: Suggest | None = None
+    initial_guesses: InitialGuesses | None = None
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class FinPath(Brief):
-    """Fin angle over each sampling interval, straight from `start` to `end`, both (n-1,) in rad.
-
-    A path that bends or jumps inside an interval is the line of its mean and its first moment. Where the line may pass what
-    the fin itself passes, first and last, (n-1,) in rad, are where the fin is as the interval begins and ends.
-    """
-
-    start: FloatArray
-    end: FloatArray
-    first: FloatArray | None = None
-    last: FloatArray | None = None
-
-    @property
-    def mean(self) -> FloatArray:
-        """Mean over each interval, (n-1,)."""
-        return 0.5 * (self.start + self.end)
-
-    def moved(self, by: float) -> FinPath:
-        """Return the path of a fin that stands off by so much, in rad."""
-        ends = (None if side is None else side + by for side in (self.first, self.last))
-        return FinPath(self.start + by, self.end + by, *ends)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,14 +129,14 @@ class Core:
         total = {f: getattr(self, f) + getattr(other, f) for f in CORE_FIELDS if f != "length"}
         return replace(self, **total, length=other.length if other.length != 1.0 else self.length)
 
-    def settled(self, rate: float) -> float:
+    def steady_cross_state(self, rate: float) -> float:
         """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none."""
         if self.cross_damping <= 0.0:
             return 0.0
-        return float(settled_cross(np.asarray(-self.cross_rate * rate), self.cross_damping, self.cross_quadratic))
+        return float(steady_cross_state(np.asarray(-self.cross_rate * rate), self.cross_damping, self.cross_quadratic))
 
 
-def settled_cross(push: FloatArray, damping: FloatArray | float, quadratic: FloatArray | float) -> FloatArray:
+def steady_cross_state(push: FloatArray, damping: FloatArray | float, quadratic: FloatArray | float) -> FloatArray:
     """Return the root x of damping x + quadratic x|x| = push, arrays alike, damping > 0; a small quadratic loses no digits."""
     return np.asarray(2.0 * push / (damping + np.sqrt(damping**2 + 4.0 * quadratic * np.abs(push))))
 
@@ -168,7 +144,7 @@ def settled_cross(push: FloatArray, damping: FloatArray | float, quadratic: Floa
 def power_drag(rate: FloatArray, beyond: FloatArray | float) -> FloatArray:
     """Return p|p| (|p|/0.2 rad/s)^beyond at rates p, arrays alike, beyond > -1: the plain version of the kernel's."""
     size = np.abs(rate)
-    return np.asarray(rate * size * np.maximum(size, STILL) ** beyond / ORDINARY**beyond)
+    return np.asarray(rate * size * np.maximum(size, ZERO_RATE_RAD_S) ** beyond / REFERENCE_RATE_RAD_S**beyond)
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)
@@ -198,8 +174,8 @@ class Effect:
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
-    `forms` are other shapes, tried where the textbook's leaves something; `is_formed` where it is in one of them.
-    `handicap` is log evidence the effect must bring beyond others: where another says the same in simpler words,
+    `variants` are other shapes, tried where the textbook's leaves something; `is_formed` where it is in one of them.
+    `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
     """
@@ -223,11 +199,11 @@ class Effect:
     core: Callable[[Values, float], Core] | None = None
     moment: MomentHook | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None
-    carry: Callable[[FloatArray, Motion, Values, Record], FloatArray] | None = None
-    suggest: Suggest | None = None
-    twin: Callable[[Values, Axis], dict[str, float] | None] | None = None
-    forms: tuple[Form, ...] = ()
-    handicap: float = 0.0
+    sensor_jvp: Callable[[FloatArray, Motion, Values, Record], FloatArray] | None = None
+    initial_guesses: InitialGuesses | None = None
+    equivalent_solution: Callable[[Values, Axis], dict[str, float] | None] | None = None
+    variants: tuple[Variant, ...] = ()
+    log_prior_penalty: float = 0.0
     is_formed: bool = False
     origin: str = field(default="built in")
     definition: Definition | None = None
@@ -245,7 +221,7 @@ class Effect:
     @property
     def every(self) -> tuple[Coefficient, ...]:
         """Its coefficients, and those that forms take besides, each once."""
-        return tuple({c.name: c for c in (*self.coefficients, *(c for f in self.forms for c in f.coefficients))}.values())
+        return tuple({c.name: c for c in (*self.coefficients, *(c for f in self.variants for c in f.coefficients))}.values())
 
     @property
     def names(self) -> set[str]:
@@ -267,24 +243,24 @@ class Effect:
         return {c.name: c.start for c in self.coefficients}
 
 
-def in_form(effect: Effect, form: Form) -> Effect:
+def with_variant(effect: Effect, form: Variant) -> Effect:
     """Return an effect with the coefficients of one of its forms among its own."""
-    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), forms=(), is_formed=True)
+    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), variants=(), is_formed=True)
 
 
-def form_of(effect: Effect, known: Collection[str]) -> Form | None:
+def variant_of(effect: Effect, known: Collection[str]) -> Variant | None:
     """Return the form whose shared numbers are all among the known names, the largest of several; None for the textbook's."""
-    fitting = [f for f in effect.forms if all(c.name in known for c in f.coefficients if not c.per_run)]
+    fitting = [f for f in effect.variants if all(c.name in known for c in f.coefficients if not c.per_run)]
     return max(fitting, key=lambda f: len(f.coefficients), default=None)
 
 
 def as_fitted(effect: Effect, values: Values) -> Effect:
     """Return an effect in the form that a model's values belong to."""
-    form = form_of(effect, values)
-    return effect if form is None else in_form(effect, form)
+    form = variant_of(effect, values)
+    return effect if form is None else with_variant(effect, form)
 
 
-def held(values: FloatArray) -> FloatArray:
+def over_intervals(values: FloatArray) -> FloatArray:
     """Return the value over each interval, (n-1,), of a signal known at its ends, (n,)."""
     return np.asarray(0.5 * (values[:-1] + values[1:]))
 

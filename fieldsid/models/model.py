@@ -12,12 +12,12 @@ import numpy as np
 from fieldsid.artifacts import load_record, save_record
 from fieldsid.display import Brief, Displayed
 from fieldsid.errors import ArtifactError
-from fieldsid.logs.mistaken import unless_log
-from fieldsid.logs.run import FloatArray
+from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.definition import Definition, definitions_body, read_definitions
 from fieldsid.models.effect import definitions_of, effect_held
 from fieldsid.models.speed_law import SpeedLaw, with_speed
+from fieldsid.numerics.arrays import FloatArray
 
 KIND = "fieldsid/model"
 

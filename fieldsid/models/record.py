@@ -12,23 +12,24 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
-from fieldsid.logs.holes import JITTER, hole_notes, unbroken, usual_step
-from fieldsid.logs.run import FloatArray, Note, Run
+from fieldsid.logs.doctor.holes import JITTER, hole_notes, unbroken, usual_step
+from fieldsid.logs.doctor.spikes import spikes_of
+from fieldsid.logs.run import Note, Run
 from fieldsid.logs.segments import no_fin
-from fieldsid.logs.spikes import spikes_of
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.cross import cross_speed
-from fieldsid.models.depth import depth_along
-from fieldsid.models.effect import FinPath
-from fieldsid.models.smoothing import smoothed
-from fieldsid.models.surge import causes_of, surge_behind
+from fieldsid.models.fin_path import FinPath
+from fieldsid.models.helpers.cross_flow_speed import cross_speed
+from fieldsid.models.helpers.depth import depth_along
+from fieldsid.models.helpers.surge import causes_of, surge_behind
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.gcv_smoother import gcv_smooth
 
-UNDER_WAY_M_S = (0.05, 50.0)
+SPEED_LIMITS_M_S = (0.05, 50.0)
 """Speeds between which a vehicle goes through water: below no fin steers, above is another unit."""
 ROLES: Mapping[str, str] = MappingProxyType({"surge": "surge_m_s", "thrust": "thrust", "roll": "roll_rad", "depth": "depth_m"})
 THRUST_COLUMNS = ("thrust", "thrust_ratio", "propeller_rpm")
 """What a log may know of its propeller, the nearest to a force first; a model's numbers are per unit of what its log has."""
-FASTEST_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
+SHORTEST_TIME_CONSTANT_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 """What a role's smoothing passes at most, in s: a hull's inertia lets its speed and depth follow nothing faster."""
 
 
@@ -55,13 +56,13 @@ class Record(Brief):
     signals: Mapping[str, FloatArray]
     speed: float
     thrust_column: str = ""
-    early: FloatArray | None = None
+    command_lead: FloatArray | None = None
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
     longest: float = field(init=False)
     """The longest of them, in s."""
-    even: FloatArray = field(init=False)
+    nominal_steps: FloatArray = field(init=False)
     """The same, (n-1,) s, but for a clock's jitter: steps near the median are taken as that. For filters that are fast where
     nothing changes and only say how noise is coloured."""
     both: FloatArray = field(init=False)
@@ -70,7 +71,7 @@ class Record(Brief):
     """Where they were measured, (2, n)."""
     is_whole: bool = field(init=False)
     """Whether both were measured throughout."""
-    lost: FloatArray | None = field(init=False)
+    missing_fraction: FloatArray | None = field(init=False)
     """Share of the samples of each interval that the log has lost, (n-1,), None where it has lost none."""
     commanded: FinPath = field(init=False)
     """The fin as logged, as a path over the intervals."""
@@ -80,29 +81,32 @@ class Record(Brief):
         usual = float(np.median(steps)) if steps.size else 0.0
         object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "longest", float(steps.max()) if steps.size else 0.0)
-        object.__setattr__(self, "even", np.where(np.abs(steps - usual) < JITTER * usual, usual, steps))
+        object.__setattr__(self, "nominal_steps", np.where(np.abs(steps - usual) < JITTER * usual, usual, steps))
         object.__setattr__(self, "both", np.stack([self.angle, self.rate]))
         object.__setattr__(self, "ok", np.stack([self.angle_ok, self.rate_ok]))
         object.__setattr__(self, "is_whole", bool(self.ok.all()))
-        object.__setattr__(self, "lost", _lost(steps) if self.fin_is_held else None)
-        object.__setattr__(self, "commanded", self.given(self.early))
+        object.__setattr__(self, "missing_fraction", _missing_fraction(steps) if self.fin_is_held else None)
+        object.__setattr__(self, "commanded", self.path_with_lead(self.command_lead))
 
     def __len__(self) -> int:
         return int(self.time.size)
 
-    def given(self, early: FloatArray | None) -> FinPath:
+    def path_with_lead(self, early: FloatArray | None) -> FinPath:
         """Return the path of the fin with its held commands given so much before their samples, (n,) s."""
         if not self.fin_is_held:
             return FinPath(self.fin[:-1], self.fin[1:])
         if early is None:
-            return FinPath(self.fin[:-1], self.fin[:-1] if self.lost is None else self.fin[:-1] + np.diff(self.fin) * self.lost)
+            return FinPath(
+                self.fin[:-1],
+                self.fin[:-1] if self.missing_fraction is None else self.fin[:-1] + np.diff(self.fin) * self.missing_fraction,
+            )
         return _jumping(self.fin, np.clip(early[1:] / self.steps, 0.0, 1.0), np.clip(-early[:-1] / self.steps, 0.0, 1.0))
 
     def with_fin(self, fin: FloatArray) -> Record:
         """Return the record with another fin, (n,) rad, and all else as it is."""
         other = copy(self)
         object.__setattr__(other, "fin", fin)
-        object.__setattr__(other, "commanded", other.given(other.early))
+        object.__setattr__(other, "commanded", other.path_with_lead(other.command_lead))
         return other
 
     def __getitem__(self, role: str) -> FloatArray:
@@ -112,7 +116,7 @@ class Record(Brief):
         return self.signals[role]
 
 
-def _lost(steps: FloatArray) -> FloatArray | None:
+def _missing_fraction(steps: FloatArray) -> FloatArray | None:
     """Return the share of the samples of each interval that a log of a usual step has lost, (n-1,), None where it has lost none.
 
     What was commanded meanwhile lies between: where the command goes smoothly on half way, and a jump is as likely before.
@@ -128,7 +132,7 @@ def _lost(steps: FloatArray) -> FloatArray | None:
 def _jumping(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:
     """Return the path of a held fin (n,) over intervals: exact mean, and straight within what it passes through.
 
-    In the last share `early` (n-1,) of an interval the next command holds already, in its first share `late` the one
+    In the last share `command_lead` (n-1,) of an interval the next command holds already, in its first share `late` the one
     before holds still.
     """
     change = np.diff(fin)
@@ -143,16 +147,18 @@ def _jumping(fin: FloatArray, early: FloatArray, late: FloatArray) -> FinPath:
 def first_part(record: Record, samples: int) -> Record:
     """Return the first samples of a record, with the speed of the whole."""
     part = slice(0, samples)
-    early = None if record.early is None else record.early[part]
+    early = None if record.command_lead is None else record.command_lead[part]
     arrays = {name: getattr(record, name)[part] for name in ("time", "fin", "angle", "rate", "angle_ok", "rate_ok")}
-    return replace(record, **arrays, early=early, signals=MappingProxyType({k: v[part] for k, v in record.signals.items()}))
+    return replace(
+        record, **arrays, command_lead=early, signals=MappingProxyType({k: v[part] for k, v in record.signals.items()})
+    )
 
 
 def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     """Return the record of a run on an axis.
 
-    fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. A run whose log hides a move of
-    the fin is cut there, see `logs/holes.py`. Raises DataError when the angle and the rate are both missing, or the fin is.
+    fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. A run whose log hides a move of the
+    fin is cut there, see `logs/doctor/holes.py`. Raises DataError when the angle and the rate are both missing, or the fin is.
     """
     names = NAMES[axis]
     column = _fin_column(run, axis, fin)
@@ -177,19 +183,19 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     thrust_column = next((c for c in THRUST_COLUMNS if run.has(c)), "")
     columns = {**ROLES, "thrust": thrust_column}
     signals = {
-        role: smoothed(run.time, run.signals[c], fastest_s=FASTEST_S.get(role, 0.0))
+        role: gcv_smooth(run.time, run.signals[c], fastest_s=SHORTEST_TIME_CONSTANT_S.get(role, 0.0))
         for role, c in columns.items()
         if run.has(c) and role != "surge" and not (along and role == "depth")
     }
     if knows_speed(run):
         turning = np.interp(run.time, run.time[rate_ok], rate[rate_ok]) if rate_ok.any() else None
-        causes, fastest_s = causes_of(signals.get("thrust"), turning, held), FASTEST_S["surge"]
+        causes, fastest_s = causes_of(signals.get("thrust"), turning, held), SHORTEST_TIME_CONSTANT_S["surge"]
         signals["surge"] = surge_behind(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
     if run.has(names.cross):
         signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
     if along:
         pitch = np.interp(run.time, run.time[angle_ok], angle[angle_ok])
-        depth, fastest_s = run.signals[ROLES["depth"]], FASTEST_S["depth"]
+        depth, fastest_s = run.signals[ROLES["depth"]], SHORTEST_TIME_CONSTANT_S["depth"]
         signals["depth"] = depth_along(run.time, depth, pitch, signals.get("surge"), held, fastest_s=fastest_s)
     return Record(
         name=run.name,
@@ -222,7 +228,7 @@ def fin_holes(run: Run, axis: Axis) -> tuple[Note, ...]:
 
 def knows_speed(run: Run) -> bool:
     """Whether a run's surge is that of a vehicle under way: sensors that are not fitted are logged as zero."""
-    low, high = UNDER_WAY_M_S
+    low, high = SPEED_LIMITS_M_S
     return run.has(ROLES["surge"]) and low < float(np.nanmedian(run[ROLES["surge"]])) < high
 
 

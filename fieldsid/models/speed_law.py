@@ -16,12 +16,8 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.models.axis import NAMES, Axis
 
-GROUP_WIDTH = 0.03
-"""Runs whose speeds differ by less than this share form one speed group, in which the authority goes with u^2.
-
-The line |b2| = 0.33 u^2 + 0.23 of the method's paper goes with powers from 1.2 to 1.7 between 1 and 2 m/s: from end to end of a
-group u^2 is then off by 1 to 2 %. What it is off by in wider groups is seen in the motion, and passes for effects that are not
-there."""
+GROUP_WIDTH = 0.08
+"""Runs whose speeds differ by less than this share form one speed group, in which the authority goes with u^2."""
 TRIM_OF_FIN = {Axis.YAW: True, Axis.PITCH: False}
 """Whether the trim moment goes with the authority where runs at several speeds do not say otherwise."""
 

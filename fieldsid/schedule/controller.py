@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fieldsid.logs.run import FloatArray
-from fieldsid.schedule.plant import ComplexArray, LinearPlant
+from fieldsid.numerics.arrays import ComplexArray, FloatArray
+from fieldsid.schedule.linear_plant import LinearPlant
 
 
 @dataclass(frozen=True, slots=True)

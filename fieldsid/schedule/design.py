@@ -17,15 +17,15 @@ from scipy.linalg import solve_continuous_are
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.registry import near
 from fieldsid.schedule.controller import KINDS, Gains, least_damping
+from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import margins
-from fieldsid.schedule.plant import LinearPlant
 
 INTEGRAL_SHARE = 0.1
 """Integral corner over the proportional loop's crossover: a tenth costs six degrees of phase."""
-SLOWER = 0.93
-SLOWEST_ROUNDS = 160
+SLOWDOWN_FACTOR = 0.93
+MAX_SLOWDOWNS = 160
 PROPORTIONAL = ("p", "pi")
-Trial = Callable[[float], Gains]
+DesignAttempt = Callable[[float], Gains]
 DEPTH_SEPARATION = 5.0
 """How much slower the depth loop is than the pitch loop under it."""
 
@@ -74,7 +74,7 @@ def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
             found=f"damping {_slow_damping(one):.3g} 1/s",
             hint=_remedy(one, wish, fin_limit),
         )
-    trial = _TRIALS[wish.kind](one, wish, fin_limit)
+    trial = _DESIGN_ATTEMPTS[wish.kind](one, wish, fin_limit)
     factor = _fastest(one, trial, wish)
     if factor is None:
         raise ModelError(
@@ -92,9 +92,9 @@ def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
     return Designed(gains, crossover, factor, reference, crossover / (DEPTH_SEPARATION * plant.speed))
 
 
-def _fastest(plant: LinearPlant, trial: Trial, wish: Wish) -> float | None:
+def _fastest(plant: LinearPlant, trial: DesignAttempt, wish: Wish) -> float | None:
     """Return the share of the wished speed of the loop that serves, found by slowing it; None where none does."""
-    factors = SLOWER ** np.arange(SLOWEST_ROUNDS)
+    factors = SLOWDOWN_FACTOR ** np.arange(MAX_SLOWDOWNS)
     return next((float(f) for f in factors if _good(plant, trial(float(f)), wish)), None)
 
 
@@ -108,7 +108,7 @@ def _remedy(plant: LinearPlant, wish: Wish, fin_limit: float) -> str:
     for option, other in others.items():
         if other.kind in PROPORTIONAL and _slow_damping(plant) <= 0:
             continue
-        if _fastest(plant, _TRIALS[other.kind](plant, other, fin_limit), other) is not None:
+        if _fastest(plant, _DESIGN_ATTEMPTS[other.kind](plant, other, fin_limit), other) is not None:
             return f"at this speed there is one with `{option}`"
     return ""
 
@@ -127,9 +127,9 @@ def _phase(plant: LinearPlant, gains: Gains) -> float:
     return float(margins(plant, gains).phase_deg[0])
 
 
-def _refined(plant: LinearPlant, trial: Trial, wish: Wish, good: float) -> float:
+def _refined(plant: LinearPlant, trial: DesignAttempt, wish: Wish, good: float) -> float:
     """Return the fastest loop between a good factor and the last bad one, by halving."""
-    bad = good / SLOWER
+    bad = good / SLOWDOWN_FACTOR
     for _ in range(20):
         middle = 0.5 * (good + bad)
         good, bad = (middle, bad) if _good(plant, trial(middle), wish) else (good, middle)
@@ -145,7 +145,7 @@ def _slow_damping(plant: LinearPlant) -> float:
     return float(plant.damping[0] + plant.cross_rate[0] / plant.cross_damping[0])
 
 
-def _proportional(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
+def _proportional(plant: LinearPlant, wish: Wish, fin_limit: float) -> DesignAttempt:
     a, k, b = _slow_damping(plant), float(plant.stiffness[0]), _static(plant)
     wished = (a * a / (4.0 * wish.damping**2) - k) / b
     if k > 0 and wished * b <= 0:
@@ -153,7 +153,7 @@ def _proportional(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
     return lambda factor: Gains(wished * factor)
 
 
-def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
+def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> DesignAttempt:
     a, k, b = _slow_damping(plant), float(plant.stiffness[0]), _static(plant)
     # full fin at the largest error: faster would only saturate
     fastest = np.sqrt(max(k, 0.0) + abs(b) * fin_limit / wish.largest_error)
@@ -166,7 +166,7 @@ def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
     return gains
 
 
-def _with_integral(trial: Trial, plant: LinearPlant) -> Trial:
+def _with_integral(trial: DesignAttempt, plant: LinearPlant) -> DesignAttempt:
     def gains(factor: float) -> Gains:
         base = trial(factor)
         crossover = float(np.nan_to_num(margins(plant, base).crossover[0]))
@@ -175,7 +175,7 @@ def _with_integral(trial: Trial, plant: LinearPlant) -> Trial:
     return gains
 
 
-def _quadratic(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
+def _quadratic(plant: LinearPlant, wish: Wish, fin_limit: float) -> DesignAttempt:
     a, k, b = _slow_damping(plant), float(plant.stiffness[0]), _static(plant)
     system, drive = np.array([[0.0, 1.0], [-k, -a]]), np.array([[0.0], [b]])
 
@@ -188,7 +188,7 @@ def _quadratic(plant: LinearPlant, wish: Wish, fin_limit: float) -> Trial:
     return gains
 
 
-_TRIALS: Mapping[str, Callable[[LinearPlant, Wish, float], Trial]] = MappingProxyType(
+_DESIGN_ATTEMPTS: Mapping[str, Callable[[LinearPlant, Wish, float], DesignAttempt]] = MappingProxyType(
     {
         "p": _proportional,
         "pd": _rate,

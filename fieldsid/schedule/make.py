@@ -11,13 +11,13 @@ from fieldsid._version import __version__
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import UsageError
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.plant.remedies import in_radians, wider_fin
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import Wish, check_wish, design_gains
+from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.margins import margins
-from fieldsid.schedule.plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.record import Row, Schedule
-from fieldsid.turning.remedies import in_radians, wider_fin
-from fieldsid.turning.source import Source
 
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
 TURNS = {
@@ -29,7 +29,7 @@ TURNS = {
 
 
 def design_schedule(
-    source: Source,
+    source: ParameterSource,
     fin_limit: float,
     *,
     speeds: Sequence[float] = (),
@@ -64,14 +64,14 @@ def design_schedule(
     )
 
 
-def _knots(source: Source, speeds: Sequence[float]) -> list[float]:
+def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
     knots = sorted({round(float(s), 9) for s in (speeds or source.speeds)})
     if not all(np.isfinite(s) and s > 0 for s in knots):
         raise UsageError("speeds must be above zero", found=f"{knots}", hint="write `--speeds 1.0,1.5,2.0`")
     return knots
 
 
-def _row(source: Source, speed: float, fin_limit: float, wish: Wish, limits: FinLimits, *, depth: bool) -> Row:
+def _row(source: ParameterSource, speed: float, fin_limit: float, wish: Wish, limits: FinLimits, *, depth: bool) -> Row:
     plants = plants_at(source, speed, limits, 1, 0)
     made = [(design_gains(plant, wish, fin_limit), plant, share) for plant, share in plants]
     gains, forward, reference, depth_gain, slowed = Gains(0.0), 0.0, 0.0, 0.0, 1.0
@@ -94,7 +94,7 @@ def _margins_at(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
     return margins(plant.one(), gains).worst()
 
 
-def _refuse_offsets(source: Source, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
+def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
     """Refuse a fin limit below the offset, at the speed where it is worst."""
     plants = {speed: plants_at(source, speed, limits, 1, 0) for speed in knots}
     offsets = {speed: sum(share * float(plant.offset[0]) for plant, share in at) for speed, at in plants.items()}
@@ -108,7 +108,7 @@ def _refuse_offsets(source: Source, knots: Sequence[float], fin_limit: float, li
     )
 
 
-def actuator_of(source: Source, limits: FinLimits) -> dict[str, float | None]:
+def actuator_of(source: ParameterSource, limits: FinLimits) -> dict[str, float | None]:
     """Return lag, delay and rate limit the design counted with: stated ones, else the worst of the models'."""
     values = [m.values for m in source.models]
     lag, delay = (max((v.get(n, 0.0) for v in values), default=0.0) for n in ("lag", "delay"))
@@ -117,7 +117,7 @@ def actuator_of(source: Source, limits: FinLimits) -> dict[str, float | None]:
     return own | {name: value for name, value in limits.record().items() if value is not None}
 
 
-def _provenance(source: Source, wish: Wish) -> dict[str, Any]:
+def _provenance(source: ParameterSource, wish: Wish) -> dict[str, Any]:
     names = NAMES[source.axis]
     sign = float(np.sign(source.points[0].values[names.authority]))
     low, high = float(source.speeds[0]), float(source.speeds[-1])

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import FieldsidError
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.controller import Gains, loop
-from fieldsid.schedule.plant import LinearPlant
+from fieldsid.schedule.linear_plant import LinearPlant
 
-GRID = np.geomspace(1e-3, 200.0, 1500)
+FREQUENCY_GRID_RAD_S = np.geomspace(1e-3, 200.0, 1500)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Margins:
 
 def margins(plant: LinearPlant, gains: Gains) -> Margins:
     """Return the margins of every draw, from the grid by interpolation at each crossing."""
-    open_loop = loop(plant, gains, GRID)
+    open_loop = loop(plant, gains, FREQUENCY_GRID_RAD_S)
     size = np.log(np.abs(open_loop))
     phase = np.unwrap(np.angle(open_loop), axis=1)
     # an unwrapped phase may sit a turn off: a loop with positive gain starts between -360 and 0
@@ -42,7 +42,7 @@ def margins(plant: LinearPlant, gains: Gains) -> Margins:
 
 def _read_off(size: FloatArray, phase: FloatArray) -> Margins:
     count = size.shape[0]
-    log_omega = np.log(GRID)
+    log_omega = np.log(FREQUENCY_GRID_RAD_S)
     phase_margin, delay, crossover = np.full(count, np.inf), np.full(count, np.inf), np.full(count, np.nan)
     gain_margin = np.full(count, np.inf)
     for i, j in zip(*np.nonzero((size[:, :-1] > 0) != (size[:, 1:] > 0)), strict=True):
@@ -73,8 +73,8 @@ def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, flo
         control: Any = import_module("control")
     except ImportError as error:
         raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
-    response = loop(plant.one(), gains, GRID)[0]
-    system = control.FrequencyResponseData(response, GRID, smooth=True)
+    response = loop(plant.one(), gains, FREQUENCY_GRID_RAD_S)[0]
+    system = control.FrequencyResponseData(response, FREQUENCY_GRID_RAD_S, smooth=True)
     gain, phase, _, _, phase_crossing, _ = control.stability_margins(system)
     delay = np.radians(phase) / phase_crossing if np.isfinite(phase_crossing) and phase_crossing > 0 else np.inf
     gain_db = 20 * np.log10(gain) if gain > 1.0 else np.inf

@@ -12,7 +12,7 @@ import numpy as np
 from fieldsid.artifacts import load_record, save_record
 from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
-from fieldsid.logs.mistaken import unless_log
+from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
 from fieldsid.schedule.controller import Gains
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.display import Brief
-from fieldsid.logs.run import FloatArray
-from fieldsid.schedule.kernels import close_loop
-from fieldsid.schedule.plant import LinearPlant
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.schedule.closed_loop_kernel import close_loop
+from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
 
 STEP_S = 0.02
-SETTLED = 0.05
+SETTLING_BAND = 0.05
 FASTEST_LAG_S = 1e-6
 
 
@@ -34,7 +34,7 @@ def overshoot(values: FloatArray, size: float) -> FloatArray:
 
 def settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
     """Return the time after which steps (t, n) stay within 5 % of `size`, (n,) s; inf if never."""
-    off = np.abs(values - size) > SETTLED * abs(size)
+    off = np.abs(values - size) > SETTLING_BAND * abs(size)
     last = time.size - 1 - np.argmax(off[::-1], axis=0)
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
 

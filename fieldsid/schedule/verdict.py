@@ -7,12 +7,20 @@ from dataclasses import dataclass
 from math import degrees, isfinite
 from typing import Any
 
+from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.rounding import number
+from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.make import actuator_of
-from fieldsid.schedule.plant import not_counted
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import DEPTH_STEP_M, DEPTH_STEP_S, READ_OFF, STEP, STEP_S, Verification, stated_limits
-from fieldsid.turning.source import Source
+from fieldsid.schedule.verify import (
+    DEPTH_STEP_M,
+    DEPTH_STEP_S,
+    READ_OFF,
+    STEP_ANGLE_RAD,
+    STEP_DURATION_S,
+    Verification,
+    stated_limits,
+)
 
 MOST_NAMED = 3
 
@@ -71,24 +79,26 @@ def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...
         return "does not hold", "; ".join(faults)
     weakest = checked.weakest("phase_margin_deg")
     margin = f"least phase margin {number(weakest.phase_least_deg, 3)} deg at {number(weakest.speed, 3)} m/s"
-    return "holds", f"{margin}; {_settles(checked, degrees(STEP[schedule.axis]))}"
+    return "holds", f"{margin}; {_settles(checked, degrees(STEP_ANGLE_RAD[schedule.axis]))}"
 
 
 def _settles(checked: Verification, step: float) -> str:
     """Return how long a step (deg) takes to settle where it takes longest, by the estimate and over the draws."""
     slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
-    by_draws = f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {STEP_S:.0f} s"
+    by_draws = (
+        f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {STEP_DURATION_S:.0f} s"
+    )
     return f"a {step:.0f} deg step settles within {slowest:.1f} s at every speed" + (f", {by_draws}" if checked.spread else "")
 
 
 def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     """Return why the loop does not hold, whatever was asked for."""
     weakest, slowest = checked.weakest("phase_margin_deg"), max(checked.scheduled, key=lambda c: c.settling)
-    step, found = degrees(STEP[schedule.axis]), []
+    step, found = degrees(STEP_ANGLE_RAD[schedule.axis]), []
     if weakest.phase_least_deg <= 0.0:
         found.append(f"unstable at {number(weakest.speed, 3)} m/s, phase margin {number(weakest.phase_least_deg, 3)} deg")
     if not isfinite(slowest.settling):
-        found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {STEP_S:.0f} s")
+        found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {STEP_DURATION_S:.0f} s")
     deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
     if deepest is not None and not isfinite(deepest.depth_settling):
         where = f"at {number(deepest.speed, 3)} m/s a {DEPTH_STEP_M:.0f} m depth step"
@@ -96,7 +106,7 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     return found
 
 
-def rests_on(checked: Verification, schedule: Schedule, source: Source) -> str:
+def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:
     """Return what a verification rests on: the models, their errors, the speeds, the fin."""
     names = source.names or tuple(p.name for p in source.paths)
     named = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
@@ -124,7 +134,7 @@ def fin_of(actuator: Mapping[str, float | None]) -> str:
     return f"lag {number(lag, 3)} s, delay {number(delay, 3)} s, {fastest}"
 
 
-def lost(source: Source) -> tuple[str, ...]:
+def lost(source: ParameterSource) -> tuple[str, ...]:
     """Return what a source knows of the path from fin to motion that gains are not made for, or that it cannot know."""
     if not source.models:
         return ("a table carries no effects",)

@@ -8,25 +8,25 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
-from fieldsid.copies import each
 from fieldsid.display import Displayed, Plotted
 from fieldsid.models.axis import Axis
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.runtime.worker_pool import parallel_map
+from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant, family_at, plants_at
 from fieldsid.schedule.margins import control_margins, margins
-from fieldsid.schedule.plant import PARTS, FinLimits, LinearPlant, family_at, plants_at
 from fieldsid.schedule.record import Row, Schedule
 from fieldsid.schedule.response import Steps, depth_response, overshoot, settling, steady_error, step_response
-from fieldsid.turning.source import Source
 
-DRAWS = 60
+VERIFY_DRAWS = 60
 SEED = 77
-STEP = {Axis.YAW: 0.3490658503988659, Axis.PITCH: 0.17453292519943295}
+STEP_ANGLE_RAD = {Axis.YAW: 0.3490658503988659, Axis.PITCH: 0.17453292519943295}
 """20 deg of heading, 10 deg of pitch."""
-BENT_FIN = 0.05235987755982988
+FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
-STEP_S = 60.0
+STEP_DURATION_S = 60.0
 DEPTH_STEP_M = 2.0
 DEPTH_STEP_S = 120.0
-PITCH_LIMIT = 0.3490658503988659
+PITCH_LIMIT_RAD = 0.3490658503988659
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -105,7 +105,9 @@ class Verification(Plotted):
         return min(self.scheduled, key=lambda c: sign * read(c))
 
 
-def verify_schedule(schedule: Schedule, source: Source, *, draws: int = DRAWS, limits: FinLimits | None = None) -> Verification:
+def verify_schedule(
+    schedule: Schedule, source: ParameterSource, *, draws: int = VERIFY_DRAWS, limits: FinLimits | None = None
+) -> Verification:
     """Check a schedule on the parameters it was made from, with their errors, at its knots and midway between them."""
     limits = limits or stated_limits(schedule)
     constant = constant_row(schedule)
@@ -119,7 +121,7 @@ def verify_schedule(schedule: Schedule, source: Source, *, draws: int = DRAWS, l
         other, steps_of_constant = _check(plant, held, schedule, knot=knot, constant=True)
         return one, other, (speed, steps_of_row, steps_of_constant)
 
-    scheduled, compared, steps = zip(*each(checked, list(enumerate(checked_speeds(schedule)))), strict=True)
+    scheduled, compared, steps = zip(*parallel_map(checked, list(enumerate(checked_speeds(schedule)))), strict=True)
     (plant, _), *_ = plants_at(source, schedule.speeds[0], limits, draws, SEED)
     spread = any(bool((getattr(plant, name) != getattr(plant, name)[0]).any()) for name in PARTS)
     return Verification(schedule, scheduled, compared, constant, steps, draws, spread)
@@ -137,9 +139,9 @@ def constant_row(schedule: Schedule) -> Row:
     return min(schedule.rows, key=lambda r: abs(r.gains.kp))
 
 
-def nominal_steps(plant: LinearPlant, row: Row, axis: Axis, seconds: float = STEP_S) -> Steps:
+def nominal_steps(plant: LinearPlant, row: Row, axis: Axis, seconds: float = STEP_DURATION_S) -> Steps:
     """Return the estimate's response to the standard step."""
-    return step_response(plant.one(), row, reference=STEP[axis], seconds=seconds)
+    return step_response(plant.one(), row, reference=STEP_ANGLE_RAD[axis], seconds=seconds)
 
 
 def stated_limits(schedule: Schedule) -> FinLimits:
@@ -149,14 +151,14 @@ def stated_limits(schedule: Schedule) -> FinLimits:
 
 
 def _check(plant: LinearPlant, row: Row, schedule: Schedule, *, knot: bool, constant: bool) -> tuple[Check, Steps]:
-    step = STEP[schedule.axis]
+    step = STEP_ANGLE_RAD[schedule.axis]
     phase, gain, delay = control_margins(plant, row.gains)
     least = margins(plant, row.gains).worst()
-    steps = step_response(plant, row, reference=step, seconds=STEP_S)
+    steps = step_response(plant, row, reference=step, seconds=STEP_DURATION_S)
     over, settled = overshoot(steps.angle, step), settling(steps.time, steps.angle, step)
-    known = replace(row, feed_forward=row.feed_forward - BENT_FIN)
-    bent = step_response(plant.one(), known, reference=0.0, seconds=STEP_S, offset=BENT_FIN)
-    unknown = step_response(plant.one(), row, reference=0.0, seconds=STEP_S, offset=BENT_FIN)
+    known = replace(row, feed_forward=row.feed_forward - FIN_OFFSET_RAD)
+    bent = step_response(plant.one(), known, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD)
+    unknown = step_response(plant.one(), row, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD)
     known_error, unknown_error = (float(steady_error(s.angle, 0.0)[0]) for s in (bent, unknown))
     depth_over, depth_settled = _depth(plant, row) if schedule.depth else (float("nan"), float("nan"))
     check = Check(
@@ -169,6 +171,6 @@ def _check(plant: LinearPlant, row: Row, schedule: Schedule, *, knot: bool, cons
 
 def _depth(plant: LinearPlant, row: Row) -> tuple[float, float]:
     one = plant.one()
-    steps = depth_response(one, row, step=DEPTH_STEP_M, seconds=DEPTH_STEP_S, pitch_limit=PITCH_LIMIT)
+    steps = depth_response(one, row, step=DEPTH_STEP_M, seconds=DEPTH_STEP_S, pitch_limit=PITCH_LIMIT_RAD)
     settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
     return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])

@@ -9,13 +9,13 @@ from typing import Any
 
 from fieldsid.display import Displayed, Plotted
 from fieldsid.logs.run import Note
-from fieldsid.turning.measured import MeasuredTurn
-from fieldsid.turning.surge import SurgeModel
+from fieldsid.turning.measured.measured_turn import MeasuredTurn
+from fieldsid.turning.steady.speed_loss import SurgeModel
 
 SIDES: Mapping[str, float] = {"port": -1.0, "starboard": 1.0}
-SAME_TURN = 0.05
+EQUAL_TURN_SHARE = 0.05
 """Share by which speed and rudder of two turns may differ and still be one."""
-MOST_SPEEDS = 4
+MAX_SPEEDS_LISTED = 4
 """Speeds that are listed one by one."""
 HOW = "one and a half circles, x_m and y_m logged"
 
@@ -77,7 +77,7 @@ class TurnRow(Displayed):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MeasuredRow(Displayed):
-    """A measured circle beside what the model predicts for the fin and the speed it was flown with."""
+    """A measured circle with the model's prediction for the fin and the speed it was flown with."""
 
     turn: MeasuredTurn
     predicted: float
@@ -85,11 +85,11 @@ class MeasuredRow(Displayed):
 
     def entered(self, speed: float, side: str) -> bool:
         """Whether the circle was turned to a side from about a speed in m/s."""
-        return self.turn.side == side and abs(self.turn.entry_speed - speed) <= SAME_TURN * speed
+        return self.turn.side == side and abs(self.turn.entry_speed - speed) <= EQUAL_TURN_SHARE * speed
 
     def held(self, rudder: float) -> bool:
         """Whether it was turned with about a rudder in rad."""
-        return abs(abs(self.turn.fin) - rudder) <= SAME_TURN * rudder
+        return abs(abs(self.turn.fin) - rudder) <= EQUAL_TURN_SHARE * rudder
 
     def record(self) -> dict[str, Any]:
         """Return the row as `--json` prints it."""
@@ -184,6 +184,6 @@ def _to(rows: Sequence[TurnRow], side: str) -> bool:
 
 def _speeds(speeds: Sequence[float]) -> str:
     """Return speeds in m/s as words, many of them as the range they span."""
-    if len(speeds) > MOST_SPEEDS:
+    if len(speeds) > MAX_SPEEDS_LISTED:
         return f"{min(speeds):.2f} to {max(speeds):.2f} m/s"
     return f"{', '.join(f'{s:.2f}' for s in speeds)} m/s"

@@ -8,11 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from fieldsid.errors import ModelError, UsageError
-from fieldsid.logs.run import FloatArray, Note, Run
-from fieldsid.logs.sifting import Refused, attempt, sifted
+from fieldsid.logs.run import Note, Run
+from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.turning.doubt import Reach, doubt_draws, doubt_of, reach_of
-from fieldsid.turning.formulas import (
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
+from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
+from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
+from fieldsid.turning.paper_formulas import (
     FIN_ZERO_TOLERANCE,
     counted_offset,
     refuse_short_fin,
@@ -20,29 +24,26 @@ from fieldsid.turning.formulas import (
     u_turn,
     usable_fin,
 )
-from fieldsid.turning.measured import MeasuredTurn, measure_turn
 from fieldsid.turning.prediction import HOW, SIDES, MeasuredRow, TurnPrediction, TurnRow
-from fieldsid.turning.remedies import damping_that_holds, in_radians, wider_fin
-from fieldsid.turning.settled import SettledTurns, settled_turns
-from fieldsid.turning.source import Source
-from fieldsid.turning.surge import SurgeModel, fit_surge
+from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
+from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
-DRAWS = 500
+RADIUS_DRAWS = 500
 SEED = 20240511
 METHODS = ("auto", "u_turn", "steady", "simulated")
-NOT_WORTH_SAYING = 0.0025
+MIN_REPORTED_OFFSET_RAD = 0.0025
 """An offset in rad that moves a radius by a hundredth."""
 
 
 def turn_radius(
-    source: Source,
+    source: ParameterSource,
     speeds: Sequence[float],
     rudder_max: float,
     *,
     runs: Sequence[Run] = (),
     measured: Sequence[Run] = (),
     method: str = "auto",
-    draws: int = DRAWS,
+    draws: int = RADIUS_DRAWS,
     fin_zero: float = FIN_ZERO_TOLERANCE,
     unfit: Refused[Run] | None = None,
 ) -> TurnPrediction:
@@ -55,7 +56,7 @@ def turn_radius(
     ModelError for an unstable model.
     """
     _check(source, speeds, rudder_max, method)
-    source = source.flown_by(runs)
+    source = source.models_flown_by(runs)
     chosen = _chosen(source, method)
     if chosen == "simulated" and source.own_laws:
         raise UsageError(
@@ -81,7 +82,7 @@ def turn_radius(
 
 
 def _formula_rows(
-    source: Source, speeds: Sequence[float], rudder: float, method: str, draws: int, fin_zero: float
+    source: ParameterSource, speeds: Sequence[float], rudder: float, method: str, draws: int, fin_zero: float
 ) -> list[TurnRow]:
     names = NAMES[Axis.YAW]
     rows = []
@@ -95,12 +96,12 @@ def _formula_rows(
             fin = _usable(rudder, c / b, sign * float(np.sign(b[0])), fin_zero, rng)
             turn = u_turn(speed, a, b, fin)
             radius = turn.radius if method == "u_turn" else turn.steady_radius
-            reach = _reach(source, speed, rudder, float(turn.yaw_rate_max[0]), float(turn.time[0]) / 2)
-            doubt = doubt_of((), reach, formula=method == "u_turn")
-            spread = np.exp(doubt_draws(doubt, draws, np.random.default_rng(SEED)))
+            coverage = _reach(source, speed, rudder, float(turn.yaw_rate_max[0]), float(turn.time[0]) / 2)
+            error = model_error((), coverage, formula=method == "u_turn")
+            spread = np.exp(model_error_draws(error, draws, np.random.default_rng(SEED)))
             rows.append(
                 _row(
-                    speed, side, method, reach, rudder, radius=radius, spread=spread, time=turn.time,
+                    speed, side, method, coverage, rudder, radius=radius, spread=spread, time=turn.time,
                     steady=float(turn.steady_radius[0]), u_turn_radius=float(turn.radius[0]),
                     rate=float(turn.yaw_rate_max[0]), turn_speed=speed,
                 )
@@ -108,7 +109,7 @@ def _formula_rows(
     return _by_side(rows)
 
 
-def _refuse_turns(source: Source, speeds: Sequence[float], rudder: float) -> None:
+def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: float) -> None:
     """Refuse what the formula has no turn for, at the speed where it is worst."""
     damping = {speed: source.base_at(speed)[NAMES[Axis.YAW].damping] for speed in speeds}
     loosest = min(damping, key=lambda speed: damping[speed])
@@ -118,21 +119,21 @@ def _refuse_turns(source: Source, speeds: Sequence[float], rudder: float) -> Non
     refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", wider_fin("--rudder-max", abs(offset), source))
 
 
-def _offset(source: Source, speed: float) -> float:
+def _offset(source: ParameterSource, speed: float) -> float:
     """Return the fin's offset delta_r0 at a speed, rad."""
     base, names = source.base_at(speed), NAMES[Axis.YAW]
     return base.get(names.trim, 0.0) / base[names.authority]
 
 
 def _simulated_rows(
-    source: Source, speeds: Sequence[float], rudder: float, surge: SurgeModel | None, draws: int
+    source: ParameterSource, speeds: Sequence[float], rudder: float, surge: SurgeModel | None, draws: int
 ) -> list[TurnRow]:
     entry = np.array(speeds, dtype=np.float64)
-    both = settled_turns(source, entry, rudder, surge, draws, np.random.default_rng(SEED))
+    both = blended_turns(source, entry, rudder, surge, draws, np.random.default_rng(SEED))
     return [_simulated_row(source, turns, i, side, rudder) for side, turns in both.items() for i in range(entry.size)]
 
 
-def _simulated_row(source: Source, turns: SettledTurns, index: int, side: str, rudder: float) -> TurnRow:
+def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, side: str, rudder: float) -> TurnRow:
     speed, rate = float(turns.entry[index]), float(turns.rate[index])
     if not np.isfinite(turns.radius[0, index]):
         raise ModelError(
@@ -141,12 +142,12 @@ def _simulated_row(source: Source, turns: SettledTurns, index: int, side: str, r
             hint=damping_that_holds(source, speed, turns.effects),
         )
     time = turns.transient.time_180[index]
-    reach = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
-    doubt = doubt_of(turns.effects, reach, formula=False)
-    spread = np.exp(doubt_draws(doubt, turns.radius.shape[0], np.random.default_rng(SEED + 1)))
+    coverage = _reach(source, speed, rudder, rate, float(np.nan_to_num(turns.transient.time_90[index], nan=60.0)))
+    error = model_error(turns.effects, coverage, formula=False)
+    spread = np.exp(model_error_draws(error, turns.radius.shape[0], np.random.default_rng(SEED + 1)))
     radius = turns.radius[:, index]
     row = _row(
-        speed, side, "simulated", reach, rudder, radius=radius, spread=spread, time=time * radius / radius[0],
+        speed, side, "simulated", coverage, rudder, radius=radius, spread=spread, time=time * radius / radius[0],
         steady=float(radius[0]), u_turn_radius=float(turns.transient.path_180[index] / np.pi), rate=rate,
         turn_speed=float(turns.path_speed[index]),
     )  # fmt: skip
@@ -163,7 +164,7 @@ def _row(
     speed: float,
     side: str,
     method: str,
-    reach: Reach,
+    coverage: DataCoverage,
     rudder: float,
     *,
     radius: FloatArray,
@@ -176,7 +177,7 @@ def _row(
 ) -> TurnRow:
     value = float(radius[0])
     interval = _interval(radius * spread, value)
-    because = reach.missing
+    because = coverage.missing
     return TurnRow(
         speed=float(speed),
         side=side,
@@ -217,14 +218,14 @@ def _usable(rudder: float, offset: FloatArray, sign: float, fin_zero: float, rng
     return np.maximum(fin, 0.05 * rudder)
 
 
-def _reach(source: Source, speed: float, rudder: float, rate: float, quarter_s: float) -> Reach:
+def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, quarter_s: float) -> DataCoverage:
     flown = source.supports(speed)
     if not source.models:
-        return reach_of({}, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown)
+        return data_coverage({}, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown)
     model = source.models[source.near(speed)[0][0]]
     slowest = model.values.get("cross_damping", np.inf) * model.law.scale(speed)
     seen = slowest * model.trained.get("held_s", 0.0) >= 1.0
-    return reach_of(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
+    return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
 
 
 def _settles(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:
@@ -236,7 +237,7 @@ def _settles(because: tuple[str, ...], side: str, speed: float, rudder: float) -
 def _compared(
     turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
 ) -> MeasuredRow:
-    """Return a measured turn beside what is predicted for it; nothing is where its fin is below the least at its speed."""
+    """Return a measured turn with its prediction; there is none where its fin is below the least one predicted at its speed."""
     speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
     if not (np.isfinite(turn.fin) and abs(turn.fin) > max(0.01, least(speed))):
         nan = float("nan")
@@ -265,13 +266,13 @@ def _by_side(rows: Sequence[TurnRow]) -> list[TurnRow]:
     return [r for side in SIDES for r in rows if r.side == side]
 
 
-def _chosen(source: Source, method: str) -> str:
+def _chosen(source: ParameterSource, method: str) -> str:
     if method != "auto":
         return method
     return "simulated" if any(m.effects for m in source.models) else "u_turn"
 
 
-def _check(source: Source, speeds: Sequence[float], rudder_max: float, method: str) -> None:
+def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, method: str) -> None:
     if source.axis is not Axis.YAW:
         raise UsageError("a turning radius needs the yaw axis", found="pitch parameters", hint="identify with `--axis yaw`")
     if method not in METHODS:
@@ -288,7 +289,9 @@ def _check(source: Source, speeds: Sequence[float], rudder_max: float, method: s
         raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")
 
 
-def _notes(source: Source, rows: Sequence[TurnRow], method: str, surge: SurgeModel | None, fin_zero: float) -> list[Note]:
+def _notes(
+    source: ParameterSource, rows: Sequence[TurnRow], method: str, surge: SurgeModel | None, fin_zero: float
+) -> list[Note]:
     notes = []
     outside = sorted({r.speed for r in rows if not source.supports(r.speed)})
     if outside:
@@ -308,14 +311,14 @@ def _notes(source: Source, rows: Sequence[TurnRow], method: str, surge: SurgeMod
     return notes
 
 
-def _offset_notes(source: Source, fin_zero: float) -> list[Note]:
+def _offset_notes(source: ParameterSource, fin_zero: float) -> list[Note]:
     names = NAMES[Axis.YAW]
     offsets = [
         (p, p.values[names.trim] / p.values[names.authority])
         for p in source.points
         if {names.trim, names.authority} <= set(p.values)
     ]
-    small = [o for _, o in offsets if NOT_WORTH_SAYING < abs(o) <= fin_zero]
+    small = [o for _, o in offsets if MIN_REPORTED_OFFSET_RAD < abs(o) <= fin_zero]
     if not small:
         return []
     return [

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from fieldsid.diagnosis import Pair
     from fieldsid.fitting.estimates import Estimate
-    from fieldsid.fitting.merit import Merit
+    from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.logs import Note
     from fieldsid.models.model import Model, Noise
 
@@ -80,7 +80,7 @@ def parameter_rows(model: Model) -> list[dict[str, Any]]:
     ]
 
 
-def error_facts(m: Merit, floor: Noise) -> list[tuple[str, str]]:
+def error_facts(m: GoodnessOfFit, floor: Noise) -> list[tuple[str, str]]:
     """Return the free-run error of angle and rate beside the noise, nothing of a channel that was not measured."""
     channels = (
         ("angle error", "rad", m.angle_rms, floor.angle, m.angle_fit),
@@ -93,7 +93,7 @@ def error_facts(m: Merit, floor: Noise) -> list[tuple[str, str]]:
     ]
 
 
-def merit_row(m: Merit) -> dict[str, float]:
+def merit_row(m: GoodnessOfFit) -> dict[str, float]:
     """Return errors and fits of a free run by the names that JSON gives them."""
     return {
         "angle_rms_rad": m.angle_rms,

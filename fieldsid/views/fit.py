@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from fieldsid.fitting.fit import Fit
-    from fieldsid.fitting.predict import Prediction
+    from fieldsid.fitting.predict.predict import Prediction
     from fieldsid.logs import Note
 
 LEAST_CORRELATION = 0.5
@@ -35,9 +35,9 @@ LEAST_CORRELATION = 0.5
 
 def line(fit: Fit) -> str:
     """Return axis, method, effects, base parameters, how well the free run follows, and how many warnings there are."""
-    from fieldsid.fitting.merit import merit
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
-    model, m = fit.model, merit(fit.predictions)
+    model, m = fit.model, goodness_of_fit(fit.predictions)
     how_well = f"rate fit {m.rate_fit:.1f} %" if isfinite(m.rate_fit) else f"angle fit {m.angle_fit:.1f} %"
     head = joined(model.axis.value, model.method, listed(model.effects), counted(len(fit.predictions), "run"))
     return f"{head}: {joined(base_words(model), how_well, counted(len(_warnings(fit)), 'warning'))}"
@@ -45,7 +45,7 @@ def line(fit: Fit) -> str:
 
 def page(fit: Fit) -> Page:
     """Return the blocks of a fit's report."""
-    from fieldsid.fitting.merit import merit
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
     model, records = fit.model, [p.record for p in fit.predictions]
     seconds = sum(float(r.time[-1] - r.time[0]) for r in records)
@@ -58,7 +58,7 @@ def page(fit: Fit) -> Page:
             ("runs", listed(model.runs)),
             ("samples", f"{sum(len(r) for r in records)} in {seconds:.1f} s"),
             ("estimated", counted(len(model.free), "parameter")),
-            *error_facts(merit(fit.predictions), fit.floor),
+            *error_facts(goodness_of_fit(fit.predictions), fit.floor),
             ("whiteness", "" if whiteness is None else f"p = {number(whiteness, 2)}"),
         ),
     )
@@ -109,7 +109,7 @@ def motion(predictions: tuple[Prediction, ...]) -> DataFrame:
 
 
 def _warnings(fit: Fit) -> list[Note]:
-    from fieldsid.fitting.notes import is_warning
+    from fieldsid.fitting.checks.warnings import is_warning
 
     return [n for n in fit.notes if is_warning(n, fit.model.axis)]
 
@@ -140,9 +140,9 @@ def _runs(fit: Fit) -> Block:
 
 
 def _run_row(p: Prediction) -> dict[str, Any]:
-    from fieldsid.fitting.merit import merit
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
-    return {"run": p.record.name, "speed_m_s": p.record.speed, **merit_row(merit([p]))}
+    return {"run": p.record.name, "speed_m_s": p.record.speed, **merit_row(goodness_of_fit([p]))}
 
 
 VIEW = View("fit", line, page, frames, lambda fit: "+".join(fit.model.runs), figures)

@@ -26,7 +26,7 @@ def line(laws: Laws) -> str:
 
 def page(laws: Laws) -> Page:
     """Return the law taken of each parameter, its value at each point, and the exponent."""
-    from fieldsid.turning.laws import law_notes
+    from fieldsid.plant.laws.axis_laws import law_notes
 
     chosen = [
         (name, law.chosen, number(law.line.rms, 3), number(law.line.r2, 3), "yes" if law.std_errors is not None else "no")

@@ -66,7 +66,7 @@ def figures(run: Run) -> Mapping[str, Callable[[], Any]]:
 
 def read(frame: DataFrame, name: str) -> Run:
     """Return the run of a table."""
-    from fieldsid.logs.frame import run_of_frame
+    from fieldsid.logs.pandas_table import run_of_frame
 
     return run_of_frame(frame, name)
 
@@ -74,7 +74,7 @@ def read(frame: DataFrame, name: str) -> Run:
 def _signals(run: Run) -> DataFrame:
     import pandas as pd
 
-    from fieldsid.logs.names import TIME
+    from fieldsid.logs.mapping.canonical_names import TIME
 
     made = pd.DataFrame(dict(run.signals), index=pd.Index(run.time, name=TIME))
     made.attrs["name"] = run.name

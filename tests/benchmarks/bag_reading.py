@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from bags import MAPPING, write_bag
 from rosbags.highlevel import AnyReader
 
-from fieldsid.logs.mapping import mapping_of
+from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers.bags.definitions import DefinitionSearch, decoder_of
+from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.stores import collected
 from fieldsid.logs.readers.rosbag import read
 

@@ -27,19 +27,19 @@ from scipy.integrate import odeint  # noqa: E402
 from scipy.optimize import curve_fit  # noqa: E402
 from truth.paper import YAW, paper_run  # noqa: E402
 
+from fieldsid.dynamics.assemble import Base, assemble, integrate_record  # noqa: E402
+from fieldsid.dynamics.free_run import command_record  # noqa: E402
 from fieldsid.estimators.output_error import found_minimum  # noqa: E402
-from fieldsid.fitting.descent import descend  # noqa: E402
 from fieldsid.fitting.fit import fit  # noqa: E402
-from fieldsid.fitting.layout import layout_of  # noqa: E402
-from fieldsid.fitting.noise import floor_of  # noqa: E402
-from fieldsid.fitting.problem import Problem  # noqa: E402
-from fieldsid.fitting.start import start_vector  # noqa: E402
+from fieldsid.fitting.initial.equation_error import equation_error_start  # noqa: E402
+from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt  # noqa: E402
+from fieldsid.fitting.problem.parameters import layout_of  # noqa: E402
+from fieldsid.fitting.problem.problem import Problem  # noqa: E402
 from fieldsid.logs.run import Run  # noqa: E402
 from fieldsid.models.axis import Axis  # noqa: E402
 from fieldsid.models.effect import effect_named  # noqa: E402
 from fieldsid.models.record import Record, record_of  # noqa: E402
-from fieldsid.models.signal_path import Base, assemble, run_core  # noqa: E402
-from fieldsid.models.simulate import command_record  # noqa: E402
+from fieldsid.noise.white_floor import white_noise_floor  # noqa: E402
 
 NOISE = 0.005
 TARGET_MS, TARGET_RATIO, TARGET_LINEAR_S, TARGET_NONLINEAR_S, TARGET_GIB = 0.5, 100.0, 0.5, 1.0, 1.0
@@ -83,7 +83,7 @@ def long_record(count: int, effects: tuple[str, ...]) -> Problem:
     fin = 0.26 * np.repeat(rng.integers(-1, 2, count // 40 + 1), 40)[:count].astype(float)
     record = command_record(Axis.YAW, np.arange(count) * 0.05, fin, speed=1.4)
     truth = Base(1.1, 0.0, -0.86, 0.002)
-    path = run_core(record, assemble(record, parts, truth, {"quadratic": 2.0}, 1.0), np.zeros(3))
+    path = integrate_record(record, assemble(record, parts, truth, {"quadratic": 2.0}, 1.0), np.zeros(3))
     ok, noise = np.ones(count, dtype=bool), NOISE * rng.standard_normal((2, count))
     record = replace(record, angle=path[:, 0] + noise[0], rate=path[:, 1] + noise[1], angle_ok=ok, rate_ok=ok)
     return Problem((record,), layout_of([record], Axis.YAW, parts))
@@ -110,10 +110,10 @@ def main() -> int:
     count = parser.parse_args().long
     record = short_record()
     problem = Problem((record,), layout_of([record], Axis.YAW, ()))
-    floor, start = floor_of([record]), start_vector([record], problem.layout)
-    found = descend(problem, start, floor)
+    floor, start = white_noise_floor([record]), equation_error_start([record], problem.layout)
+    found = levenberg_marquardt(problem, start, floor)
     np.testing.assert_allclose(by_odeint(record, start)[:3], found.x[:3], rtol=5e-3)
-    ours, path = best(lambda: descend(problem, start, floor), 200), best(lambda: found_minimum(problem), 100)
+    ours, path = best(lambda: levenberg_marquardt(problem, start, floor), 200), best(lambda: found_minimum(problem), 100)
     whole = best(lambda: fit([record], Axis.YAW, method="output_error"), 20)
     theirs = best(lambda: by_odeint(record, start), 2)
     print(f"660 samples, descent            {1e3 * ours:8.2f} ms   target <= {TARGET_MS}")

@@ -97,7 +97,7 @@ def import_it(path: Path) -> None:
 
 def read_it(path: Path) -> None:
     """The reader alone."""
-    from fieldsid.logs.mapping import mapping_of
+    from fieldsid.logs.mapping.mapping_file import mapping_of
     from fieldsid.logs.reader import ReadOptions, reader_of
 
     reader, options = reader_of(path), ReadOptions()

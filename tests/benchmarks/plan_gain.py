@@ -18,22 +18,22 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).res
 from plan_flights import believed, exact, flown, paper_day, scatter  # noqa: E402
 
 from fieldsid.maneuvers import pick_maneuver  # noqa: E402
-from fieldsid.planning.build import Setting, best_leg, pulses  # noqa: E402
-from fieldsid.planning.candidate import Candidate, Window  # noqa: E402
-from fieldsid.planning.envelope import Envelope  # noqa: E402
-from fieldsid.planning.judge import judge_of  # noqa: E402
+from fieldsid.planning.design.best_leg import Setting, best_leg, pulses  # noqa: E402
+from fieldsid.planning.design.objective import make_objective  # noqa: E402
+from fieldsid.planning.flight.excitation import Excitation, Window  # noqa: E402
+from fieldsid.planning.safety.envelope import Envelope  # noqa: E402
 
 WINDOW = Window(33.0)
 FIN = 0.26
 
 
-def entrants(day, heading: float) -> dict[str, Candidate]:
+def entrants(day, heading: float) -> dict[str, Excitation]:
     """The paper's pulses, a PRBS as long and as large, and what is planned within the pulses' heading and within 60 deg."""
     prbs = pick_maneuver("prbs")
-    judge = judge_of(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
+    judge = make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
     made = {
         "pulses": pulses(judge),
-        "prbs": Candidate("prbs", prbs.checked({"amplitude": FIN, "bit": 1.0, "duration": 21.0})),
+        "prbs": Excitation("prbs", prbs.checked({"amplitude": FIN, "bit": 1.0, "duration": 21.0})),
     }
     for name, limit in (("planned, pulses' heading", heading), ("planned, 60 deg", float(np.radians(60)))):
         envelope = Envelope(FIN, heading=limit)
@@ -43,7 +43,7 @@ def entrants(day, heading: float) -> dict[str, Candidate]:
 
 def compare(day, seeds: range, method: str) -> list[tuple[str, dict[str, float], dict[str, float], float]]:
     """Rows of (name, predicted standard errors, those of many fits, largest heading in rad)."""
-    judge = judge_of(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
+    judge = make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
     reach = float(np.max(np.abs(flown(day, pulses(judge), WINDOW, 0)["yaw_rad"])))
     rows = []
     # The prior is off and wide: its draws need some room above what the pulses reach on the truth.

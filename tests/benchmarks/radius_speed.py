@@ -16,17 +16,17 @@ import numpy as np
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import verify_schedule
-from fieldsid.turning.radius import DRAWS, turn_radius
-from fieldsid.turning.source import Source, load_source
+from fieldsid.turning.radius import RADIUS_DRAWS, turn_radius
 
 SPEEDS = [round(0.5 + 0.02 * i, 3) for i in range(100)]
 VALUES = {"a22": 2.2, "b2": -3.0, "C0": 0.01, "lag": 0.15, "cross_damping": 0.9, "cross_rate": -0.4, "quadratic": 3.0}
 EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
 
 
-def source_in(folder: Path, speeds: tuple[float, ...]) -> Source:
+def source_in(folder: Path, speeds: tuple[float, ...]) -> ParameterSource:
     """Models with effects and errors of 3 % at these speeds."""
     paths = []
     for speed in speeds:
@@ -34,7 +34,7 @@ def source_in(folder: Path, speeds: tuple[float, ...]) -> Source:
         covariance = np.diag([(0.03 * abs(v)) ** 2 for v in values.values()])
         model = Model(Axis.YAW, EFFECTS, values, {}, tuple(values), covariance, SpeedLaw(speed), Noise(0.005, 0.005))
         paths.append(save_model(model, folder / f"m{speed:.2f}.yaml", force=True))
-    return load_source(paths)
+    return load_parameter_source(paths)
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -51,8 +51,11 @@ def measure() -> dict[str, tuple[float, float]]:
         schedule = design_schedule(five, 0.26)
         verify_schedule(schedule, five, draws=2)
         return {
-            f"turn-radius, {len(SPEEDS)} speeds, {DRAWS} draws, one model": (seconds(lambda: turn_radius(one, SPEEDS, 0.3)), 5.0),
-            f"turn-radius, {len(SPEEDS)} speeds, {DRAWS} draws, five models": (
+            f"turn-radius, {len(SPEEDS)} speeds, {RADIUS_DRAWS} draws, one model": (
+                seconds(lambda: turn_radius(one, SPEEDS, 0.3)),
+                5.0,
+            ),
+            f"turn-radius, {len(SPEEDS)} speeds, {RADIUS_DRAWS} draws, five models": (
                 seconds(lambda: turn_radius(five, SPEEDS, 0.3)),
                 5.0,
             ),

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fieldsid.fitting.recursive import INITIAL, MEMORY, Recursion, fresh, plain_update, sweep
+from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MEMORY, Recursion, initial_memory, plain_update, sweep
 
 TARGET_RATIO = 50.0
 TARGET_BULK_US = 0.1
@@ -36,13 +36,13 @@ def log(count: int) -> np.ndarray:
 
 def compiled(samples: np.ndarray, room: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
     """The sweep over all samples: filter, update, history of values and bands."""
-    sweep(np.zeros(MEMORY), fresh(stiff=True), LAMBDA, BETA, 1, 4, np.zeros(5), samples, *room)
+    sweep(np.zeros(MEMORY), initial_memory(stiff=True), LAMBDA, BETA, 1, 4, np.zeros(5), samples, *room)
     return room[0][-1]
 
 
 def numpy_loop(rows: np.ndarray) -> np.ndarray:
     """The same update, written as one writes it in NumPy, on rows that are filtered already."""
-    theta, big = np.zeros(4), np.eye(4) * INITIAL
+    theta, big = np.zeros(4), np.eye(4) * INITIAL_VARIANCE
     for row in rows:
         theta, big = plain_update(theta, big, row[:4], row[4], BETA)
     return theta

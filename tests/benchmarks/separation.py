@@ -26,9 +26,9 @@ from fieldsid.fitting.fit import fit  # noqa: E402
 from fieldsid.maneuvers import parse_spec  # noqa: E402
 from fieldsid.models.axis import Axis  # noqa: E402
 from fieldsid.models.record import record_of  # noqa: E402
-from fieldsid.planning.candidate import Candidate, Window  # noqa: E402
-from fieldsid.planning.discriminate import separate  # noqa: E402
-from fieldsid.planning.envelope import Envelope  # noqa: E402
+from fieldsid.planning.discriminate.discriminate import separate  # noqa: E402
+from fieldsid.planning.flight.excitation import Excitation, Window  # noqa: E402
+from fieldsid.planning.safety.envelope import Envelope  # noqa: E402
 
 SPEED, FIN = 1.4, 0.35
 STRENGTHS = {
@@ -48,7 +48,7 @@ PAIRS = (
     "servo_lag/delay", "deadband/stall", "stall/quadratic_damping", "quadratic_damping/sway_coupling", "current/trim_drift",
     "current/compass_deviation", "asymmetric_fin/trim_drift", "rate_limit/servo_lag",
 )  # fmt: skip
-PULSES = Candidate("square_pulses", parse_spec("square_pulses:amplitude=0.26,second=0.15")[1])
+PULSES = Excitation("square_pulses", parse_spec("square_pulses:amplitude=0.26,second=0.15")[1])
 
 
 def day_with(effect: str) -> Day:
@@ -57,7 +57,7 @@ def day_with(effect: str) -> Day:
     return Day(physics._replace(**STRENGTHS[effect]), SPEED, SENSOR, disturbance=0.003)
 
 
-def runs_of(day: Day, candidate: Candidate, window: Window, seeds: tuple[int, ...], name: str):
+def runs_of(day: Day, candidate: Excitation, window: Window, seeds: tuple[int, ...], name: str):
     """Flights of one candidate, named apart."""
     return [replace(flown(day, candidate, window, s), name=f"{name}{s}") for s in seeds]
 

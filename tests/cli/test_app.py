@@ -12,8 +12,8 @@ from cli import trial
 
 from fieldsid._version import __version__
 from fieldsid.cli import app
-from fieldsid.cli.catalogue import entries
-from fieldsid.cli.day import DAY
+from fieldsid.cli.help.catalogue import entries
+from fieldsid.cli.help.command_order import COMMAND_ORDER
 from fieldsid.errors import DataError
 
 HEAVY = ("numpy", "pandas", "scipy", "numba", "matplotlib", "typer", "rich", "pyarrow", "pydantic", "rosbags")
@@ -23,7 +23,7 @@ def test_help_lists_every_command_once_in_the_order_of_the_day(run_cli):
     page = run_cli("--help")
     assert page.code == 0
     named = [line.split()[0] for line in page.out.splitlines() if line.startswith("  ") and line[2] != " "]
-    placed = [n for _, names in DAY for n in names if n in entries()]
+    placed = [n for _, names in COMMAND_ORDER for n in names if n in entries()]
     assert named == placed + [n for n in entries() if n not in placed]
 
 

@@ -9,10 +9,10 @@ import pytest
 from cli import trial
 
 from fieldsid.logs import load_run, save_run
-from fieldsid.logs.conditioning import likely_unit
+from fieldsid.logs.convert.conditioning import likely_unit
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
-from fieldsid.turning.surge import _root, fit_surge
+from fieldsid.turning.steady.speed_loss import _root, fit_surge
 
 COLUMNS = ("time_s", "yaw_rad", "yaw_rate_rad_s", "rudder_rad", "surge_m_s")
 

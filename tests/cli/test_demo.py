@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fieldsid.cli import demo
 from fieldsid.cli.app import main
+from fieldsid.cli.commands import demo
 from fieldsid.demo import steps, vehicle
 from fieldsid.demo.steps import PLAN, STEPS, Step
 from fieldsid.demo.trial import PLANNED_SPEED
 from fieldsid.demo.vehicle import SPEED_NOISE
 from fieldsid.logs import load_run
 from fieldsid.maneuvers import pick_maneuver
-from fieldsid.planning.leg import commands_of
-from fieldsid.planning.plan_file import load_plan
+from fieldsid.planning.design.leg import commands_of
+from fieldsid.planning.output.plan_file import load_plan
 from fieldsid.rounding import number
 
 

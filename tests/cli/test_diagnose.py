@@ -12,7 +12,7 @@ from fieldsid.effects import forget_effects
 from fieldsid.logs import save_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
-from fieldsid.planning.rivals import rivals_from
+from fieldsid.planning.discriminate.rivals import rivals_from
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import sys
 import pytest
 from rich.console import Console
 
-from fieldsid.cli.markdown import rendered
+from fieldsid.cli.help.markdown import rendered
 from fieldsid.effects import all_effects
 from fieldsid.guide import all_pages, pick_page
 from fieldsid.guide.pages import GUIDE

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from fieldsid.cli.catalogue import entries
-from fieldsid.cli.day import DAY
+from fieldsid.cli.help.catalogue import entries
+from fieldsid.cli.help.command_order import COMMAND_ORDER
 from fieldsid.templates import template_names, template_path
 
 LEAVES = [
@@ -18,7 +18,7 @@ LEAVES = [
 
 
 def test_no_group_of_the_front_page_waits_for_a_command_that_is_not_there():
-    assert [name for _, names in DAY for name in names if name not in entries()] == []
+    assert [name for _, names in COMMAND_ORDER for name in names if name not in entries()] == []
 
 
 @pytest.mark.parametrize("group", ["effects", "schedule"])

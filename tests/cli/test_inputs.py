@@ -11,11 +11,11 @@ from cli import trial
 
 from fieldsid.cli import inputs
 from fieldsid.cli.inputs import STDIN, read_runs
-from fieldsid.copies import can_copy
 from fieldsid.errors import DataError, LogError, UsageError
 from fieldsid.logs import load_run, save_run
+from fieldsid.runtime.worker_pool import can_fork
 
-needs_copies = pytest.mark.skipif(not can_copy(), reason="needs Linux, a second core and no other threads")
+needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_the_files_are_read_in_the_copy(files, nothing_read, monkeypatch):
 
 def test_a_process_that_has_read_logs_before_reads_them_itself(files, monkeypatch):
     read_runs(files)
-    monkeypatch.setattr(inputs, "copied", lambda _work: pytest.fail("a copy was made"))
+    monkeypatch.setattr(inputs, "fork_worker", lambda _work: pytest.fail("a copy was made"))
     assert [run.name for run in read_runs(files, meanwhile=lambda: None)] == ["run1", "run2"]
 
 

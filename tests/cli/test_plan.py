@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from moos_helm import script
 
-from fieldsid.planning.leg import error_in_words
-from fieldsid.planning.plan_file import load_plan
+from fieldsid.planning.design.leg import error_in_words
+from fieldsid.planning.output.plan_file import load_plan
 from fieldsid.rounding import number
 from fieldsid.templates import template_path
 

@@ -12,7 +12,7 @@ from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.planning.rehearse import rehearse, with_noise
+from fieldsid.planning.flight.dry_run import dry_run, with_noise
 
 TRUTH = {
     Axis.YAW: {"a22": 1.1, "b2": -1.2, "C0": 0.02},
@@ -28,7 +28,7 @@ def flown(
     folder: Path, axis: Axis = Axis.YAW, *, spec: str = "square_pulses", speed: float = 1.4, seed: int = 3, name: str = "run7"
 ) -> Path:
     model = vehicle(axis)
-    run = with_noise(rehearse(model, *parse_spec(spec), speed=speed, limits=Limits(0.35)), model, seed)
+    run = with_noise(dry_run(model, *parse_spec(spec), speed=speed, limits=Limits(0.35)), model, seed)
     return save_run(replace(run, name=name), folder / f"{name}.parquet")
 
 

@@ -12,14 +12,15 @@ import pytest
 from fieldsid.effects import all_effects
 from fieldsid.maneuvers import all_maneuvers
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core, Effect, FinPath, Motion, Stage, Terms
+from fieldsid.models.effect import Core, Effect, Motion, Stage, Terms
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 
 EFFECTS = all_effects()
 HOOKS = {
     Stage.ACTUATOR: {"fin"},
     Stage.HYDRODYNAMICS: {"terms", "slope", "core", "moment"},
-    Stage.SENSOR: {"measure", "carry"},
+    Stage.SENSOR: {"measure", "sensor_jvp"},
 }
 MANEUVERS = set(all_maneuvers())
 ROLES = {"surge", "thrust", "roll", "depth", "cross"}
@@ -88,7 +89,7 @@ def untouched(name: str, log: Record) -> np.ndarray | float:
 
 @each_effect
 def test_exactly_the_hooks_of_its_stage_are_given(effect):
-    given = {n for n in ("fin", "terms", "slope", "core", "moment", "measure", "carry") if getattr(effect, n) is not None}
+    given = {n for n in ("fin", "terms", "slope", "core", "moment", "measure", "sensor_jvp") if getattr(effect, n) is not None}
     assert given
     assert given <= HOOKS[effect.stage]
 
@@ -215,7 +216,7 @@ def test_a_path_cut_in_half_steps_keeps_its_area(effect):
 
 @pytest.mark.parametrize(
     ("effect", "form"),
-    [(e, f) for e in EFFECTS.values() if e.slope for f in (None, *e.forms)],
+    [(e, f) for e in EFFECTS.values() if e.slope for f in (None, *e.variants)],
     ids=lambda v: getattr(v, "name", "form"),
 )
 def test_an_effects_slopes_are_those_of_its_moment(effect, form):
@@ -236,12 +237,12 @@ def test_a_sensor_effect_returns_motion(effect):
     assert isinstance(effect.measure(motion_of(log), effect.starts(), log), Motion)
 
 
-@pytest.mark.parametrize("effect", [e for e in EFFECTS.values() if e.carry], ids=lambda e: e.name)
+@pytest.mark.parametrize("effect", [e for e in EFFECTS.values() if e.sensor_jvp], ids=lambda e: e.name)
 def test_moves_carried_through_a_sensor_are_the_slopes_of_what_it_shows(effect):
     log, rng = record(effect.axes[0]), np.random.default_rng(4)
     motion, moves = motion_of(log), rng.standard_normal((3, 2, len(log)))
     values = {c.name: c.start + 0.1 * (c.high - c.start) for c in effect.every}
-    for carried, move in zip(effect.carry(moves, motion, values, log), moves, strict=True):
+    for carried, move in zip(effect.sensor_jvp(moves, motion, values, log), moves, strict=True):
         ends = [effect.measure(Motion(motion.angle + s * move[0], motion.rate + s * move[1]), values, log) for s in (1e-5, -1e-5)]
         slope = np.stack([ends[0].angle - ends[1].angle, ends[0].rate - ends[1].rate]) / 2e-5
         np.testing.assert_allclose(carried, slope, atol=1e-6)

@@ -13,7 +13,7 @@ from fieldsid.artifacts import sha256_of
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs import Run, load_run, save_run
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
-from fieldsid.logs.mapping import mapping_of
+from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import PACKAGE, RawLog, ReadOptions, reader_of
 from fieldsid.registry import members
 

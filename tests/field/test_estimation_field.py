@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fieldsid.fitting.fit import fit
-from fieldsid.fitting.merit import merit
-from fieldsid.fitting.predict import predict
+from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+from fieldsid.fitting.predict.predict import predict
 from fieldsid.logs import Run, segment
 from fieldsid.logs.load import load_run
 from fieldsid.models.axis import Axis
@@ -30,7 +30,7 @@ def ship(shared_data):
 def unseen(ship, effects):
     found = fit([ship[n] for n in ("10_05", "20_05", "30_05")], Axis.YAW, effects=effects)
     assert found.model.method == "output_error"
-    return merit([predict(found.model, ship["15_05"])]).rate_fit
+    return goodness_of_fit([predict(found.model, ship["15_05"])]).rate_fit
 
 
 def test_a_zigzag_is_predicted_better_with_every_effect_that_is_there(ship):

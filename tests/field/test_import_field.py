@@ -10,7 +10,7 @@ from bags import KINDS, MAPPING, write_bag
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs import load_run, segment
 from fieldsid.logs.inspection import inspect_log, write_proposal
-from fieldsid.logs.mapping import mapping_of
+from fieldsid.logs.mapping.mapping_file import mapping_of
 
 pytestmark = pytest.mark.field
 

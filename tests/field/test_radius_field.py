@@ -9,9 +9,9 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs import load_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
-from fieldsid.turning.measured import measure_turn
+from fieldsid.plant.parameter_source import load_parameter_source
+from fieldsid.turning.measured.measured_turn import measure_turn
 from fieldsid.turning.radius import turn_radius
-from fieldsid.turning.source import load_source
 
 pytestmark = pytest.mark.field
 
@@ -31,7 +31,7 @@ def models(folder, shared_data, kinds, effects):
         (fit,) = identify(logs, Axis.YAW, effects=effects, joint=len(logs) > 1)
         paths.append(save_model(fit.model, folder / f"m{v}.yaml"))
         runs += logs
-    return load_source(paths), runs
+    return load_parameter_source(paths), runs
 
 
 def test_pulses_and_zigzag_predict_full_rudder_within_five_percent_both_sides(tmp_path, shared_data, truth):

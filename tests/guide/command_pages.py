@@ -14,8 +14,8 @@ from guide.schema_pages import SHAPES, file_of
 from guide.session import Session, tidied
 
 from fieldsid.cli.app import main
-from fieldsid.cli.catalogue import entries
-from fieldsid.cli.day import DAY
+from fieldsid.cli.help.catalogue import entries
+from fieldsid.cli.help.command_order import COMMAND_ORDER
 
 INDEX = """# Commands
 
@@ -36,7 +36,7 @@ def pages(session: Session) -> dict[str, str]:
 def index() -> str:
     """Return the page that lists the commands by the time of the day."""
     known, parts = entries(), [INDEX]
-    for title, names in DAY:
+    for title, names in COMMAND_ORDER:
         rows = [(f"[{n}]({n}.md)", known[n].summary) for n in names if n in known]
         parts += [f"## {title}\n\n{table(('command', 'what it gives'), rows)}"] if rows else []
     return "\n".join(parts)

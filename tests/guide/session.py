@@ -23,7 +23,7 @@ import numpy as np
 from fieldsid.artifacts import plain
 from fieldsid.cli.app import main
 from fieldsid.cli.app import run as run_command
-from fieldsid.cli.demo import HIDDEN
+from fieldsid.cli.commands.demo import HIDDEN
 from fieldsid.demo.steps import expanded
 from fieldsid.demo.vehicle import SPEED, flown, hidden_vehicle
 from fieldsid.logs import save_run

@@ -21,7 +21,7 @@ from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.model import Model
 from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
-from fieldsid.planning.rehearse import rehearse, with_noise
+from fieldsid.planning.flight.dry_run import dry_run, with_noise
 
 SEED = 3
 STRENGTHS: Mapping[str, tuple[str, Mapping[str, float]]] = {
@@ -93,7 +93,7 @@ def _vehicle(name: str) -> tuple[Model, str]:
 def _flown(model: Model, maneuver: str) -> Run:
     effects = tuple(pick_effect(n) for n in model.effects)
     known = pick_maneuver(maneuver)
-    return rehearse(model, known, known.checked({}), speed=SPEED, limits=LIMITS, helpers=lambda t: helpers(effects, t, SPEED))
+    return dry_run(model, known, known.checked({}), speed=SPEED, limits=LIMITS, helpers=lambda t: helpers(effects, t, SPEED))
 
 
 def figure(told: Telltale) -> Figure:

@@ -15,7 +15,7 @@ from guide.sameness import difference, same
 from guide.schema_pages import SHAPES
 from guide.session import TOUR
 
-from fieldsid.cli.catalogue import entries
+from fieldsid.cli.help.catalogue import entries
 from fieldsid.effects import all_effects
 from fieldsid.guide import all_pages
 from fieldsid.logs.run import SIGNALS

@@ -7,37 +7,45 @@ import re
 import pytest
 from guide.make import GUIDE
 
-from fieldsid.diagnosis import hypothesis, remainder, verdict, worth
-from fieldsid.fitting import choice, layout, own_speed, remarks, restricted, suspects
+from fieldsid.diagnosis import verdict
+from fieldsid.diagnosis.evidence import acceptance, scored_model
+from fieldsid.diagnosis.residual_tests import residual_tests
+from fieldsid.diagnosis.search import speed_law_search
+from fieldsid.fitting import auto_method
+from fieldsid.fitting.checks import parameter_checks, score_tests
+from fieldsid.fitting.covariance import reml
+from fieldsid.fitting.predict import speed_correction
+from fieldsid.fitting.problem import parameters
 from fieldsid.schedule import verify
-from fieldsid.turning import doubt, formulas, radius
+from fieldsid.turning import model_error, paper_formulas, radius
 
 PAGE = (GUIDE / "theory.md").read_text()
 WORDS = " ".join(PAGE.split())
 NUMBERS = {
-    "prior log odds against an effect": hypothesis.PRIOR_ODDS,
-    "share the free-run error must fall to": worth.MATTERS,
-    "less of it for a third and each further effect": worth.MATTERS_MORE,
-    "log evidence is divided by, for a probability": verdict.TEMPER,
-    "log evidence within which hypotheses are rivals": verdict.RIVAL,
-    "factor of error within which hypotheses predict alike": worth.ALIKE,
-    "error over the floor that is visible": verdict.VISIBLE,
-    "p-value below which what is left is no disturbance": remainder.BEYOND_CHANCE,
-    "error over the floor below which only a relation counts": verdict.FAINT,
-    "error over the floor beyond which no sea is taken for granted": verdict.STORM,
-    "unseen over fitted error beyond which none is": worth.WORSE,
-    "share of the excess that an effect must explain": verdict.MOSTLY,
-    "log likelihood per number of a noise kind": restricted.GAIN_NEEDED,
-    "share of the slow residual that follows the fin, for `auto`": choice.FOLLOWS,
-    "free-run error of `pem` over that of output error, for `auto`": choice.WORST_FREE_RUN,
-    "share that a measured speed is off by": own_speed.MEASURED,
-    "shortest delay that is said, s": suspects.LEAST_DELAY_S,
-    "correlation that is said": remarks.HIGHEST_CORRELATION,
-    "width of a group of speeds, log": layout.GROUP_WIDTH,
-    "time constants of the u-turn's ramp": formulas.RAMP,
-    "share of a turn's rate that counts as reached": doubt.REACHED,
-    "draws of a turn": radius.DRAWS,
-    "draws of a schedule": verify.DRAWS,
+    "prior log odds against an effect": scored_model.EFFECT_LOG_ODDS,
+    "share the free-run error must fall to": acceptance.MAX_ERROR_RATIO,
+    "less of it for a third and each further effect": acceptance.EXTRA_ERROR_RATIO_PER_EFFECT,
+    "log evidence is divided by, for a probability": verdict.EVIDENCE_TEMPERATURE,
+    "log evidence within which hypotheses are rivals": verdict.MAX_RIVAL_LOG_ODDS,
+    "factor of error within which hypotheses predict alike": acceptance.EQUAL_ERROR_RATIO,
+    "error over the floor that is visible": verdict.SUFFICIENT_ERROR_RATIO,
+    "p-value below which what is left is no disturbance": residual_tests.MIN_P_VALUE,
+    "error over the floor below which only a relation counts": verdict.ERROR_LOW,
+    "error over the floor beyond which no sea is taken for granted": verdict.ERROR_HIGH,
+    "unseen over fitted error beyond which none is": acceptance.MAX_VALIDATION_ERROR_RATIO,
+    "share of the excess that an effect must explain": verdict.MIN_EXPLAINED_SHARE,
+    "log likelihood per number of a noise kind": reml.PENALTY_PER_PARAMETER,
+    "share of the slow residual that follows the fin, for `auto`": auto_method.MIN_FOLLOWING_SHARE,
+    "free-run error of `pem` over that of output error, for `auto`": auto_method.MAX_FREE_RUN_RATIO,
+    "share that a measured speed is off by": speed_correction.MEASURED_SPEED_STD_ERROR,
+    "shortest delay that is said, s": score_tests.MIN_DELAY_S,
+    "correlation that is said": parameter_checks.MAX_CORRELATION,
+    "width of a group of speeds, log": parameters.GROUP_WIDTH,
+    "the same while models are compared": speed_law_search.FINE_GROUP_WIDTH,
+    "time constants of the u-turn's ramp": paper_formulas.RISE_TIME_CONSTANTS,
+    "share of a turn's rate that counts as reached": model_error.MIN_COVERED_SHARE,
+    "draws of a turn": radius.RADIUS_DRAWS,
+    "draws of a schedule": verify.VERIFY_DRAWS,
 }
 
 
@@ -49,13 +57,13 @@ def test_the_page_gives_the_codes_numbers():
 
 @pytest.mark.parametrize("share", [0.7, 0.6, 0.3])
 def test_the_page_says_what_an_effect_must_explain(share):
-    (p,) = (p for enough, p in verdict.BESIDE if enough == share)
+    (p,) = (p for enough, p in verdict.VERDICT_TABLE if enough == share)
     (said,) = re.findall(rf"less than {100 * share:.0f} % (?:of the excess error [a-z- ]* below|and) ([0-9.e-]+[0-9])", WORDS)
     assert float(said) == p
 
 
 def test_the_worked_u_turn_is_the_formulas():
-    turn = formulas.u_turn(1.0, 1.0, -0.55, 0.26)
+    turn = paper_formulas.u_turn(1.0, 1.0, -0.55, 0.26)
     assert f"`r_max` = {turn.yaw_rate_max:.3f} rad/s" in WORDS
     assert f"R = {turn.radius:.2f} m" in WORDS
 
@@ -71,9 +79,9 @@ ROWS = {
 @pytest.mark.parametrize(("f", "h", "d"), [(0.0, 0.0, 0.0), (0.4, 0.2, 0.1), (0.2, 0.7, 0.5)])
 def test_the_table_of_a_turns_doubt_is_the_codes(row, f, h, d):
     mean, sd = re.search(rf"^\| {re.escape(row)} \| (.*) \| (.*) \|$", PAGE, re.MULTILINE).groups()
-    reach = doubt.Reach(fin=1.0 - d, rate=1.0 - f, hold=1.0 - h, speed_flown=True)
+    reach = model_error.DataCoverage(fin=1.0 - d, rate=1.0 - f, hold=1.0 - h, speed_flown=True)
     effects, formula = ROWS[row]
-    found = doubt.doubt_of(effects, reach, formula=formula)
+    found = model_error.model_error(effects, reach, formula=formula)
     assert found.mean == pytest.approx(value_of(mean, f, h, d))
     assert found.sd == pytest.approx(value_of(sd, f, h, d))
 

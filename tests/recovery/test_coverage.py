@@ -92,9 +92,9 @@ def test_intervals_cover_what_they_say(row, case, method):
 @pytest.mark.parametrize("row", ROWS, ids=["yaw", "pitch"])
 def test_output_error_reaches_the_cramer_rao_bound_in_white_noise(row):
     """The bound is the inverse information at the truth; efficiency is bound over mean squared error, averaged."""
-    from fieldsid.fitting.descent import covariance, normal_equations
-    from fieldsid.fitting.layout import layout_of
-    from fieldsid.fitting.problem import Problem
+    from fieldsid.fitting.optimise.levenberg_marquardt import covariance, normal_equations
+    from fieldsid.fitting.problem.parameters import layout_of
+    from fieldsid.fitting.problem.problem import Problem
     from fieldsid.models.model import Noise
 
     log = record(row, "white", 0)

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from truth.bank import Case, make_case
 
-from fieldsid import copies
 from fieldsid.diagnosis import Diagnosis, diagnose
+from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.diagnose import body_of
-from fieldsid.diagnosis.search import Search
-from fieldsid.diagnosis.usable import usable
+from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
+from fieldsid.runtime import worker_pool
 
 SEED = 2026
 CHANNELS = (("angle", "rad"), ("rate", "rad_s"))
@@ -68,10 +68,10 @@ def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:
     case = visible_case("pair", 0)
     axis = Axis(case.axis)
     training, unseen = ([record_of(r, axis) for r in runs_of(logs, "run")] for logs in (case.training, case.validation))
-    catalogue, _ = usable(all_effects(axis).values(), [*training, *unseen])
+    catalogue, _ = applicable_effects(all_effects(axis).values(), [*training, *unseen])
     work = Search(training, unseen, axis, catalogue)
     found = work.best()
-    longer = work.grow(found)[0]
+    longer = work.forward_step(found)[0]
     assert len(longer.names) == len(found.names) + 1 == 3
     assert work.core_of(longer) == frozenset(found.names)
 
@@ -156,5 +156,5 @@ def test_an_unseen_run_is_flown_at_its_own_speed_and_that_is_said() -> None:
 def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case(kind, 40)
     shared = diagnosed(case)
-    monkeypatch.setattr(copies, "can_copy", lambda: False)
+    monkeypatch.setattr(worker_pool, "can_fork", lambda: False)
     assert body_of(diagnosed(case)) == body_of(shared)

@@ -14,12 +14,12 @@ from truth.logbook import flown
 from truth.noise import Clock
 from truth.physics import Physics
 
+from fieldsid.dynamics.free_run import simulate
 from fieldsid.effects import all_effects
 from fieldsid.fitting.fit import fit
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
-from fieldsid.models.simulate import simulate
 
 CLOCK = Clock(0.05, 1000)
 BASE = {

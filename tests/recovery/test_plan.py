@@ -16,14 +16,14 @@ from fieldsid.fitting.fit import fit
 from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
-from fieldsid.planning.build import Setting, best_leg, pulses
-from fieldsid.planning.candidate import Candidate, Window
-from fieldsid.planning.circle import circle_legs
-from fieldsid.planning.crowd import crowd_of, fly_crowd
-from fieldsid.planning.envelope import Envelope
-from fieldsid.planning.judge import judge_of
-from fieldsid.planning.plan import Request, make_plan
-from fieldsid.planning.prior import named_prior
+from fieldsid.planning.belief.prior_model import named_prior
+from fieldsid.planning.design.best_leg import Setting, best_leg, pulses
+from fieldsid.planning.design.circle_legs import circle_legs
+from fieldsid.planning.design.objective import make_objective
+from fieldsid.planning.design.plan import Request, make_plan
+from fieldsid.planning.flight.excitation import Excitation, Window
+from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.safety.monte_carlo import draw_ensemble, fly_ensemble
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
@@ -39,12 +39,12 @@ def planned():
 
 
 def errors_of(day, candidate):
-    judge = judge_of(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
+    judge = make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0)
     return judge.expected(candidate).std_errors()
 
 
 def paper_pulses(day):
-    return pulses(judge_of(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0))
+    return pulses(make_objective(exact(day), day.speed, Envelope(FIN), WINDOW, {}, 10.0))
 
 
 @pytest.mark.parametrize("disturbance", [0.0, 0.01])
@@ -85,7 +85,7 @@ def test_predicted_errors_agree_with_three_hundred_fits_within_fifteen_per_cent(
 def test_a_stronger_fin_angle_buys_errors_in_proportion():
     day = paper_day()
     one, two = (
-        errors_of(day, Candidate("doublet", parse_spec(f"doublet:amplitude={a}")[1])) for a in (0.1, 0.2)
+        errors_of(day, Excitation("doublet", parse_spec(f"doublet:amplitude={a}")[1])) for a in (0.1, 0.2)
     )  # fmt: skip
     assert one["b2"] == pytest.approx(2 * two["b2"], rel=0.05)
 
@@ -100,8 +100,8 @@ def test_a_stronger_fin_angle_buys_errors_in_proportion():
 def test_no_plan_leaves_the_envelope_in_more_than_the_stated_share_of_five_hundred_new_draws(axis, envelope):
     model = named_prior("torpedo", axis)
     leg = best_leg(Setting(model, envelope, WINDOW, {}), 1.4)
-    crowd = crowd_of(model, 1.4, WINDOW, 500, 987)
-    broken = fly_crowd(crowd, leg.candidate, envelope, leg.autopilot, 14.0).outside(envelope)
+    crowd = draw_ensemble(model, 1.4, WINDOW, 500, 987)
+    broken = fly_ensemble(crowd, leg.candidate, envelope, leg.autopilot, 14.0).outside(envelope)
     assert np.mean(broken) <= envelope.share
     assert leg.break_probability <= envelope.share
 
@@ -138,11 +138,11 @@ def test_a_speed_planned_among_others_is_planned_nearly_as_well_as_alone():
 
 
 def test_a_maneuver_is_stretched_in_time_inside_the_bounds_of_its_parameters():
-    pulses = Candidate("square_pulses", parse_spec("square_pulses:amplitude=0.2,width=2,recovery=50")[1]).stretched(1.5)
+    pulses = Excitation("square_pulses", parse_spec("square_pulses:amplitude=0.2,width=2,recovery=50")[1]).stretched(1.5)
     assert pulses.parameters["width"] == pytest.approx(3.0)
     assert pulses.parameters["recovery"] == 60.0
     assert pulses.parameters["amplitude"] == 0.2
-    chirp = Candidate("chirp", parse_spec("chirp:amplitude=0.2,low_hz=0.1,high_hz=1.2,duration=20")[1]).stretched(2.0)
+    chirp = Excitation("chirp", parse_spec("chirp:amplitude=0.2,low_hz=0.1,high_hz=1.2,duration=20")[1]).stretched(2.0)
     assert (chirp.parameters["low_hz"], chirp.parameters["high_hz"]) == pytest.approx((0.05, 0.6))
     assert chirp.parameters["duration"] == 20.0
 

@@ -11,9 +11,9 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
-from fieldsid.turning.measured import measure_turn
+from fieldsid.plant.parameter_source import load_parameter_source
+from fieldsid.turning.measured.measured_turn import measure_turn
 from fieldsid.turning.radius import turn_radius
-from fieldsid.turning.source import load_source
 
 FINS = Fins(lag=0.15)
 SPEED = 1.54
@@ -42,7 +42,7 @@ def zigzag() -> Run:
 
 def source_of(folder, runs, effects):
     (fit,) = identify(runs, Axis.YAW, effects=effects, joint=len(runs) > 1)
-    return load_source([save_model(fit.model, folder / "model.yaml", force=True)])
+    return load_parameter_source([save_model(fit.model, folder / "model.yaml", force=True)])
 
 
 @pytest.mark.parametrize("rudder", [0.2, 0.3])

@@ -11,11 +11,11 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
+from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.schedule.design import Wish
+from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.plant import FinLimits
 from fieldsid.schedule.verify import checked_speeds, constant_row
-from fieldsid.turning.source import load_source
 
 KNOTS = (1.2, 1.6, 2.0)
 FINS = Fins(lag=0.15, rate=1.0, limit=0.3)
@@ -35,7 +35,7 @@ def schedule_from(folder, fins: Fins, kind: str = "pd"):
         (fit,) = identify([flown(speed, 20 + i, fins)], Axis.YAW, method="output_error")
         paths.append(save_model(fit.model, folder / f"m{i}.yaml"))
     limits = FinLimits(lag=fins.lag, rate=fins.rate)
-    return design_schedule(load_source(paths), fins.limit, wish=Wish(kind=kind, bandwidth=1.0), limits=limits)
+    return design_schedule(load_parameter_source(paths), fins.limit, wish=Wish(kind=kind, bandwidth=1.0), limits=limits)
 
 
 def steered(row, speed: float, *, fins: Fins = FINS, step: float = STEP, forward: bool = True, seed: int = 50):

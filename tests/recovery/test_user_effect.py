@@ -10,10 +10,10 @@ from truth.physics import Physics
 from truth.simple import fly
 
 from fieldsid.effects import forget_effects
-from fieldsid.effects._own import add_user_effects
+from fieldsid.effects._user_folder import add_user_effects
 from fieldsid.errors import EffectError
 from fieldsid.fitting.fit import fit
-from fieldsid.fitting.predict import predict
+from fieldsid.fitting.predict.predict import predict
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of

@@ -9,21 +9,22 @@ import hidden_lag
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis import laws, trial, weather
-from fieldsid.diagnosis.beside import Beside
-from fieldsid.diagnosis.split import held_back
+from fieldsid.diagnosis.data.holdout_split import holdout_split
+from fieldsid.diagnosis.evidence import likelihood_fit, noise_kind
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.search import speed_law_search
 from fieldsid.effects import pick_effect
-from fieldsid.fitting.layout import layout_of, speed_groups
-from fieldsid.fitting.starts import _first_least
-from fieldsid.logs.lagged import correlations
+from fieldsid.fitting.initial.joint_grid_search import _first_least
+from fieldsid.fitting.problem.parameters import layout_of, speed_groups
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.record import record_of
-from fieldsid.models.smoothing import smoothed
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.numerics.gcv_smoother import gcv_smooth
+from fieldsid.numerics.shifted_correlation import shifted_correlations
+from fieldsid.plant.laws.parameter_law import authority_law, other_law
+from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.rounding import nine_digits
-from fieldsid.turning.law import authority_law, other_law
-from fieldsid.turning.source import load_source
 
 UP, DOWN = np.nextafter(1.4, 2.0), np.nextafter(1.4, 1.0)
 SPEEDS = np.array([1.0, 1.3, 1.5, 1.9, 2.0])
@@ -45,26 +46,26 @@ def test_nine_digits_are_alike_for_what_differs_by_rounding_and_not_for_what_doe
 @pytest.mark.parametrize("speeds", [(1.4, UP, DOWN), (UP, DOWN, 1.4), (DOWN, 1.4, UP)])
 def test_of_runs_at_one_speed_the_middle_one_is_held_back_whatever_their_last_bits(record, speeds):
     runs = [replace(record, name=f"run{i}", speed=speed) for i, speed in enumerate(speeds)]
-    _, unseen, _ = held_back(runs)
+    _, unseen, _ = holdout_split(runs)
     assert [r.name for r in unseen] == ["run1"]
 
 
 def test_of_runs_at_several_speeds_the_middle_speed_is_held_back(record):
     runs = [replace(record, name=f"{speed}", speed=speed) for speed in (1.8, 1.0, 1.4)]
-    assert [r.name for r in held_back(runs)[1]] == ["1.4"]
+    assert [r.name for r in holdout_split(runs)[1]] == ["1.4"]
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.003])
 def test_a_signal_that_is_straight_but_for_rounding_is_smoothed_to_itself(slope):
     time = np.arange(600) * 0.05
     values = np.nextafter(1.4 + slope * time, np.where(np.arange(600) % 7 < 3, 9.0, -9.0))
-    np.testing.assert_array_equal(smoothed(time, values), values)
+    np.testing.assert_array_equal(gcv_smooth(time, values), values)
 
 
 @pytest.mark.parametrize("value", [0.1, 0.3, 0.7, 1e-3])
 @pytest.mark.parametrize("size", [50, 331, 997])
 def test_what_stays_goes_with_nothing(value, size):
-    assert (correlations(np.full(size, value), np.sin(np.arange(size)), 2) == 0.0).all()
+    assert (shifted_correlations(np.full(size, value), np.sin(np.arange(size)), 2) == 0.0).all()
 
 
 @pytest.mark.parametrize("value", [0.1, 0.3, 0.7, 0.8, 1.1, 2.3])
@@ -108,7 +109,7 @@ def model_at(folder, name, speed):
 
 @pytest.mark.parametrize("speeds", [(1.4, UP), (UP, 1.4), (1.4, 1.4)])
 def test_models_of_one_speed_share_every_speed_alike(tmp_path, speeds):
-    source = load_source([model_at(tmp_path, f"m{i}", speed) for i, speed in enumerate(speeds)])
+    source = load_parameter_source([model_at(tmp_path, f"m{i}", speed) for i, speed in enumerate(speeds)])
     for speed in (1.0, 1.4, 2.0):
         assert source.near(speed) == [(0, 0.5), (1, 0.5)]
 
@@ -129,12 +130,12 @@ def test_of_two_starts_that_are_alike_the_smaller_effect_is_kept(monkeypatch, re
         x = np.zeros(place + 1)
         x[place] = value
         return SimpleNamespace(
-            trial=SimpleNamespace(problem=problem, x=x), likelihood=likelihood, noise=None, floor=None, family=""
+            fitted=SimpleNamespace(problem=problem, x=x), log_likelihood=likelihood, noise=None, floor=None, noise_kind=""
         )
 
-    monkeypatch.setattr(trial, "twin_of", lambda *_of: np.zeros(1))
-    monkeypatch.setattr(trial, "judge", lambda *_of: judged(other, 100.0 + gained))
-    assert trial.smaller_twin(judged(lag, 100.0), effect).trial.x[place] == min(lag, other)
+    monkeypatch.setattr(likelihood_fit, "equivalent_solution", lambda *_of: np.zeros(1))
+    monkeypatch.setattr(likelihood_fit, "fit_maximum_likelihood", lambda *_of: judged(other, 100.0 + gained))
+    assert likelihood_fit.prefer_smaller_equivalent(judged(lag, 100.0), effect).fitted.x[place] == min(lag, other)
 
 
 @pytest.mark.parametrize(
@@ -142,11 +143,13 @@ def test_of_two_starts_that_are_alike_the_smaller_effect_is_kept(monkeypatch, re
 )
 def test_white_noise_is_of_the_first_kind_whatever_the_last_bit_says(monkeypatch, gained, kind):
     likelihoods = {"disturbance": 1000.0, "coloured": 1000.0 + gained}
-    monkeypatch.setattr(weather, "judge", lambda *of: SimpleNamespace(family=of[-1], likelihood=likelihoods[of[-1]]))
-    monkeypatch.setattr(weather, "wanders", lambda _judged: False)
+    monkeypatch.setattr(
+        noise_kind, "fit_maximum_likelihood", lambda *of: SimpleNamespace(noise_kind=of[-1], log_likelihood=likelihoods[of[-1]])
+    )
+    monkeypatch.setattr(noise_kind, "has_sensor_colour", lambda _judged: False)
     monkeypatch.setenv("FIELDSID_IS_COPY", "1")
     start = SimpleNamespace(problem=None, x=None)
-    assert weather.base_judged(start, FLOOR, FLOOR, "", Beside((), ())).family == kind
+    assert noise_kind.fit_base(start, FLOOR, FLOOR, "", ParallelMap((), ())).noise_kind == kind
 
 
 @pytest.mark.parametrize(("speeds", "asks"), [((1.4, UP), False), ((1.4, 1.42), True)])
@@ -154,7 +157,7 @@ def test_the_other_law_of_the_speed_is_asked_for_runs_of_several_speeds_only(mon
     records = [replace(record, speed=speed) for speed in speeds]
     groups = speed_groups(records)
     problem = SimpleNamespace(layout=SimpleNamespace(groups=groups), records=records)
-    h = SimpleNamespace(judged=SimpleNamespace(trial=SimpleNamespace(problem=problem, x=np.zeros(3))))
-    monkeypatch.setattr(laws, "by_other_law", lambda *_of: (None, None))
-    monkeypatch.setattr(laws, "_better", lambda *_of: "asked")
-    assert laws.under_other_law(h, FLOOR, "disturbance", asks_for_more=True) == ("asked" if asks else None)
+    h = SimpleNamespace(likelihood_fit=SimpleNamespace(fitted=SimpleNamespace(problem=problem, x=np.zeros(3))))
+    monkeypatch.setattr(speed_law_search, "under_other_speed_law", lambda *_of: (None, None))
+    monkeypatch.setattr(speed_law_search, "_better", lambda *_of: "asked")
+    assert speed_law_search.other_speed_law(h, FLOOR, "disturbance", asks_for_more=True) == ("asked" if asks else None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fieldsid.logs.clocktext import CLOCK, DATE
+from fieldsid.logs.convert.clock_text import CLOCK, DATE
 
 _NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 _COMMA_NUMBER = re.compile(r"^[+-]?(\d+,\d+|\d+)([eE][+-]?\d+)?$")

@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import Source
-from fieldsid.logs.clocktext import DAY_S, clock_of_text, days_of
-from fieldsid.logs.clocktime import likely_time_unit, seconds_of
-from fieldsid.logs.names import TIME, unit_in_name
+from fieldsid.logs.convert.clock_text import DAY_S, clock_of_text, days_of
+from fieldsid.logs.convert.time_column import likely_time_unit, seconds_of
+from fieldsid.logs.mapping.canonical_names import TIME, unit_in_name
+from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._columns import Columns
-from fieldsid.logs.run import FloatArray
-from fieldsid.logs.words import meaning_of, words_of
+from fieldsid.numerics.arrays import FloatArray
 
 MOSTLY = 0.9
 """Share of the steps of a column that go on, from which it is taken for time: a damaged log may go back here and there."""

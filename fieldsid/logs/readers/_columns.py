@@ -12,14 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError, MappingError
-from fieldsid.logs.cells import as_numbers
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
-from fieldsid.logs.clocktime import seconds_of
-from fieldsid.logs.names import TIME, Canonical, canonical, stated_unit, unit_in_name
-from fieldsid.logs.naming import stem_of
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.time_column import seconds_of
+from fieldsid.logs.mapping.canonical_names import TIME, Canonical, canonical, stated_unit, unit_in_name
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
-from fieldsid.logs.run import FloatArray, Note
-from fieldsid.logs.words import meaning_of
+from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import stem_of
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 LOOKED_AT = 200

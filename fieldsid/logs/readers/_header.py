@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fieldsid.logs.convert.units import find_unit
 from fieldsid.logs.readers._cells import COMMENTS, cells, is_number_or_date
-from fieldsid.logs.units import find_unit
 
 OTHER_UNITS = frozenset({
     "timestamp", "utc", "nodim", "enum", "bool", "volts", "v", "amps", "a", "ah", "mah", "w", "wh", "degc", "hz", "count",

@@ -17,7 +17,7 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from fieldsid.errors import LogError
-from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN
 
 GZIP = b"\x1f\x8b"
 HEAD = 1 << 18

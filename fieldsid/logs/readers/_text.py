@@ -9,7 +9,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.readers._cells import cells, is_row, is_word
 from fieldsid.logs.readers._header import behind_sizes, header_of
-from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN
 
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 LOOKED_AT = 400

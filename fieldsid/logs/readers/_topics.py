@@ -13,11 +13,12 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source
-from fieldsid.logs.names import stated_unit, unit_in_name
-from fieldsid.logs.naming import stem_of
+from fieldsid.logs.mapping.canonical_names import stated_unit, unit_in_name
 from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo, Inventory, RawLog, Series
-from fieldsid.logs.run import FloatArray, Note
-from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import stem_of
+from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
 DATA = "data"

@@ -13,7 +13,7 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
 from fieldsid.logs.run import Note
-from fieldsid.logs.strangers import COPY_AGAIN, DATAFLASH
+from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
 
 MAVLINK = (0xFE, 0xFD)
 """How a packet of either version of the protocol starts, behind eight bytes of time."""
@@ -72,7 +72,16 @@ def _rows(log: Any, *, is_flash: bool) -> dict[str, list[tuple[float, dict[str, 
 
 
 def _flash(path: Path) -> Any:
-    return library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary(str(path))
+    kind = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary
+    log = kind.__new__(kind)
+    try:
+        kind.__init__(log, str(path))
+    except Exception:
+        # it opens the file before it looks into it, and leaves it open where it does not like what it finds
+        if (handle := getattr(log, "filehandle", None)) is not None:
+            handle.close()
+        raise
+    return log
 
 
 def _of_flash(message: Any) -> tuple[str, float | None, dict[str, float]]:

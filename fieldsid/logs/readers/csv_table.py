@@ -23,7 +23,7 @@ from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
 from fieldsid.logs.readers._text import Form, form_of
 from fieldsid.logs.run import Note
-from fieldsid.logs.strangers import COPY_AGAIN, is_text
+from fieldsid.logs.unknown_file import COPY_AGAIN, is_text
 
 _LINE = re.compile(r"line (\d+)")
 BLOCK_ROWS = 100_000

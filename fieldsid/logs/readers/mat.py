@@ -16,8 +16,8 @@ from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Read
 from fieldsid.logs.readers._clock import clock_of
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._topics import library
-from fieldsid.logs.run import FloatArray
-from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.numerics.arrays import FloatArray
 
 MAGIC = b"MATLAB "
 HDF5 = b"MATLAB 7.3"

@@ -9,13 +9,13 @@ from typing import Any
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.names import TIME
-from fieldsid.logs.naming import stem_of
+from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.readers._clock import clock_of
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.run import SIGNALS, Note
-from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.logs.several.run_names import stem_of
+from fieldsid.logs.unknown_file import COPY_AGAIN
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"

@@ -14,10 +14,10 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, library, raw_log_of, topic_of
 from fieldsid.logs.run import Note
-from fieldsid.logs.strangers import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN
 
 LABEL = b"dbd_label:"
-BINARY = b"dinkum_binary_data"
+BINARY = b"(dinkum_binary_data)"
 END = b"X"
 HEAD = 2048
 MEANS: Means = {
@@ -29,6 +29,7 @@ MEANS: Means = {
     f"c_fin.{DATA}": ("rudder_rad", {"unit": "rad"}),
 }
 """The glider's own sensors: heading from north, pitch up, the fin its rudder; `c_` is commanded, `m_` measured."""
+_TAGS = re.compile(rb"num_ascii_tags:\s*(\d+)")
 _CACHE = re.compile(rb"sensor_list_crc:\s*(\w+)")
 _FACTORED = re.compile(rb"sensor_list_factored:\s*1")
 _FAILURES = (ValueError, KeyError, IndexError, TypeError, OSError, UnicodeDecodeError)
@@ -45,6 +46,7 @@ def sniff(path: Path) -> bool:
 
 def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
     dbdreader = library("dbdreader", path, "a Slocum glider's log", "slocum")
+    _refuse_cut_head(path)
     folder = _cache_of(path)
     try:
         # The list of sensors of a log that brings its own is written to the cache: not beside the log.
@@ -57,6 +59,18 @@ def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
         what = f"`{path}` is a Slocum glider's log that cannot be read"
         raise LogError(what, found=f"{type(error).__name__}: {error}"[:160], hint=COPY_AGAIN) from error
     return {n: topic for n, topic in found.items() if topic is not None}
+
+
+def _refuse_cut_head(path: Path) -> None:
+    """Raise LogError where the head ends before the lines that it counts: dbdreader would look for them for ever."""
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    tags = _TAGS.search(head)
+    lines = head.count(b"\n")
+    if tags is None or lines < int(tags[1]) or head.count(b"\n", 0, tags.start()) >= int(tags[1]):
+        counted = tags[1].decode() if tags else "no number"
+        found = f"{lines} lines in its first {len(head)} bytes, of which {counted} are to be its head"
+        raise LogError(f"`{path}` is a Slocum glider's log that cannot be read", found=found, hint=COPY_AGAIN)
 
 
 def _sensor(log: Any, name: str) -> Topic | None:

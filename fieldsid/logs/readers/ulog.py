@@ -11,7 +11,7 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
 from fieldsid.logs.run import Note
-from fieldsid.logs.strangers import COPY_AGAIN, ULOG, ULOG_HEADER
+from fieldsid.logs.unknown_file import COPY_AGAIN, ULOG, ULOG_HEADER
 
 MESSAGE_HEADER = 3
 """Bytes before a message's body: its length and its type."""

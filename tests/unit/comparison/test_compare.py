@@ -16,7 +16,7 @@ from fieldsid.maneuvers import Limits, parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.planning.rehearse import rehearse, with_noise
+from fieldsid.planning.flight.dry_run import dry_run, with_noise
 
 BASE = {"a22": 1.1, "b2": -1.2, "C0": 0.02}
 
@@ -26,7 +26,7 @@ def model(*effects, **values):
 
 
 def run_of(truth, spec="zigzag", helpers=None):
-    return with_noise(rehearse(truth, *parse_spec(spec), speed=1.4, limits=Limits(0.35), helpers=helpers), truth, 8)
+    return with_noise(dry_run(truth, *parse_spec(spec), speed=1.4, limits=Limits(0.35), helpers=helpers), truth, 8)
 
 
 def test_the_right_model_is_down_to_the_noise():

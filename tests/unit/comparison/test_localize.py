@@ -9,8 +9,8 @@ import pytest
 
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import places, stretches
+from fieldsid.dynamics.free_run import command_record
 from fieldsid.models.axis import Axis
-from fieldsid.models.simulate import command_record
 
 TIME = np.arange(0.0, 40.0, 0.05)
 FIN = np.select([(TIME >= 10) & (TIME < 13), (TIME >= 13) & (TIME < 16)], [0.2, -0.2], 0.0)

@@ -9,7 +9,7 @@ import pytest
 
 from fieldsid.effects import pick_effect
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import FinPath
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 
 FINE = 4000

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measured, with_moments
+from fieldsid.dynamics.free_run import command_record
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.effects._paths import Beyond
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import FinPath, Motion, as_fitted, in_form
+from fieldsid.models.effect import Motion, as_fitted, with_variant
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import first_part
-from fieldsid.models.signal_path import Base, assemble, measured, run_core, with_moments
-from fieldsid.models.simulate import command_record
 
 NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
@@ -40,20 +41,20 @@ def shown(effect, values, log):
     """What the sensors show of a hull with the effect at 1.7 times its reference speed, (2, n)."""
     start = np.array([0.1, -0.05, 0.01])
     arrays = assemble(log, [effect], Base(1.2, 0.3, -1.5, 0.01), values, 1.7)
-    out = run_core(log, with_moments(log, arrays, [effect], values, start), start)
+    out = integrate_record(log, with_moments(log, arrays, [effect], values, start), start)
     motion = measured(Motion(out[:, 0], out[:, 1]), log, [effect], values)
     return np.stack([motion.angle, motion.rate])
 
 
-FORMS = [(n, i) for n, e in sorted(all_effects().items()) for i in range(len(e.forms))]
+FORMS = [(n, i) for n, e in sorted(all_effects().items()) for i in range(len(e.variants))]
 
 
 @pytest.mark.parametrize(("name", "which"), FORMS)
 def test_a_form_is_fitted_under_the_effects_own_name(name, which):
     effect = pick_effect(name)
-    shaped = in_form(effect, effect.forms[which])
-    assert (shaped.name, shaped.forms) == (name, ())
-    values = effect.starts() | {c.name: c.start for c in effect.forms[which].coefficients}
+    shaped = with_variant(effect, effect.variants[which])
+    assert (shaped.name, shaped.variants) == (name, ())
+    values = effect.starts() | {c.name: c.start for c in effect.variants[which].coefficients}
     assert as_fitted(effect, values).coefficients == shaped.coefficients
     assert as_fitted(effect, effect.starts()) is effect
 
@@ -61,8 +62,8 @@ def test_a_form_is_fitted_under_the_effects_own_name(name, which):
 @pytest.mark.parametrize(("name", "which"), [f for f in FORMS if f[0] != "servo_lag"])
 def test_a_form_is_the_textbooks_at_its_neutral_numbers_and_not_elsewhere(name, which):
     effect, log = pick_effect(name), record()
-    form = effect.forms[which]
-    shaped = in_form(effect, form)
+    form = effect.variants[which]
+    shaped = with_variant(effect, form)
     values = effect.starts() | {c.name: NEUTRAL[c.name] for c in form.coefficients}
     np.testing.assert_allclose(shown(shaped, values, log), shown(effect, effect.starts(), log), atol=1e-6)
     other = effect.starts() | {c.name: GENTLE.get(c.name, c.low + 0.45 * (c.high - c.low)) for c in form.coefficients}
@@ -119,10 +120,10 @@ def test_the_frequency_of_a_swept_wave_is_the_one_declared_and_the_period_its_me
 
 def test_a_second_component_is_suggested_at_the_period_that_the_first_has_left():
     log, wave = record(), pick_effect("wave")
-    second = next(f for f in wave.forms if f.suggest is not None)
+    second = next(f for f in wave.variants if f.initial_guesses is not None)
     left = np.stack([np.zeros(len(log)), 0.02 * np.cos(2.0 * np.pi * log.time / 3.1)])
     seen = replace(log, angle_ok=np.ones(len(log), bool), rate_ok=np.ones(len(log), bool))
-    assert min(abs(p["second_period"] - 3.1) for p in second.suggest([seen], [left])) < 0.2
+    assert min(abs(p["second_period"] - 3.1) for p in second.initial_guesses([seen], [left])) < 0.2
 
 
 @pytest.mark.parametrize(("jump", "release"), [(1.0, 0.5), (0.6, 0.7), (0.0, 1.0)])
@@ -151,7 +152,7 @@ def test_a_gyros_other_forms_are_their_equations_and_carry_small_moves_as_they_m
     sided = pick_effect("gyro_scale")
     values = {"scale_error": 0.1, "scale_side": -0.3}
     np.testing.assert_allclose(sided.measure(motion, values, log).rate, np.where(rate > 0, 0.8, 1.4) * rate)
-    np.testing.assert_allclose(sided.carry(moves, motion, values, log)[0, 1], np.where(rate > 0, 0.8, 1.4))
+    np.testing.assert_allclose(sided.sensor_jvp(moves, motion, values, log)[0, 1], np.where(rate > 0, 0.8, 1.4))
     drifting = pick_effect("gyro_bias").measure(motion, {"bias": 0.01, "bias_drift": 0.06}, log)
     np.testing.assert_allclose(drifting.rate - rate, 0.01 + 0.001 * (log.time - log.time[0]))
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.effects._paths import PASSED_RAD, join, split
-from fieldsid.models.effect import FinPath
+from fieldsid.models.fin_path import FinPath
 
 SHARES = st.floats(0.0, 1.0)
 STEP_S = 0.05

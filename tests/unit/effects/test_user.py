@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from fieldsid.effects import add_effects, all_effects, forget_effects, pick_effect
 from fieldsid.effects._expression import parse
-from fieldsid.effects._own import add_user_effects
-from fieldsid.effects._user import SIGNAL_OF, effect_of, load_user_effect
+from fieldsid.effects._user_file import SIGNAL_OF, effect_of, load_user_effect
+from fieldsid.effects._user_folder import add_user_effects
 from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Motion, Stage

@@ -9,11 +9,11 @@ from truth.paper import PITCH, YAW, paper_run
 from fieldsid.errors import DataError
 from fieldsid.estimators.svf_ls import bandwidth_notes, base_slots, regress
 from fieldsid.estimators.svf_rls import settle_time
-from fieldsid.fitting.equation import filtered_equation, measured_signals
 from fieldsid.fitting.fit import fit
-from fieldsid.fitting.layout import layout_of
-from fieldsid.fitting.method import Options
-from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.problem.estimator import Options
+from fieldsid.fitting.problem.parameters import layout_of
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.fitting.regression.svf_equation import filtered_equation, measured_signals
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import Record, record_of

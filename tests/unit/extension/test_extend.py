@@ -9,7 +9,7 @@ from cli.trial import vehicle
 
 from fieldsid.errors import DataError, UsageError
 from fieldsid.extension import extend
-from fieldsid.fitting.predict import predict
+from fieldsid.fitting.predict.predict import predict
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 

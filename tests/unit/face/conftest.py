@@ -13,16 +13,16 @@ from fieldsid.comparison.compare import compare
 from fieldsid.diagnosis import Candidate, Diagnosis, Errors, Pair
 from fieldsid.extension import Extension, Gain
 from fieldsid.fitting.fit import Fit
-from fieldsid.fitting.method import History
-from fieldsid.fitting.predict import Prediction
+from fieldsid.fitting.predict.predict import Prediction
+from fieldsid.fitting.problem.estimator import History
 from fieldsid.logs import Note, Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.schedule import design_schedule, verify_schedule
 from fieldsid.turning import measure_turn, turn_radius
-from fieldsid.turning.source import source_of_models
 
 UNITS = {"a22": "1/s", "b2": "1/s^2", "C0": "rad/s^2", "lag": "s"}
 NOISE = Noise(0.005, 0.004)

@@ -13,7 +13,7 @@ import pytest
 from mypy import api
 
 import fieldsid
-from fieldsid.cli.catalogue import entries
+from fieldsid.cli.help.catalogue import entries
 
 ROOT = Path(__file__).resolve().parents[3]
 HEAVY = ("numpy", "pandas", "scipy", "numba", "matplotlib", "typer", "rich", "pyarrow", "pydantic", "rosbags")

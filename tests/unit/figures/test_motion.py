@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fieldsid.dynamics.free_run import command_record
 from fieldsid.errors import ArtifactError
 from fieldsid.figures import canvas, motion
 from fieldsid.models.axis import Axis
-from fieldsid.models.simulate import command_record
 
 
 @pytest.fixture

@@ -8,20 +8,20 @@ from truth.paper import YAW
 
 from fieldsid.figures import canvas, law, schedule, turn
 from fieldsid.models.axis import Axis
+from fieldsid.plant.laws.axis_laws import fit_laws
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.plant.points import Point
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import verify_schedule
-from fieldsid.turning.circle import fit_circle
-from fieldsid.turning.laws import fit_laws
-from fieldsid.turning.measured import MeasuredTurn
-from fieldsid.turning.points import Point
+from fieldsid.turning.measured.circle import fit_circle
+from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.radius import turn_radius
-from fieldsid.turning.source import Source
 
 
 @pytest.fixture(scope="module")
 def source():
     points = tuple(Point(f"row {i}", r.speed, {"a22": r.a22, "b2": r.b2, "C0": r.C0}, {}) for i, r in enumerate(YAW))
-    return Source(Axis.YAW, points, (), (), fit_laws(Axis.YAW, points), ())
+    return ParameterSource(Axis.YAW, points, (), (), fit_laws(Axis.YAW, points), ())
 
 
 def axes_of(figure):

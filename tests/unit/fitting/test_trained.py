@@ -9,8 +9,8 @@ import pytest
 from truth.paper import YAW, paper_run
 
 from fieldsid.fitting.fit import trained
-from fieldsid.fitting.layout import layout_of
-from fieldsid.fitting.problem import Problem
+from fieldsid.fitting.problem.parameters import layout_of
+from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of

@@ -11,6 +11,7 @@ from binary_logs import write_alog, write_dataflash, write_dbd, write_mat, write
 from fieldsid.errors import LogError
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log
+from fieldsid.logs.readers.slocum import sniff
 
 TIME = 0.1 * np.arange(300)
 YAW = 0.4 * np.sin(0.3 * TIME)
@@ -90,7 +91,7 @@ def test_a_glider_log_without_its_list_of_sensors_names_the_file(tmp_path):
 
 
 def _by(topic):
-    from fieldsid.logs.mapping import mapping_of
+    from fieldsid.logs.mapping.mapping_file import mapping_of
 
     return mapping_of({"signals": {"yaw_rad": {"topic": topic, "field": "data"}}})
 
@@ -122,3 +123,19 @@ def test_garbage_behind_a_signature_is_an_error_with_its_name(tmp_path, suffix):
     with pytest.raises(LogError) as error:
         load_run(log, _by("m_heading"))
     assert str(log) in error.value.what
+
+
+def test_a_gliders_log_as_text_is_left_to_the_reader_of_text(tmp_path):
+    log = tmp_path / "a.dba"
+    log.write_text("dbd_label: DBD_ASC(dinkum_binary_data_ascii)file\nencoding_ver: 2\nnum_ascii_tags: 14\n")
+    assert not sniff(log)
+
+
+@pytest.mark.parametrize("tags", ["", "num_ascii_tags: 14\n", "a: 1\nb: 2\nc: 3\nnum_ascii_tags: 2\n"])
+def test_a_gliders_log_whose_head_is_cut_is_refused_before_it_is_read(tmp_path, tags):
+    log = tmp_path / "a.dbd"
+    log.write_text(f"dbd_label: DBD(dinkum_binary_data)file\nencoding_ver: 5\n{tags}")
+    with pytest.raises(LogError) as refused:
+        inspect_log(log)
+    assert "cannot be read" in refused.value.what
+    assert "lines in its first" in refused.value.found

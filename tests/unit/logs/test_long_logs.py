@@ -11,11 +11,12 @@ from rich.console import Console
 from fieldsid.cli import console
 from fieldsid.logs import load_run
 from fieldsid.logs.channels import TableForm
-from fieldsid.logs.mapping import mapping_of
+from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import ReadOptions, reader_of
 from fieldsid.logs.readers import csv_table
 from fieldsid.logs.readers._growing import GrowingColumn
-from fieldsid.logs.readers.bags import mcap, packets
+from fieldsid.logs.readers.bags import packets
+from fieldsid.logs.readers.bags.containers import mcap
 from fieldsid.logs.readers.bags.stores import collected
 
 ROWS = 200

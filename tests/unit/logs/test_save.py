@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.logs import Note, Run, load_run, save_run
-from fieldsid.logs.conditioning import LARGEST
+from fieldsid.logs.convert.conditioning import MAX_PLAUSIBLE_VALUE
 from fieldsid.logs.run import SIGNALS
 
-finite = st.floats(-LARGEST, LARGEST, width=64)
+finite = st.floats(-MAX_PLAUSIBLE_VALUE, MAX_PLAUSIBLE_VALUE, width=64)
 
 
 def example(tmp_path):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fieldsid.logs.doctor import examine
+from fieldsid.logs.doctor.examine import examine
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import left_out, record_of

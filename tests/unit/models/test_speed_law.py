@@ -29,15 +29,15 @@ def test_beyond_the_groups_the_power_law_goes_on_from_the_nearest():
     assert GROUPS.authority(0.5, -1.5) == pytest.approx(-0.6 / 4.0)
 
 
-@pytest.mark.parametrize("speed", [0.99, 1.01, 1.48, 1.52, 1.98, 2.02])
+@pytest.mark.parametrize("speed", [0.97, 1.03, 1.46, 1.54, 1.95, 2.05])
 def test_a_speed_that_a_groups_runs_may_have_is_that_groups(speed):
     nearest, authority = min(GROUPS.points, key=lambda p: abs(p[0] - speed))
     assert GROUPS.authority(speed, -1.5) == pytest.approx(authority * (speed / nearest) ** 2)
 
 
 def test_neighbours_a_groups_width_apart_share_what_is_between_them():
-    near = SpeedLaw(1.0, 1.0, 2.0, ((1.0, -1.0), (1.02, -1.2)))
-    over_law = [near.authority(u, -1.0) / u**2 for u in np.geomspace(1.0, 1.02, 61)]
+    near = SpeedLaw(1.0, 1.0, 2.0, ((1.0, -1.0), (1.06, -1.2)))
+    over_law = [near.authority(u, -1.0) / u**2 for u in np.geomspace(1.0, 1.06, 61)]
     assert np.all(np.diff(over_law) <= 1e-12)
     assert over_law[30] == pytest.approx(0.5 * (over_law[0] + over_law[-1]))
 

@@ -14,25 +14,25 @@ from fieldsid.errors import ArtifactError, ModelError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.plant.laws.axis_laws import save_laws
+from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
+from fieldsid.schedule.closed_loop_kernel import close_loop, compile_loops
 from fieldsid.schedule.controller import KINDS, Gains, least_damping
 from fieldsid.schedule.design import Wish, design_gains
-from fieldsid.schedule.kernels import close_loop, compile_loops
+from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.margins import control_margins, margins
-from fieldsid.schedule.plant import FinLimits, LinearPlant, not_counted, plants_at
 from fieldsid.schedule.record import load_schedule, save_schedule
 from fieldsid.schedule.response import depth_response, overshoot, settling, steady_error, step_response
 from fieldsid.schedule.verdict import lost
 from fieldsid.schedule.verify import checked_speeds, constant_row, verify_schedule
-from fieldsid.turning.laws import save_laws
-from fieldsid.turning.source import Source, load_source
 
 
 def source_of(folder, rows, names):
     path = folder / "table.csv"
     text = [",".join(("speed_m_s", *names))] + [",".join(str(getattr(r, n)) for n in ("speed", *names)) for r in rows]
     path.write_text("\n".join(text) + "\n")
-    return load_source([path])
+    return load_parameter_source([path])
 
 
 @pytest.fixture
@@ -78,23 +78,23 @@ def model_at(folder, speed, effects=("servo_lag",), **values):
 def lagging(tmp_path):
     """Files of two models with a slow servo, and the fit file made from them."""
     paths = [model_at(tmp_path, speed) for speed in (1.0, 1.8)]
-    return paths, save_laws(load_source(paths).laws, tmp_path / "law.yaml", models=paths)
+    return paths, save_laws(load_parameter_source(paths).laws, tmp_path / "law.yaml", models=paths)
 
 
 def test_a_fit_file_gives_the_gains_that_its_models_give(lagging):
     paths, law = lagging
-    of_models, of_law = (design_schedule(load_source(given), 0.26) for given in (paths, [law]))
+    of_models, of_law = (design_schedule(load_parameter_source(given), 0.26) for given in (paths, [law]))
     assert of_law.actuator["lag_s"] == 0.35
     assert of_law.rows == of_models.rows
     assert all(r.slowed < 1.0 for r in of_law.rows)
-    checked = verify_schedule(of_law, load_source([law]))
+    checked = verify_schedule(of_law, load_parameter_source([law]))
     assert checked.spread
-    assert checked.worst == verify_schedule(of_models, load_source(paths)).worst
+    assert checked.worst == verify_schedule(of_models, load_parameter_source(paths)).worst
 
 
 def test_beyond_the_points_a_fit_files_laws_go_on_and_ones_own_hold_and_the_effects_stay(lagging):
     paths, law = lagging
-    source, own = load_source([law]), load_source(paths, laws=["b2=-5"])
+    source, own = load_parameter_source([law]), load_parameter_source(paths, laws=["b2=-5"])
     (plant, share), *_ = plants_at(source, 3.0, FinLimits(), 30, 1)
     (edge, _), *_ = plants_at(source, 1.8, FinLimits(), 30, 1)
     assert share == 1.0
@@ -105,28 +105,28 @@ def test_beyond_the_points_a_fit_files_laws_go_on_and_ones_own_hold_and_the_effe
     assert np.std(plant.damping) > 0.0
     assert plants_at(own, 1.0, FinLimits(), 30, 1)[0][0].authority[0] == pytest.approx(-5.0)
     with pytest.raises(UsageError, match="crosses zero before 3 m/s"):
-        plants_at(load_source([law], laws=["b2=-2,1"]), 3.0, FinLimits(), 30, 1)
+        plants_at(load_parameter_source([law], laws=["b2=-2,1"]), 3.0, FinLimits(), 30, 1)
 
 
 def test_gains_without_the_servo_are_verified_on_models_with_it(tmp_path):
-    quick = design_schedule(load_source([model_at(tmp_path, u, effects=()) for u in (1.0, 1.8)]), 0.26)
+    quick = design_schedule(load_parameter_source([model_at(tmp_path, u, effects=()) for u in (1.0, 1.8)]), 0.26)
     quick = load_schedule(save_schedule(quick, tmp_path / "gains.yaml"))
     slow = [model_at(tmp_path, speed, lag=1.5) for speed in (1.0, 1.8)]
     assert quick.actuator["lag_s"] == 0.0
-    assert verify_schedule(quick, load_source(slow)).worst["phase_margin_deg"] < 45.0
-    stated = design_schedule(load_source(slow), 0.26, limits=FinLimits(lag=0.0))
-    assert verify_schedule(stated, load_source(slow)).worst["phase_margin_deg"] > 45.0
+    assert verify_schedule(quick, load_parameter_source(slow)).worst["phase_margin_deg"] < 45.0
+    stated = design_schedule(load_parameter_source(slow), 0.26, limits=FinLimits(lag=0.0))
+    assert verify_schedule(stated, load_parameter_source(slow)).worst["phase_margin_deg"] > 45.0
 
 
 def test_effects_that_a_linear_plant_does_not_hold_are_named(tmp_path):
     path = model_at(tmp_path, 1.4, effects=("servo_lag", "backlash", "quadratic_damping"), gap=0.02, quadratic=1.0)
-    source = load_source([path])
+    source = load_parameter_source([path])
     assert not_counted(source.models) == ("backlash",)
     assert design_schedule(source, 0.26).provenance["effects_not_counted"] == ["backlash"]
     assert lost(source) == ("not counted in full: backlash",)
-    inert = load_source([model_at(tmp_path, 1.4, inertia_share=0.5)])
+    inert = load_parameter_source([model_at(tmp_path, 1.4, inertia_share=0.5)])
     assert not_counted(inert.models) == ("servo_lag",)
-    assert not_counted(load_source([model_at(tmp_path, 1.4)]).models) == ()
+    assert not_counted(load_parameter_source([model_at(tmp_path, 1.4)]).models) == ()
 
 
 @pytest.mark.parametrize("zeta", [0.6, 0.7071, 0.9])
@@ -315,7 +315,7 @@ def test_the_trim_offset_holds_the_propellers_moment_at_each_speeds_thrust():
     trained = {"thrust_at_1_m_s": 2.0, "thrust_exponent": 2.0}
     law = SpeedLaw(1.5)
     model = Model(Axis.YAW, ("prop_moment",), values, {}, tuple(values), np.zeros((4, 4)), law, Noise(0.01, 0.01), trained)
-    source = Source(Axis.YAW, (), (model,), ("made",), None, ())
+    source = ParameterSource(Axis.YAW, (), (model,), ("made",), None, ())
     for speed in (1.0, 2.0):
         offset = float(plants_at(source, speed, FinLimits(), 1, 0)[0][0].offset[0])
         authority = model.at_speed(speed)["b2"]

@@ -42,7 +42,7 @@ def test_an_oracle_gets_every_case_right(runner, monkeypatch, capsys):
 
     def oracle(_training, _axis, validation):
         case = truths[validation[0]["surge_m_s"][0]]
-        return said(case.expected, list(case.effects), case.floor)
+        return said(min(case.expected), list(case.effects), case.floor)
 
     answering(monkeypatch, oracle)
     assert runner.main(["--cases", "6", "--seed", "6"]) == 0

@@ -11,10 +11,10 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.turning.doubt import Reach, doubt_of, reach_of
-from fieldsid.turning.laws import save_laws
+from fieldsid.plant.laws.axis_laws import save_laws
+from fieldsid.plant.parameter_source import load_parameter_source
+from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error
 from fieldsid.turning.radius import turn_radius
-from fieldsid.turning.source import load_source
 
 FULL = {"fin_max": 0.3, "rate_max": 0.5, "held_s": 30.0, "speed_low": 1.0, "speed_high": 2.0}
 PULSES = {"fin_max": 0.3, "rate_max": 0.2, "held_s": 2.0, "speed_low": 1.5, "speed_high": 1.5}
@@ -25,7 +25,7 @@ def table(folder, rows=YAW, offset=True):
     lines += [f"{r.speed},{r.a22},{r.b2}" + (f",{r.C0}" if offset else "") for r in rows]
     path = folder / "table.csv"
     path.write_text("\n".join(lines) + "\n")
-    return load_source([path])
+    return load_parameter_source([path])
 
 
 def source_of(folder, trained, effects=("quadratic_damping",), **values):
@@ -34,7 +34,7 @@ def source_of(folder, trained, effects=("quadratic_damping",), **values):
         own.pop("quadratic")
     covariance = np.diag([(0.02 * abs(v)) ** 2 for v in own.values()])
     model = Model(Axis.YAW, effects, own, {}, tuple(own), covariance, SpeedLaw(1.5), Noise(0.005, 0.005), trained)
-    return load_source([save_model(model, folder / "model.yaml", force=True)])
+    return load_parameter_source([save_model(model, folder / "model.yaml", force=True)])
 
 
 def test_a_table_goes_by_the_formula_and_is_extrapolated(tmp_path):
@@ -49,7 +49,7 @@ def test_a_table_goes_by_the_formula_and_is_extrapolated(tmp_path):
 def test_an_offset_of_a_degree_or_more_sets_the_sides_apart(tmp_path):
     path = tmp_path / "case.csv"
     path.write_text("speed_m_s,a22,b2,delta_r0_rad\n1.37,2.15,-1.62,-0.064\n")
-    port, starboard = turn_radius(load_source([path]), [1.37], 0.26).rows
+    port, starboard = turn_radius(load_parameter_source([path]), [1.37], 0.26).rows
     assert port.radius == pytest.approx(9.74, abs=0.06)
     assert starboard.radius < 0.7 * port.radius
 
@@ -70,13 +70,16 @@ def test_a_fit_file_turns_as_its_models_do(tmp_path):
         law = SpeedLaw(speed)
         model = Model(Axis.YAW, ("quadratic_damping",), own, {}, tuple(own), covariance, law, Noise(0.005, 0.005), FULL)
         paths.append(save_model(model, tmp_path / f"{speed}.yaml"))
-    fit = save_laws(load_source(paths).laws, tmp_path / "law.yaml", models=paths)
-    of_models, of_law = (turn_radius(load_source(given), [1.0, 1.5], 0.3, draws=100).rows for given in (paths, [fit]))
+    fit = save_laws(load_parameter_source(paths).laws, tmp_path / "law.yaml", models=paths)
+    of_models, of_law = (turn_radius(load_parameter_source(given), [1.0, 1.5], 0.3, draws=100).rows for given in (paths, [fit]))
     assert [r.method for r in of_law] == ["simulated"] * 4
     assert of_law == of_models
     with pytest.raises(UsageError, match="goes with the formula"):
-        turn_radius(load_source([fit], laws=["b2=-2"]), [1.5], 0.3)
-    assert turn_radius(load_source([fit], laws=["b2=-2"]), [1.5], 0.3, method="u_turn", draws=50).rows[0].method == "u_turn"
+        turn_radius(load_parameter_source([fit], laws=["b2=-2"]), [1.5], 0.3)
+    assert (
+        turn_radius(load_parameter_source([fit], laws=["b2=-2"]), [1.5], 0.3, method="u_turn", draws=50).rows[0].method
+        == "u_turn"
+    )
 
 
 def test_data_that_reached_the_turn_are_trusted_and_pulses_are_not(tmp_path):
@@ -168,7 +171,7 @@ def test_a_rudder_below_the_offset_is_refused(tmp_path):
     path = tmp_path / "case.csv"
     path.write_text("speed_m_s,a22,b2,C0\n1.37,2.15,-1.62,0.5\n")
     with pytest.raises(UsageError, match="below the offset"):
-        turn_radius(load_source([path]), [1.37], 0.26)
+        turn_radius(load_parameter_source([path]), [1.37], 0.26)
 
 
 def test_a_sway_mode_slower_than_any_held_turn_is_named_and_does_not_make_the_turn_endless(tmp_path):
@@ -182,7 +185,7 @@ def test_a_sway_mode_slower_than_any_held_turn_is_named_and_does_not_make_the_tu
 
 
 def test_the_minimum_of_the_upper_branch_is_found(tmp_path):
-    source = load_source(table(tmp_path).paths, laws=["a22=1", "b2=-0.2319,-0.3263", "C0=0"])
+    source = load_parameter_source(table(tmp_path).paths, laws=["a22=1", "b2=-0.2319,-0.3263", "C0=0"])
     prediction = turn_radius(source, [round(0.25 + 0.05 * i, 2) for i in range(96)], 0.26, draws=50)
     best = prediction.best("port")
     assert best.speed == pytest.approx(3.7, abs=0.051)
@@ -191,19 +194,19 @@ def test_the_minimum_of_the_upper_branch_is_found(tmp_path):
 
 
 def test_doubt_shrinks_as_the_data_reach_further():
-    near = reach_of(FULL, fin=0.3, rate=0.5, quarter_s=5.0, speed_flown=True)
-    far = reach_of(PULSES, fin=0.5, rate=0.5, quarter_s=5.0, speed_flown=True)
+    near = data_coverage(FULL, fin=0.3, rate=0.5, quarter_s=5.0, speed_flown=True)
+    far = data_coverage(PULSES, fin=0.5, rate=0.5, quarter_s=5.0, speed_flown=True)
     assert near.missing == ()
     assert len(far.missing) == 3
     for effects, formula in (((), True), ((), False), (("sway_coupling",), False)):
-        a, b = doubt_of(effects, near, formula=formula), doubt_of(effects, far, formula=formula)
+        a, b = model_error(effects, near, formula=formula), model_error(effects, far, formula=formula)
         assert a.sd < b.sd
         assert a.mean < b.mean
 
 
 def test_doubt_of_a_short_pulse_covers_the_errors_met_in_turning_trials():
     """Formula against turning trials of other vehicles: -43 .. +13 %."""
-    doubt = doubt_of((), Reach(float("nan"), float("nan"), float("nan"), speed_flown=True), formula=True)
+    doubt = model_error((), DataCoverage(float("nan"), float("nan"), float("nan"), speed_flown=True), formula=True)
     low, high = doubt.mean - 1.96 * doubt.sd, doubt.mean + 1.96 * doubt.sd
     assert low <= np.log(1.0 / 1.13)
     assert high >= np.log(1.0 / 0.57)

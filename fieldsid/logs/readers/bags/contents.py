@@ -8,7 +8,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions
-from fieldsid.logs.readers.bags.definitions import DefinitionSearch, decoder_of
+from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets
 from fieldsid.logs.readers.bags.signals import check_not_empty, not_decodable
 from fieldsid.logs.run import Note

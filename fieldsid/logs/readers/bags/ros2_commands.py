@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from fieldsid.errors import ArtifactError
-from fieldsid.logs.run import FloatArray
+from fieldsid.numerics.arrays import FloatArray
 
 NANOSECONDS = 1_000_000_000
 

@@ -9,10 +9,10 @@ import numpy as np
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source, Stamp
 from fieldsid.logs.reader import RawLog, ReadOptions
-from fieldsid.logs.readers.bags.definitions import DefinitionSearch
+from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch
+from fieldsid.logs.readers.bags.messages.topic import TopicDecoding, TopicSeries
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection
 from fieldsid.logs.readers.bags.stores import collected
-from fieldsid.logs.readers.bags.topic import TopicDecoding, TopicSeries
 from fieldsid.logs.run import Note
 from fieldsid.registry import near
 

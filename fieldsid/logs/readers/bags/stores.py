@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fieldsid.errors import LogError
-from fieldsid.logs.readers.bags import db3, mcap, ros1
-from fieldsid.logs.readers.bags.metadata import check_against_metadata
+from fieldsid.logs.readers.bags.containers import db3, mcap, ros1
+from fieldsid.logs.readers.bags.containers.metadata import check_against_metadata
 from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, UnknownFormError, keep_all
 from fieldsid.logs.run import Note
 
@@ -63,7 +63,7 @@ def _collect(part: Path, collector: Collector) -> None:
     except UnknownFormError as error:
         if sum(len(p.stamps) for p in collector.packets.values()) > before:
             raise
-        from fieldsid.logs.readers.bags.by_rosbags import collect
+        from fieldsid.logs.readers.bags.messages.by_rosbags import collect
 
         collect(part, collector, error)
 
@@ -92,7 +92,7 @@ def _plain_part(part: Path, collector: Collector) -> Iterator[Path]:
     if part.suffix != ".zstd":
         yield part
         return
-    from fieldsid.logs.readers.bags.decompress import unpack_file
+    from fieldsid.logs.readers.bags.containers.decompress import unpack_file
 
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / part.stem
@@ -107,7 +107,7 @@ def _plain_part(part: Path, collector: Collector) -> Iterator[Path]:
 
 def _unpack_messages(packets: TopicPackets, collector: Collector) -> None:
     """Unpack messages that the recorder compressed one by one; no plain message starts like zstd data."""
-    from fieldsid.logs.readers.bags.decompress import unzstd
+    from fieldsid.logs.readers.bags.containers.decompress import unzstd
 
     plain = [unzstd(p) if p.startswith(ZSTD) else p for p in packets.payloads]
     if None in plain:

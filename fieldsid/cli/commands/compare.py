@@ -1,0 +1,217 @@
+"""sysid compare: a model against measurement, and where it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, ModelFile, OutputDir, RunFiles, ToS
+from fieldsid.cli.progress import get_ready, refuse_closed
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from fieldsid.comparison.compare import Channel, Comparison
+    from fieldsid.models.model import Model
+
+MOST_SHOWN = 6
+
+MinFit = Annotated[
+    float | None,
+    typer.Option(
+        "--min-fit", metavar="PERCENT", help="Gate: exit 1 when a run's angle or rate fit is below this.", show_default=False
+    ),
+]
+Top = Annotated[int, typer.Option("--top", min=1, help="Conditions to show for each run.")]
+
+
+def command(
+    model: ModelFile,
+    runs: RunFiles,
+    start: FromS = None,
+    end: ToS = None,
+    mapping: MappingFile = None,
+    min_fit: MinFit = None,
+    top: Top = MOST_SHOWN,
+    output: OutputDir = None,
+    figures: Figures = True,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Compare a model with runs by free simulation, and show where it fails.
+
+    The model is simulated from the run's fin alone; refitted are the initial state, the speed as far as the third of a percent
+    that it is taken to be measured to lets it and, where a log rounds the jumps of its command to its samples, when they were
+    made. The error of angle and rate is divided by phase, fin angle, rate, speed, heading, side, depth and time, that of the
+    one further above its noise first. With `-o` one figure per run is drawn.
+
+    Example: sysid compare models/run7_yaw.yaml runs/zigzag.parquet
+    """
+    from fieldsid.cli.inputs import read_runs, refuse_swapped
+    from fieldsid.cli.skipped_logs import Skips
+    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.models.model import load_model
+    from fieldsid.models.record import left_out
+
+    refuse_swapped("compare", model, runs)
+    refuse_closed(output)
+    known = load_model(model)
+    skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
+    effects = partial(check_effects, [(model, known)])
+    logs = read_runs(runs, mapping=mapping, start=start, end=end, check=effects, meanwhile=ready, refused=skips.skip)
+    from fieldsid.comparison.compare import compare
+
+    found = compare(known, logs, unfit=skips.skip)
+    drawn = _drawn(known, model, found, output if figures else None, force=force)
+    entries = [_entry(c, figure) for c, figure in zip(found, drawn, strict=True)]
+    notes = left_out(logs, known.axis)
+    body = {
+        "schema": "fieldsid/compare/1",
+        "model": str(model),
+        "axis": known.axis,
+        "runs": entries,
+        "skipped_runs": skips.records,
+        "warnings": [{"code": n.code, "message": n.message} for n in notes],
+    }
+    if not as_json:
+        warn(notes)
+    emit(body, as_json=as_json, render=lambda to: _render(to, entries, top))
+    _gate(entries, min_fit)
+    skips.end(len(entries))
+    return body
+
+
+def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
+    found = [(e["run"], name, e[f"{name}_fit_percent"]) for e in entries for name in e["over_floor"]]
+    failed = [(run, name, fit) for run, name, fit in found if least is not None and not fit >= least]
+    for run, name, fit in failed:
+        messages().print(f"gate failed: {run} has {name} fit {fit:.1f} %, below {least:g} %", soft_wrap=True)
+    if failed:
+        raise typer.Exit(1)
+
+
+def _drawn(model: Model, name: Path, found: Sequence[Comparison], folder: Path | None, *, force: bool) -> list[str | None]:
+    if folder is None:
+        return [None] * len(found)
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.compare import figure
+    from fieldsid.runtime.worker_pool import await_background
+
+    with await_background():
+        return [str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force)) for c in found]
+
+
+def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
+    return {
+        "run": c.run,
+        "speed_m_s": c.shown.record.speed,
+        "angle_rms_rad": c.merit.angle_rms,
+        "rate_rms_rad_s": c.merit.rate_rms,
+        "angle_fit_percent": c.merit.angle_fit,
+        "rate_fit_percent": c.merit.rate_fit,
+        "noise_floor": {"angle_rad": c.floor.angle, "rate_rad_s": c.floor.rate},
+        "command_times": _as_flown(c, "command_between_samples"),
+        "own_speed": _as_flown(c, "own_speed"),
+        "over_floor": {channel.name: channel.over_floor for channel in c.channels},
+        "judged_by": c.leading.name,
+        **_fault(c.leading),
+        "failing": [{"channel": channel.name} | _fault(channel) for channel in c.failing],
+        "moves_with": [{"signal": m.signal, "explained": m.explained} for m in c.moves_with if c.failing],
+        "figure": figure,
+    }
+
+
+def _fault(c: Channel) -> dict[str, Any]:
+    """Return how well a channel is followed and, where it fails, where; one that is down to its noise fails nowhere."""
+    return {
+        "theil": c.metrics.theil,
+        "r2": c.metrics.r2,
+        "whiteness_p": c.metrics.whiteness_p,
+        "where": [
+            {
+                "condition": p.condition,
+                "share_of_error": p.share_of_error,
+                "share_of_samples": p.share_of_samples,
+                "rms_ratio": p.rms_ratio,
+                "t_start_s": p.start_s,
+                "t_end_s": p.end_s,
+            }
+            for p in c.where
+            if c.fails
+        ],
+        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in c.worst if c.fails],
+    }
+
+
+def _as_flown(c: Comparison, code: str) -> dict[str, Any] | None:
+    """Return what a run was taken to have done otherwise than its log has it, and the errors with all of that as logged."""
+    note = next((n for n in c.shown.notes if n.code == code), None)
+    if note is None or c.shown.as_logged is None:
+        return None
+    angle, rate = c.shown.as_logged
+    return {**note.data, "says": note.message, "as_logged": {"angle_rms_rad": angle, "rate_rms_rad_s": rate}}
+
+
+def _render(to: Console, entries: Sequence[Mapping[str, Any]], top: int) -> None:
+    from fieldsid.rounding import number
+
+    rows = [
+        (
+            e["run"],
+            number(e["speed_m_s"], 3),
+            number(e["angle_rms_rad"], 2),
+            number(e["noise_floor"]["angle_rad"], 2),
+            number(e["angle_fit_percent"], 3),
+            number(e["rate_rms_rad_s"], 2),
+            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(e["rate_fit_percent"], 3),
+        )
+        for e in entries
+    ]
+    to.print(table("", ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %"), rows))
+    for e in entries:
+        for flown in filter(None, (e["command_times"], e["own_speed"])):
+            angle, rate = (number(flown["as_logged"][name], 2) for name in ("angle_rms_rad", "rate_rms_rad_s"))
+            to.print(f"{flown['says']}; angle rms {angle}, rate rms {rate} as logged", soft_wrap=True)
+    for e in entries:
+        _render_where(to, e, top)
+    for e in entries:
+        if e["figure"]:
+            to.print(f"figure: {e['figure']}", soft_wrap=True)
+
+
+def _render_where(to: Console, e: Mapping[str, Any], top: int) -> None:
+    """Say where each channel fails, the worse one first, and which are down to their noise."""
+    over, failing = e["over_floor"], e["failing"]
+    for fault in failing:
+        name = fault["channel"]
+        to.print()
+        to.print(_places(f"{e['run']}: where the {name} fails, {over[name]:.1f} x its noise", fault["where"][:top]))
+    quiet = [f"{name} {ratio:.2f} x" for name, ratio in over.items() if name not in {f["channel"] for f in failing}]
+    if quiet:
+        if not failing:
+            to.print()
+        to.print(f"{e['run']}: down to the noise: {', '.join(quiet)}", soft_wrap=True)
+    if e["moves_with"]:
+        said = ", ".join(f"{m['signal']} ({100 * m['explained']:.0f} %)" for m in e["moves_with"][:3])
+        to.print(f"the missing moment moves with {said}")
+
+
+def _places(title: str, where: Sequence[Mapping[str, Any]]) -> Table:
+    rows = [
+        (
+            w["condition"],
+            f"{100 * w['share_of_error']:.0f} %",
+            f"{100 * w['share_of_samples']:.0f} %",
+            f"{w['rms_ratio']:.2f}",
+            f"{w['t_start_s']:.1f} .. {w['t_end_s']:.1f}",
+        )
+        for w in where
+    ]
+    return table(title, ("", "of error", "of time", "rms ratio", "worst, s"), rows)

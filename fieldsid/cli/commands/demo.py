@@ -1,0 +1,163 @@
+"""sysid demo: all of it on a trial that it makes itself, with a hidden effect."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from textwrap import fill
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.app import run
+from fieldsid.cli.console import WIDTH, emit
+from fieldsid.cli.options import Force, JsonFlag, OutputDir
+from fieldsid.cli.progress import compiling
+from fieldsid.errors import ArtifactError
+from fieldsid.runtime.worker_pool import await_background
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.demo.steps import Step
+    from fieldsid.demo.trial import Trial
+    from fieldsid.planning.design.leg import Leg
+
+HIDDEN = "servo_lag"
+FOLDER = "sysid-demo"
+
+OPENING = (
+    "A small vehicle waits on deck. Its dynamics hold one effect more than the textbook's model; the commands below do not know "
+    "which. The first one asks what to fly."
+)
+
+EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The effect to hide: see `sysid effects list`.")]
+
+
+def command(
+    effect: EffectName = HIDDEN, output: OutputDir = None, force: Force = False, as_json: JsonFlag = False
+) -> Mapping[str, Any]:
+    """Take a tour: the command of each step as you would type it, with its result and what it means.
+
+    The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
+    textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
+    """
+    began = perf_counter()
+    with compiling(_compile_loops):
+        body = _tour(effect, output, began, force=force, quiet=as_json)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+
+
+def _tour(effect: str, output: Path | None, began: float, *, force: bool, quiet: bool) -> dict[str, Any]:
+    from fieldsid.demo.steps import PLAN, STEPS, places
+    from fieldsid.demo.trial import make_trial
+    from fieldsid.demo.vehicle import hidden_vehicle
+    from fieldsid.planning.output.plan_file import load_plan
+
+    folder = _folder(output, force=force)
+    vehicle = hidden_vehicle(effect)
+    known = dict(places(folder, vehicle.axis))
+    _told(OPENING, quiet=quiet)
+    with await_background():
+        done = [_taken(1, PLAN, known, force=force, quiet=quiet)]
+        (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
+        trial = make_trial(vehicle, folder / "trial", leg, force=force)
+        _told(_flown(trial, folder, leg), quiet=quiet)
+        for step in (s for s in STEPS if vehicle.axis in s.axes):
+            if step.possible(known):
+                done.append(_taken(len(done) + 1, step, known, force=force, quiet=quiet))
+                known |= step.learns(done[-1]["result"])
+    return {
+        "schema": "fieldsid/demo/1",
+        "folder": str(folder),
+        "hidden": {"effect": effect, "axis": vehicle.axis, "values": dict(vehicle.values)},
+        "named": known["effects"].split(",") if "effects" in known else [],
+        "steps": done,
+        "files": sorted(str(p) for p in folder.rglob("*") if p.is_file()),
+        "seconds": perf_counter() - began,
+    }
+
+
+def _compile_loops() -> None:
+    from fieldsid.schedule.closed_loop_kernel import compile_loops
+
+    compile_loops()
+
+
+def _folder(asked: Path | None, *, force: bool) -> Path:
+    """Return the folder to work in: the one asked for, or the first of sysid-demo, sysid-demo-2, ... that is free."""
+    if asked is None:
+        numbered = (Path(f"{FOLDER}-{i}") for i in range(2, 10_000))
+        return next(p for p in (Path(FOLDER), *numbered) if not p.exists())
+    if asked.is_dir() and any(asked.iterdir()) and not force:
+        raise ArtifactError(
+            f"`{asked}` is not empty",
+            found=f"{sum(1 for _ in asked.iterdir())} entries",
+            hint="add `--force`, or name another folder",
+        )
+    return asked
+
+
+def _taken(place: int, step: Step, known: Mapping[str, str], *, force: bool, quiet: bool) -> dict[str, Any]:
+    from fieldsid.demo.steps import expanded, words_of
+
+    words = words_of(step.line, known)
+    if not quiet:
+        sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
+    began = perf_counter()
+    with _silence() if quiet else _aloud():
+        result = run([*expanded(words), *(["--force"] if force else [])])
+    meaning = step.means(result)
+    if not quiet:
+        sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")
+        sys.stdout.flush()
+    return {"command": "sysid " + " ".join(words), "seconds": perf_counter() - began, "means": meaning, "result": result}
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):  # noqa: PTH123
+        yield
+
+
+@contextmanager
+def _aloud() -> Iterator[None]:
+    sys.stdout.flush()
+    yield
+    sys.stderr.flush()
+
+
+def _told(text: str, *, quiet: bool) -> None:
+    if not quiet:
+        sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n")
+        sys.stdout.flush()
+
+
+def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
+    from fieldsid.demo.trial import CHECK_SPEEDS, TRAIN_SPEEDS
+
+    others = " and ".join(f"{u:.1f}" for u in TRAIN_SPEEDS if u != leg.speed)
+    judging = " and ".join(f"{u:.1f}" for u in CHECK_SPEEDS)
+    return (
+        f"The vehicle flies it at {leg.speed:.1f} m/s and {trial.learning} at {others} m/s, to learn from, then "
+        f"{trial.judging} at {judging} m/s, to judge by. Its logs are in {folder}/trial."
+    )
+
+
+def _render(to: Console, body: Mapping[str, Any]) -> None:
+    from fieldsid.models.axis import NAMES, Axis
+
+    hidden = body["hidden"]
+    own = {n: v for n, v in hidden["values"].items() if n not in NAMES[Axis(hidden["axis"])].base}
+    numbers = ", ".join(f"{n} = {v:.3g}" for n, v in own.items())
+    figures = [f for f in body["files"] if f.endswith(".png")]
+    named = " and ".join(body["named"]) or "nothing"
+    to.print(f"\nHidden in the trial was {hidden['effect']} ({numbers}); diagnose named {named}.", soft_wrap=True)
+    to.print(f"{len(body['files'])} files are in {body['folder']}, {len(figures)} of them figures:", soft_wrap=True)
+    for file in figures:
+        to.print(f"  {file}", soft_wrap=True)
+    to.print(f"The tour took {body['seconds']:.1f} s. `sysid --help` lists every command.")

@@ -1,0 +1,228 @@
+"""sysid diagnose: which physical effect is missing, how sure, what else it could be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
+from fieldsid.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.diagnosis import Diagnosis
+    from fieldsid.models.axis import Axis
+    from fieldsid.models.model import Model
+
+MOST_PLACES, MOST_SPOKEN = 5, 3
+NAME_WIDTH = 30
+
+KnownModel = Annotated[
+    Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
+]
+Thorough = Annotated[
+    bool, typer.Option("--thorough", help="Go on for as long as there is something to try, half a minute where much is left.")
+]
+
+
+def command(
+    runs: RunFiles,
+    axis: AxisOption,
+    validate: ValidateRuns = None,
+    model: KnownModel = None,
+    mapping: MappingFile = None,
+    output: OutputFile = None,
+    figure: FigureFile = None,
+    thorough: Thorough = False,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Say which physical effect the model is missing, how sure that is, and what else it could be.
+
+    Every effect of the catalogue, and every one of your own in `effects/`, is added to a model fitted to all runs together, and
+    judged by its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis
+    is kept for `sysid plan --from FILE`.
+
+    Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
+    """
+    from fieldsid.cli.inputs import files_of, read_groups
+    from fieldsid.cli.skipped_logs import Skips
+    from fieldsid.cli.user_effects import check_effects
+
+    refuse_existing(output, force=force)
+    refuse_figure(figure, force=force)
+    known = _known(model, axis)
+    skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
+    held = partial(check_effects, [(model, known)] if model and known else [])
+    training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
+    from fieldsid.diagnosis import diagnose
+    from fieldsid.models.definition import NONE
+
+    effects = known.effects if known else ()
+    with compiling_first(), trying("diagnosing") as report:
+        own = known.own if known else NONE
+        found = diagnose(training, axis, unseen, known=effects, own=own, report=report, thorough=thorough, unfit=skips.skip)
+    training, unseen = skips.left_of(training), skips.left_of(unseen)
+    inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
+    body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
+    body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, force=force)}
+    if not as_json:
+        warn(found.notes)
+    emit(body, as_json=as_json, render=lambda to: _render(to, found, body))
+    skips.end(len(training) + len(unseen))
+    return body
+
+
+def _known(path: Path | None, axis: Axis) -> Model | None:
+    if path is None:
+        return None
+    from fieldsid.models.model import load_model
+
+    model = load_model(path)
+    if model.axis is not axis:
+        raise UsageError(
+            f"`{path}` is a {model.axis.value} model", found=f"--axis {axis.value}", hint=f"write `--axis {model.axis.value}`"
+        )
+    return model
+
+
+def _body(found: Diagnosis, runs: Sequence[str], unseen: Sequence[str], known: Model | None, path: Path | None) -> dict[str, Any]:
+    from fieldsid.diagnosis import body_of
+
+    return {
+        "schema": "fieldsid/diagnose/1",
+        **body_of(found),
+        "runs": list(runs),
+        "validation_runs": list(unseen),
+        "model": None if path is None else str(path),
+        "known": [] if known is None else list(known.effects),
+    }
+
+
+def _saved(body: Mapping[str, Any], path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
+    if path is None:
+        return None
+    from fieldsid.artifacts import save_record
+
+    kept = {k: v for k, v in body.items() if k != "schema"}
+    return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
+
+
+def _drawn(found: Diagnosis, path: Path | None, *, force: bool) -> str | None:
+    if path is None:
+        return None
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.diagnose import figure
+
+    return str(save(figure(found), path, force=force))
+
+
+def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    from fieldsid.rounding import number
+
+    to.print(Text(f"{found.verdict}: {found.says}", style="bold"))
+    to.print()
+    to.print(_candidates(found))
+    floor = found.noise_floor
+    noise = f"{number(floor.angle, 2)} rad and {number(floor.rate, 2)} rad/s"
+    to.print(
+        Text(f"fitted, unseen: free-run error of those runs over the noise floor, {noise}; evidence: log, over the first row")
+    )
+    _render_words(to, found)
+    _render_where(to, found)
+    _render_skipped(to, found.skipped)
+    _render_next(to, found, body)
+    for key in ("file", "figure"):
+        if body[key]:
+            to.print(f"{key}: {body[key]}", soft_wrap=True)
+
+
+def _candidates(found: Diagnosis) -> Any:
+    floor = found.noise_floor
+    judged = found.base.validation.over(floor)
+    rows = [("as it is", "", _times(found.base.train.over(floor)), _times(judged), "", "")]
+    rows += [
+        (
+            fill(c.effect.replace("+", " +"), NAME_WIDTH),
+            _probability(c.probability),
+            _times(c.errors.train.over(floor)),
+            _times(c.errors.validation.over(floor)),
+            "worse" if c.worse else f"{100 * c.explained:.0f} %",
+            f"{c.score:+.0f}",
+        )
+        for c in found.candidates
+    ]
+    return table("", ("effect", "prob.", "fitted", "unseen", "explained", "evidence"), rows)
+
+
+def _render_words(to: Console, found: Diagnosis) -> None:
+    """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
+    from rich.text import Text
+
+    from fieldsid.diagnosis.verdict import MIN_RIVAL_PROBABILITY_RATIO
+
+    if found.verdict in ("sufficient", "disturbed"):
+        return
+    for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
+        if i and c.probability < MIN_RIVAL_PROBABILITY_RATIO:
+            continue
+        alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
+        to.print()
+        to.print(Text(f"{c.effect}: {c.evidence}{alike}"))
+
+
+def _render_where(to: Console, found: Diagnosis) -> None:
+    rows = [
+        (p.condition, f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
+        for p in found.where[:MOST_PLACES]
+    ]
+    to.print()
+    to.print(table("where the model as it is fails", ("", "of error", "rms ratio", "worst, s"), rows))
+
+
+def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
+    from rich.text import Text
+
+    if not skipped:
+        return
+    why: dict[str, list[str]] = {}
+    for name, reason in skipped.items():
+        why.setdefault(reason, []).append(name)
+    to.print()
+    for reason, names in why.items():
+        to.print(Text(f"not tried: {', '.join(names)}: {reason}"))
+
+
+def _render_next(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    fly = found.next_maneuver
+    if fly:
+        to.print()
+        command = f": `{fly['command']}`" if "command" in fly else ""
+        note = f"; {fly['note']}" if "note" in fly else ""
+        to.print(Text(f"next: {fly['maneuver']}, {fly['why']}{note}{command}"))
+    if found.effects:
+        unseen = " --validate RUN" if body["validation_runs"] else ""
+        model = body["model"] or "MODEL"
+        adds = " ".join(f"--add {n}" for n in found.effects)
+        messages().print(Text(f"add it: `sysid extend {model} RUN... {adds}{unseen}`"), soft_wrap=True)
+
+
+def _probability(p: float) -> str:
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2f}" if isfinite(ratio) else "-"

@@ -1,0 +1,210 @@
+"""sysid effects: list the physical effects, show one, start one of your own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.progress import refuse_existing
+from fieldsid.cli.user_effects import OWN_EFFECTS, load_own_effects
+from fieldsid.errors import UsageError
+from fieldsid.models.axis import Axis
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.models.effect import Coefficient, Effect, Variant
+
+command = typer.Typer(help="List the physical effects, show one, start one of your own.")
+
+EffectName = Annotated[str, typer.Argument(metavar="NAME", help="Name of an effect, as in `sysid effects list`.")]
+OneAxis = Annotated[Axis | None, typer.Option("--axis", help="Only the effects of this plane.", show_default=False)]
+NewName = Annotated[
+    str, typer.Argument(metavar="NAME", help="Name that yours shall have: a small letter, then letters, digits, _.")
+]
+NewAxis = Annotated[Axis, typer.Option("--axis", help="The plane that it acts on.")]
+NewFile = Annotated[
+    Path | None,
+    typer.Option(
+        "-o", "--output", metavar="FILE", help="YAML file to write; effects/NAME.yaml if not given.", show_default=False
+    ),
+]
+
+
+@command.command("list", short_help="List every effect by stage.")
+def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor."""
+    from fieldsid.effects import all_effects
+
+    known = all_effects(axis).values()
+    body = {"schema": "fieldsid/effects/1", "axis": axis, "effects": [_described(e) for e in known]}
+    return emit(body, as_json=as_json, render=lambda to: _render_list(to, known))
+
+
+@command.command("show", short_help="Show all that is known of one effect.")
+def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source."""
+    from fieldsid.effects import pick_effect
+
+    effect = pick_effect(name)
+    body = {"schema": "fieldsid/effect/1", **_described(effect)}
+    return emit(body, as_json=as_json, render=lambda to: _render_one(to, effect))
+
+
+@command.command("new", short_help="Start an effect of your own.")
+def new(
+    name: NewName, axis: NewAxis = Axis.YAW, output: NewFile = None, force: Force = False, as_json: JsonFlag = False
+) -> Mapping[str, Any]:
+    """Write a file for an effect of your own, to be edited: a YAML file with a moment as an expression.
+
+    Every command that is run in the folder that `effects/` is in knows it, and a model that holds it takes it along.
+
+    Example: sysid effects new tether_drag --axis yaw
+    """
+    from fieldsid.artifacts import write_text
+
+    path = output or Path(OWN_EFFECTS) / f"{name}.yaml"
+    _refuse_name(name, path)
+    refuse_existing(path, force=force)
+    write_text(path, _started(name, axis, path), force=force)
+    load_own_effects()  # what was broken in a file that is replaced is so no more
+    body = {"schema": "fieldsid/new-effect/1", "name": name, "axis": axis, "file": str(path)}
+    return emit(body, as_json=as_json, render=lambda _to: say(f"wrote {path}: edit it, then {_look_at(path, name)}"))
+
+
+def _refuse_name(name: str, path: Path) -> None:
+    """Refuse a name that no effect can have, or that one has which is not in the file to be written; raises FieldsidError."""
+    from fieldsid.effects import all_effects
+    from fieldsid.effects._user_file import checked_name, name_like
+    from fieldsid.models.effect import REGISTRY
+    from fieldsid.registry import refusal
+
+    effects = all_effects()
+    checked_name(name, effects)
+    known = effects.get(name)
+    if known is not None and Path(known.origin).resolve() != path.resolve():
+        what = f"there is an effect named {name!r} already"
+        raise UsageError(what, found=known.origin, hint=f"call it `{name_like(name, effects)}`")
+    if (why := refusal(REGISTRY, name)) is not None and not path.exists():
+        raise why
+
+
+def _started(name: str, axis: Axis, path: Path) -> str:
+    """Return the text of a new effect; raises FieldsidError where the file would not be read as that effect."""
+    from fieldsid.effects import all_effects, refuse_clash
+    from fieldsid.effects._user_file import SUFFIXES, effect_of_text
+    from fieldsid.templates import template_path
+
+    if path.suffix not in SUFFIXES:
+        raise UsageError(
+            f"`{path}` is no YAML file", found=path.suffix or "no suffix", hint=f"write `-o {path.with_suffix('.yaml')}`"
+        )
+    text = template_path("effect.yaml").read_text(encoding="utf-8")
+    for old, own in _changes(name, axis):
+        text = text.replace(old, own)
+    others = [e for e in all_effects().values() if e.name != name]  # whose that name is, `_refuse_name` has asked
+    refuse_clash(effect_of_text(text, path, origin=str(path)), others)
+    return text
+
+
+def _look_at(path: Path, name: str) -> str:
+    """Return what to do when it is edited: outside the working folder's own it is not read from here."""
+    if path.parent.resolve() == Path(OWN_EFFECTS).resolve():
+        return f"`sysid effects show {name}`"
+    return f"put it in the `{OWN_EFFECTS}/` of the folder you work in"
+
+
+def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
+    """What of the template is the user's: its name, its axis, and a coefficient's name that no other effect has."""
+    return (
+        ("roll_rate_drag", name),
+        ("axes: [yaw]", f"axes: [{axis}]"),
+        ('moment: "-k * r * abs(phi)"', f'moment: "-{name}_k * rate * abs(roll)"'),
+        ("  k: {unit", f"  {name}_k: {{unit"),
+    )
+
+
+def _described(effect: Effect) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "says": effect.says,
+        "stage": effect.stage,
+        "axes": effect.axes,
+        "equation": effect.equation,
+        "coefficients": [_coefficient(c) for c in effect.coefficients],
+        "forms": [_form(effect, f) for f in effect.variants],
+        "needs": effect.needs,
+        "extra_states": effect.extra_states,
+        "telltale": effect.telltale,
+        "excited_by": effect.excited_by,
+        "mistaken_for": effect.mistaken_for,
+        "source": effect.source,
+        "origin": effect.origin,
+    }
+
+
+def _axes(effect: Effect, form: Variant) -> list[Axis]:
+    return [a for a in effect.axes if a in form.axes]
+
+
+def _form(effect: Effect, form: Variant) -> dict[str, Any]:
+    return {
+        "says": form.says,
+        "axes": _axes(effect, form),
+        "needs": [*effect.needs, *form.needs],
+        "coefficients": [_coefficient(c) for c in form.coefficients],
+    }
+
+
+def _coefficient(c: Coefficient) -> dict[str, Any]:
+    return {"name": c.name, "unit": c.unit, "low": c.low, "high": c.high, "start": c.start, "per_run": c.per_run, "says": c.says}
+
+
+def _render_list(to: Console, known: Iterable[Effect]) -> None:
+    from fieldsid.models.effect import Stage
+
+    for stage in Stage:
+        rows = [(e.name, "+".join(e.axes), e.says) for e in known if e.stage is stage]
+        if rows:
+            to.print(table(stage.capitalize(), ("effect", "axes", "in plain words"), rows, left=3))
+            to.print()
+    for effect in known:
+        if effect.definition is not None:
+            to.print(f"{effect.name} is not built in: {effect.origin}", soft_wrap=True)
+    to.print("`sysid effects show NAME` tells the equation, the telltale and what excites it.")
+
+
+def _form_in_words(effect: Effect, form: Variant) -> str:
+    """Return what a form says, with its axes and signals where they are not the effect's."""
+    axes = _axes(effect, form)
+    own = [*([] if len(axes) == len(effect.axes) else axes), *(f"needs {role}" for role in form.needs)]
+    return form.says + (f" ({', '.join(own)})" if own else "")
+
+
+def _render_one(to: Console, effect: Effect) -> None:
+    from fieldsid.rounding import in_unit
+
+    facts = [
+        ("stage", f"{effect.stage}, {' and '.join(effect.axes)}"),
+        ("equation", effect.equation),
+        ("telltale", effect.telltale),
+        *(("or in the form", _form_in_words(effect, f)) for f in effect.variants),
+        ("excited by", ", ".join(effect.excited_by)),
+        ("mistaken for", ", ".join(effect.mistaken_for) or "-"),
+        ("log must have", ", ".join(effect.needs) or "nothing more"),
+        ("source", effect.source),
+        ("origin", effect.origin),
+    ]
+    to.print(f"{effect.name}: {effect.says}\n")
+    to.print(table("", ("", ""), facts, left=2))
+    rows = [
+        (c.name, in_unit(c.unit), f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))
+        for c in effect.every
+    ]
+    to.print()
+    to.print(table("", ("coefficient", "unit", "range", "is"), rows, left=4))

@@ -1,0 +1,277 @@
+"""sysid extend: add an effect, refit, and keep it only if the error on unseen runs falls."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Mapping, Sequence
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
+from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
+from fieldsid.cli.skipped_logs import Skips
+from fieldsid.errors import ArtifactError, UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.extension import Extension
+    from fieldsid.models.effect import Coefficient
+    from fieldsid.models.model import Model
+
+SCHEMA = "fieldsid/extend/1"
+AT_THE_FLOOR = {"yaw": "turn-radius", "pitch": "schedule design"}
+"""What a model is for once it leaves no more than the noise."""
+MORE = "more is missing than the sensors' noise explains"
+NEAR = 1e-6
+"""Share of a coefficient's range from its bound within which it lies at it."""
+MUCH, SMALL = 100.0, 1e-3
+"""A standard error so many times the value, or the smallest value that counts, is no knowledge."""
+
+LearnedRuns = Annotated[
+    list[Path] | None, typer.Argument(metavar="RUN...", help="The runs that the model and the effects are fitted to.")
+]
+Added = Annotated[
+    list[str] | None,
+    typer.Option("--add", metavar="EFFECT", help="An effect to add: see `sysid effects list`; may repeat.", show_default=False),
+]
+Keep = Annotated[bool, typer.Option("--keep", help="Keep the addition even where the error on unseen runs does not fall.")]
+Undo = Annotated[bool, typer.Option("--undo", help="Go back: give the model that this one was extended from.")]
+
+
+def command(
+    model: ModelFile,
+    runs: LearnedRuns = None,
+    add: Added = None,
+    validate: ValidateRuns = None,
+    keep: Keep = False,
+    undo: Undo = False,
+    mapping: MappingFile = None,
+    output: OutputFile = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Add an effect to a model, refit everything, and watch the error fall.
+
+    Before and after are both refitted to the runs and judged by their free run on the `--validate` runs; without them a part of
+    the runs is held back. The extended model is written beside its parent, or to `-o FILE`, only where the error on unseen runs
+    falls, or with `--keep`. `--undo` gives the parent back; `sysid history MODEL` shows the whole line.
+
+    Example: sysid extend model.yaml runs/pulses_*.parquet --add servo_lag --validate runs/zigzag.parquet
+    """
+    if undo:
+        if runs or add or validate or keep:
+            raise UsageError(
+                "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
+            )
+        return _undone(model, output, force=force, as_json=as_json)
+    skips = Skips()
+    body, notes = _extended(
+        model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
+    )
+    if not as_json:
+        warn(notes)
+    emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    skips.end(len(runs or []) + len(validate or []) - len(skips.records))
+    return body
+
+
+def _names(given: Sequence[str] | None) -> list[str]:
+    """Return the effects of all `--add`, each of which may hold several as `a,b` or `a+b`."""
+    return [n for text in given or [] for n in re.split(r"[,+\s]+", text) if n]
+
+
+def _extended(
+    path: Path,
+    runs: Sequence[Path],
+    names: Sequence[str],
+    validate: Sequence[Path],
+    skips: Skips,
+    *,
+    keep: bool,
+    mapping: Path | None,
+    output: Path | None,
+    force: bool,
+) -> tuple[dict[str, Any], Sequence[Any]]:
+    from fieldsid.cli.inputs import read_groups, refuse_swapped
+    from fieldsid.models.model import load_model
+
+    refuse_swapped("extend", path, runs)
+    if not runs:
+        raise UsageError(
+            "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
+        )
+    target = output or path.with_name(f"{path.stem}+{'+'.join(dict.fromkeys(names))}.yaml")
+    known = load_model(path)
+    refuse_existing(target, force=force)
+    check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
+    training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
+    from fieldsid.extension import extend, save_extension
+
+    with compiling_first(), trying("extending") as report:
+        found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
+    training, unseen = skips.left_of(training), skips.left_of(unseen)
+    kept = found.pays or keep
+    if kept:
+        save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
+    body = _body(found, known, path, target if kept else None) | {"skipped_runs": skips.records}
+    return body | _left(found, body, runs, validate, mapping), found.notes
+
+
+def _check(path: Path, model: Model, names: Sequence[str]) -> None:
+    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.extension.extend import new_effects
+
+    check_effects([(path, model)])
+    new_effects(model, names)
+
+
+def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
+    """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
+    from fieldsid.diagnosis.verdict import SUFFICIENT_ERROR_RATIO
+
+    fitted, unseen = found.gain.left(kept=body["kept"])
+    more = any(error > SUFFICIENT_ERROR_RATIO for error in (fitted, unseen))
+    if more:
+        options = [
+            f"--axis {body['axis']}",
+            f"--model {quote(body['model'])}",
+            *(f"--validate {quote(str(p))}" for p in validate),
+        ]
+        options += [f"--mapping {quote(str(mapping))}"] if mapping is not None else []
+        command = " ".join(["sysid diagnose", *(quote(str(p)) for p in runs), *options])
+    else:
+        command = f"sysid {AT_THE_FLOOR[body['axis']]} {quote(body['model'])}"
+    return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}
+
+
+def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> dict[str, Any]:
+    from fieldsid.artifacts import sha256_of
+    from fieldsid.effects import pick_effect
+    from fieldsid.extension import gain_body, kept_by
+    from fieldsid.models.effect import as_fitted
+
+    new = [c for n in found.gain.added for c in as_fitted(pick_effect(n), found.model.values).shared]
+    return {
+        "schema": SCHEMA,
+        "axis": parent.axis.value,
+        **gain_body(found.gain),
+        "log_evidence": found.evidence,
+        "pays": found.pays,
+        "kept": written is not None,
+        "kept_by": None if written is None else kept_by(found),
+        "model": str(path if written is None else written),
+        "effects": list(parent.effects if written is None else found.model.effects),
+        "parent": {"path": str(path), "sha256": sha256_of(path)},
+        "coefficients": {c.name: _coefficient(found.model, c) for c in new},
+        "notes": [{"code": n.code, "message": n.message} for n in found.notes],
+    }
+
+
+def _coefficient(model: Model, c: Coefficient) -> dict[str, Any]:
+    value = model.values[c.name]
+    at_bound = min(value - c.low, c.high - value) <= NEAR * (c.high - c.low)
+    return {"value": value, "std_error": model.std_error(c.name), "unit": c.unit, "at_bound": at_bound}
+
+
+def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
+    from fieldsid.artifacts import replacing
+    from fieldsid.extension import CHANGED, MISSING, gain_body, history_of, parent_of
+    from fieldsid.models.model import load_model
+
+    parent = parent_of(path)
+    if parent is None:
+        raise UsageError(f"`{path}` was not extended from another model", found="no parent", hint="there is nothing to undo")
+    if parent.state == MISSING:
+        raise ArtifactError(f"the parent of `{path}` is gone", found=str(parent.path), hint="put it back beside the model")
+    if parent.state == CHANGED and not force:
+        raise ArtifactError(
+            f"the parent of `{path}` has changed since", found=str(parent.path), hint="add `--force` to take it as it is now"
+        )
+    back = parent.path
+    if output is not None:
+        with replacing(output, force=force) as temporary:
+            shutil.copyfile(parent.path, temporary)
+        back = output
+    step = history_of(path)[-1].step
+    body = {
+        "schema": SCHEMA,
+        **(gain_body(step.gain) if step else {"before": {}, "after": {}, "noise_floor": {}}),
+        "kept": False,
+        "undone": str(path),
+        "model": str(back),
+        "effects": list(load_model(back).effects),
+        "parent": {"path": str(parent.path), "sha256": parent.sha256, "state": parent.state},
+    }
+    return emit(body, as_json=as_json, render=lambda to: _render_undone(to, body))
+
+
+def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
+    messages().print(f"undone: {body['undone']} stays where it is, its parent is", soft_wrap=True)
+    to.print(body["model"], soft_wrap=True)
+
+
+def _render(to: Console, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    from fieldsid.rounding import in_unit, number
+
+    before, after = body["over_floor"]["before"], body["over_floor"]["after"]
+    where = "unseen data" if body["unseen"] else "the runs fitted to"
+    said = f"{'+'.join(body['added'])}: the error on {where} goes from {before:.2f} to {after:.2f} x the noise floor"
+    to.print(Text(said, style="bold"))
+    to.print()
+    floor = body["noise_floor"]
+    rows = [
+        (f"{unit}, {side}", number(b[key], 3), number(a[key], 3), number(floor[noise], 3))
+        for key, noise, unit in (("angle_rms_rad", "angle_rad", "angle, rad"), ("rate_rms_rad_s", "rate_rad_s", "rate, rad/s"))
+        for side, b, a in (
+            ("unseen", body["before"]["validation"], body["after"]["validation"]),
+            ("fitted", body["before"]["train"], body["after"]["train"]),
+        )
+        if isfinite(b[key])
+    ]
+    to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
+    to.print()
+    found = [
+        (n, _value(c["value"], c["std_error"], at_bound=c["at_bound"]), in_unit(c["unit"]))
+        for n, c in body["coefficients"].items()
+    ]
+    to.print(table("", ("coefficient", "value", "unit"), found, left=2))
+    to.print()
+    to.print(Text(_verdict(body)))
+    to.print(Text(_says_left(body)))
+    to.print(f"model: {body['model']}", soft_wrap=True)
+    to.print(Text(f"next: {body['next']}"), soft_wrap=True)
+
+
+def _says_left(body: Mapping[str, Any]) -> str:
+    sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
+    said = ", ".join(f"{error:.2f} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    return f"left: {said}: " + (MORE if body["left"]["more_than_noise"] else "that is the noise")
+
+
+def _verdict(body: Mapping[str, Any]) -> str:
+    if body["pays"]:
+        return "kept: it predicts better what it has not seen" if body["unseen"] else "kept: the evidence pays for it"
+    data = "unseen data" if body["unseen"] else "the evidence"
+    if body["kept"]:
+        return f"kept because of --keep: on {data} it does not pay"
+    return f"not kept: on {data} it does not pay; nothing was written, --keep overrules"
+
+
+def _value(value: float, error: float, *, at_bound: bool) -> str:
+    """Return a value with its error, or why it has none."""
+    from fieldsid.rounding import number, with_error
+
+    if at_bound:
+        return f"{number(value)} (at its bound)"
+    known = error < MUCH * max(abs(value), SMALL)
+    return with_error(value, error) if known else f"{number(value)} (these data do not tell)"

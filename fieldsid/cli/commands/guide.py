@@ -1,0 +1,57 @@
+"""sysid guide: the manual, offline: a trial, the theory, every effect and command."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit
+from fieldsid.cli.options import JsonFlag
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.guide import Page
+
+WIDEST = 100
+"""Columns of a page at most: longer lines are hard to read."""
+KEEPS_STYLES = "FRX"
+"""Options of `less` where the user has set none: show colours, and leave at once where a page fits the screen."""
+
+Topic = Annotated[
+    str | None,
+    typer.Argument(metavar="TOPIC", help="A page, such as `trial` or `effects/servo_lag`; the contents if not given."),
+]
+
+
+def command(topic: Topic = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """Show a page of the guide: on a terminal in a pager, else as text.
+
+    The pages are Markdown files that are installed with the program, so that no network is needed. An effect or a command can be
+    asked for by its name alone. `--json` gives the list of topics, or the text of one.
+
+    Example: sysid guide effects/servo_lag
+    """
+    from fieldsid.guide import all_pages, pick_page
+
+    page = pick_page(topic or "index")
+    body: dict[str, Any] = {"schema": "fieldsid/guide/1"}
+    if topic is None:
+        body |= {"topics": [{"topic": p.topic, "title": p.title} for p in all_pages().values()]}
+    else:
+        body |= {"topic": page.topic, "title": page.title, "file": str(page.path), "text": page.text}
+    return emit(body, as_json=as_json, render=lambda to: _show(to, page))
+
+
+def _show(to: Console, page: Page) -> None:
+    from fieldsid.cli.help.markdown import rendered
+
+    if not to.is_terminal:
+        to.print(rendered(page), crop=False)
+        return
+    os.environ.setdefault("LESS", KEEPS_STYLES)
+    with to.pager(styles=True):
+        to.print(rendered(page), width=min(to.width, WIDEST), crop=False)

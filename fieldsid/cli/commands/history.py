@@ -1,0 +1,123 @@
+"""sysid history: a model's line, effect by effect, with the error before and after each addition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
+from fieldsid.cli.progress import refuse_figure
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.extension import Generation
+
+KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
+
+
+def command(model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """Show how a model came about: its parents, the effects added, and how the error fell towards the noise floor.
+
+    Every file's hash is checked against what its child and its data were when it was made.
+
+    Example: sysid history models/joint_yaw+servo_lag.yaml --figure history.png
+    """
+    from fieldsid.cli.user_effects import read_model
+
+    refuse_figure(figure, force=force)
+    known = read_model(model)
+    from fieldsid.extension import history_of
+
+    line = history_of(model)
+    body = {
+        "schema": "fieldsid/history/1",
+        "model": str(model),
+        "axis": known.axis.value,
+        "generations": [_entry(g) for g in line],
+        "intact": all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
+        "figure": _drawn(line, model, figure, force=force),
+    }
+    if not as_json:
+        _warn(line)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, line, body))
+
+
+def _entry(g: Generation) -> dict[str, Any]:
+    from fieldsid.extension import gain_body
+
+    body: dict[str, Any] = {"model": str(g.path), "effects": list(g.effects), "state": g.state}
+    if g.step is None:
+        return body | {"added": []}
+    return body | gain_body(g.step.gain) | {"kept_by": g.step.kept_by, "changed_data": list(g.step.changed_data)}
+
+
+def _drawn(line: Sequence[Generation], model: Path, path: Path | None, *, force: bool) -> str | None:
+    if path is None:
+        return None
+    if not any(g.step for g in line):
+        say("nothing was added yet: there is no figure to draw")
+        return None
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.history import figure
+
+    return str(save(figure(line, model.name), path, force=force))
+
+
+def _warn(line: Sequence[Generation]) -> None:
+    for g in line:
+        if g.state == "changed":
+            say(f"warning: `{g.path}` has changed since its child was made from it [parent_changed]")
+        elif g.state == "missing":
+            say(f"warning: `{g.path}` is missing: the line is not known before it [parent_missing]")
+        for path in g.step.changed_data if g.step else ():
+            say(f"warning: `{path}` has changed since `{g.path.name}` was made from it [data_changed]")
+
+
+def _render(to: Console, line: Sequence[Generation], body: Mapping[str, Any]) -> None:
+    first = line[0]
+    to.print(f"starts from {', '.join(first.effects) or 'the plain model'}: {first.path}", soft_wrap=True)
+    to.print()
+    rows = [row for g in line if g.step for row in _rows(g)]
+    if rows:
+        to.print(table("", ("added", "error of", "before", "after", "noise", "x floor"), rows, left=2))
+    else:
+        to.print("nothing was added yet")
+    to.print()
+    for g in line:
+        if g.step:
+            judged = ("judged on " if g.step.gain.unseen else "fitted to ") + ", ".join(g.step.gain.judged_on)
+            kept = KEPT.get(g.step.kept_by, g.step.kept_by)
+            to.print(f"+ {', '.join(g.step.gain.added)}: {kept}; {judged}", soft_wrap=True)
+    to.print(f"model: {body['model']}", soft_wrap=True)
+    if body["figure"]:
+        to.print(f"figure: {body['figure']}", soft_wrap=True)
+
+
+def _rows(g: Generation) -> list[tuple[str, ...]]:
+    """Return a row for each channel of one addition, the pooled error over the floor on the first."""
+    from fieldsid.rounding import number
+
+    if g.step is None:
+        return []
+    gain = g.step.gain
+    before, after = (p.validation if gain.unseen else p.train for p in (gain.before, gain.after))
+    channels = [
+        (name, b, a, floor)
+        for name, b, a, floor in (
+            ("angle, rad", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
+            ("rate, rad/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
+        )
+        if isfinite(b)
+    ]
+    words = [f"+ {n}" for n in gain.added]
+    words += [""] * (len(channels) - len(words))
+    over = [f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}", *([""] * (len(words) - 1))]
+    channels += [("", float("nan"), float("nan"), float("nan"))] * (len(words) - len(channels))
+    return [
+        (w, name, *(number(v, 3) if name else "" for v in (b, a, floor)), x)
+        for w, (name, b, a, floor), x in zip(words, channels, over, strict=True)
+    ]

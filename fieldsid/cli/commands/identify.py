@@ -1,0 +1,249 @@
+"""sysid identify: the parameters of the yaw or pitch model, with honest error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, messages, progress, table
+from fieldsid.cli.options import (
+    AxisOption,
+    EffectNames,
+    Figures,
+    Force,
+    FromS,
+    JsonFlag,
+    MappingFile,
+    OutputDir,
+    RunFiles,
+    ToS,
+    VehicleFile,
+    names_of,
+)
+from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.fitting.fit import Fit
+    from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
+    from fieldsid.fitting.predict.predict import Prediction
+    from fieldsid.logs import Run
+
+Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
+Joint = Annotated[bool, typer.Option("--joint", help="One model for all runs: damping and trim shared, authority by speed.")]
+Whole = Annotated[bool, typer.Option("--whole", help="Use whole runs, not only the part that excites the axis.")]
+Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
+Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor of svf_rls.")]
+
+
+def command(
+    runs: RunFiles,
+    axis: AxisOption,
+    method: Method = "auto",
+    effects: EffectNames = None,
+    joint: Joint = False,
+    whole: Whole = False,
+    start: FromS = None,
+    end: ToS = None,
+    bandwidth: Bandwidth = 4.0,
+    forgetting: Forgetting = 1.0,
+    mapping: MappingFile = None,
+    vehicle: VehicleFile = None,
+    output: OutputDir = None,
+    figures: Figures = True,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Identify the yaw or pitch model of each run, or one model of all of them.
+
+    With `-o` each model is written to DIR/RUN_AXIS.yaml with its figure beside it. `auto` is output error, and prediction error
+    (pem) where the residuals show a disturbance. Of several runs one that cannot be used is skipped with its reason, and the
+    exit code is 1.
+
+    Example: sysid identify runs/*.parquet --axis yaw -o models/
+    """
+    from fieldsid.cli.inputs import files_of, read_runs
+    from fieldsid.cli.skipped_logs import Skips
+
+    refuse_closed(output)
+    skips, ready = Skips(), partial(get_ready, "fieldsid.fitting.identify")
+    known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready, refused=skips.skip)
+    from fieldsid.fitting.identify import check_joint, identify
+    from fieldsid.fitting.problem.estimator import Options
+    from fieldsid.vehicle import find_vehicle, load_vehicle
+
+    if joint:
+        check_joint([run.name for run in known], len(runs))
+    with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
+        fits = identify(
+            known,
+            axis,
+            method=method,
+            effects=names_of(effects),
+            joint=joint,
+            vehicle=load_vehicle(vehicle) if vehicle is not None else find_vehicle(Path()),
+            whole=whole or start is not None or end is not None,
+            options=Options(bandwidth, forgetting),
+            done=step,
+            unfit=skips.skip,
+        )
+    used = skips.left_of(known)
+    groups = [used] if joint else [[run] for run in used]
+    models = _written(fits, [files_of(group) for group in groups], output, figures=figures, force=force)
+    entries = [_entry(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True)]
+    body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries, "skipped_runs": skips.records}
+    emit(body, as_json=as_json, render=lambda to: _render(to, entries))
+    skips.end(len(used))
+    return body
+
+
+def _written(
+    fits: Sequence[Fit], sources: Sequence[list[Path]], folder: Path | None, *, figures: bool, force: bool
+) -> list[Path | None]:
+    if folder is None:
+        return [None] * len(fits)
+    from fieldsid.models.model import save_model
+    from fieldsid.runtime.worker_pool import await_background
+
+    paths: list[Path | None] = []
+    with await_background():
+        for fit, inputs in zip(fits, sources, strict=True):
+            stem = _stem(fit)
+            paths.append(save_model(fit.model, folder / f"{stem}.yaml", inputs=inputs, force=force))
+            if figures:
+                _draw(fit, folder, stem, force=force)
+    return paths
+
+
+def _draw(fit: Fit, folder: Path, stem: str, *, force: bool) -> None:
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.identify import figure, history_figure
+
+    for i, shown in enumerate(fit.predictions):
+        name = stem if len(fit.predictions) == 1 else f"{stem}_{shown.record.name}"
+        save(figure(fit, i), folder / f"{name}.png", force=force)
+    if fit.history is not None:
+        save(history_figure(fit, fit.history), folder / f"{stem}_over_time.png", force=force)
+
+
+def _stem(fit: Fit) -> str:
+    run = fit.model.runs[0] if len(fit.model.runs) == 1 else "joint"
+    return f"{run}_{fit.model.axis.value}"
+
+
+def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
+    from fieldsid.fitting.checks.warnings import is_warning
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+
+    m, model = goodness_of_fit(fit.predictions), fit.model
+    notes = [n for n in (*fit.notes, *(n for run in logs for n in run.notes)) if is_warning(n, model.axis)]
+    return {
+        "run": "+".join(model.runs),
+        "model": None if path is None else str(path),
+        "speed_m_s": model.law.reference,
+        "method": model.method,
+        "effects": list(model.effects),
+        "parameters": _parameters(fit),
+        **_merit(m),
+        "noise_floor": {"angle_rad": fit.floor.angle, "rate_rad_s": fit.floor.rate},
+        "warnings": [{"code": n.code, "message": n.message, "data": dict(n.data)} for n in notes],
+        "whiteness_p": model.info.get("whiteness_p"),
+        "runs": [_of_run(p) for p in fit.predictions],
+        "settled_s": None if fit.history is None else dict(fit.history.settled_s),
+    }
+
+
+def _of_run(p: Prediction) -> dict[str, Any]:
+    from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
+
+    time = p.record.time
+    return {"run": p.record.name, "speed_m_s": p.record.speed, "segment_s": [time[0], time[-1]], **_merit(goodness_of_fit([p]))}
+
+
+def _merit(m: GoodnessOfFit) -> dict[str, float]:
+    return {
+        "angle_rms_rad": m.angle_rms,
+        "rate_rms_rad_s": m.rate_rms,
+        "angle_fit_percent": m.angle_fit,
+        "rate_fit_percent": m.rate_fit,
+    }
+
+
+def _parameters(fit: Fit) -> dict[str, dict[str, Any]]:
+    from fieldsid.fitting.estimates import estimates
+
+    law = fit.model.info.get("law_parameters", {})
+    return {
+        e.name: {
+            "value": e.value,
+            "std_error": e.std_error,
+            "interval95": list(e.interval95),
+            "unit": e.unit,
+            "shown": e.name if e.name in law else fit.model.shown(e.name),
+        }
+        for e in estimates(fit.model)
+    }
+
+
+def _render_warnings(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Say each kind of warning once, with the numbers of the first run that has it."""
+    seen: dict[str, list[str]] = {}
+    first: dict[str, str] = {}
+    for e in entries:
+        for w in e["warnings"]:
+            seen.setdefault(w["code"], []).append(_label(e))
+            first.setdefault(w["code"], w["message"])
+    for code, runs in seen.items():
+        others = "" if len(runs) == 1 else f" (and {len(runs) - 1} more like it)"
+        to.print(f"warning: {runs[0]}: {first[code]} \\[{code}]{others}", soft_wrap=True)
+
+
+def _label(entry: Mapping[str, Any]) -> str:
+    """Return the run's name, or how many runs a joint fit has."""
+    return str(entry["run"]) if len(entry["runs"]) == 1 else f"{len(entry['runs'])} runs"
+
+
+def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
+    from fieldsid.rounding import in_unit, interval, number, with_error
+
+    _render_warnings(to, entries)
+    rows = [
+        (
+            _label(e) if i == 0 else "",
+            p["shown"],
+            with_error(p["value"], p["std_error"]),
+            in_unit(p["unit"]),
+            interval(*p["interval95"]),
+        )
+        for e in entries
+        for i, p in enumerate(e["parameters"].values())
+    ]
+    to.print(table("", ("run", "parameter", "value", "unit", "95 % interval"), rows, left=2))
+    to.print()
+    merits = [
+        (
+            r["run"],
+            number(r["speed_m_s"], 3),
+            number(r["angle_rms_rad"], 2),
+            number(e["noise_floor"]["angle_rad"], 2),
+            number(r["angle_fit_percent"], 3),
+            number(r["rate_rms_rad_s"], 2),
+            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(r["rate_fit_percent"], 3),
+        )
+        for e in entries
+        for r in e["runs"]
+    ]
+    columns = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
+    to.print(table("", columns, merits))
+    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in rad, rate in rad/s")
+    for e in entries:
+        if e["model"]:
+            to.print(f"model: {e['model']}", soft_wrap=True)
+    if not any(e["model"] for e in entries):
+        messages().print("nothing was written: add `-o DIR` to keep the models and their figures")

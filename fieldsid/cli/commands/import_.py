@@ -1,0 +1,108 @@
+"""sysid import: a clean Run: SI, one frame, one clock, quality notes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.options import Force, FromS, JsonFlag, MappingFile, ToS, VehicleFile
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.logs.importing import Imported
+
+
+def command(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs: tables, bags, MATLAB, MOOS, PX4, ArduPilot, gliders.")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR|FILE", help="Folder for the runs, or the file of a single one.")
+    ],
+    mapping: MappingFile = None,
+    channel: Annotated[
+        list[str] | None,
+        typer.Option("--channel", metavar="SIGNAL=COLUMN:UNIT", help="Map one signal; counts more than the mapping; may repeat."),
+    ] = None,
+    msg_path: Annotated[
+        Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
+    ] = None,
+    vehicle: VehicleFile = None,
+    from_s: FromS = None,
+    to_s: ToS = None,
+    max_gap: Annotated[
+        float,
+        typer.Option("--max-gap", metavar="S", help="Longest gap of a main signal, or 5 of its own steps.", min=0.0),
+    ] = 2.0,
+    salvage: Annotated[
+        bool, typer.Option("--salvage", help="Take what is left of a damaged log: cut gzip, bad cells, time out of order.")
+    ] = False,
+    whole: Annotated[
+        bool, typer.Option("--whole", help="Keep what is not under way: on deck, at the surface, idle; one run for each log.")
+    ] = False,
+    format_: Annotated[
+        str, typer.Option("--format", metavar="parquet|csv|csv.gz", help="Kind of file in the folder.")
+    ] = "parquet",
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> None:
+    """Turn logs into Runs: SI and radians, NED and forward-starboard-down, one clock, gaps left as gaps.
+
+    What is not under way is left out, and said; several stretches of one log are runs of their own.
+
+    Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
+    """
+    from fieldsid.artifacts import check_output
+    from fieldsid.cli.console import emit, tracked, warn
+    from fieldsid.cli.inputs import between, mapping_of
+    from fieldsid.cli.skipped_logs import Skips
+    from fieldsid.logs.importing import Importer
+    from fieldsid.logs.several.run_names import refuse_twice
+    from fieldsid.logs.several.sifting import attempt, sifted
+
+    importer = Importer(
+        mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage=salvage, whole=whole
+    )
+    limits = _fin_limits(vehicle)
+    targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))
+    skips = Skips()
+    shown = tracked(logs, "reading")
+    outcomes = (attempt(lambda log_and_bar: importer.read(log_and_bar[0], limits, log_and_bar[1]), pair) for pair in shown)
+    read = sifted(logs, outcomes, skips.skip)
+    refuse_twice([run for _, runs in read for run in runs], [log for log, runs in read for _ in runs])
+    placed = [pair for log, runs in read for pair in zip(runs, importer.places(targets[log], len(runs)), strict=True)]
+    for _, place in placed:
+        check_output(place, force=force)
+    done = [importer.write(run, place, force=force) for run, place in placed]
+    body = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
+    emit(body, as_json=as_json, render=lambda c: _render(done, c))
+    for item in done:
+        warn(item.warnings, of=item.run.name)
+    skips.end(len(done))
+
+
+def _fin_limits(vehicle: Path | None) -> dict[str, float]:
+    from fieldsid.face.arguments import signal_limits, vehicle_of
+
+    return signal_limits(vehicle_of(vehicle))
+
+
+def _render(done: list[Imported], console: Console) -> None:
+    from fieldsid.cli.console import table
+
+    rows: list[Any] = []
+    for item in done:
+        record = item.record()
+        rows.append(
+            (
+                record["file"],
+                str(record["samples"]),
+                f"{record['duration_s']:.2f}",
+                f"{record['rate_hz']:.4g}",
+                str(len(record["signals"])),
+            )
+        )
+    console.print(table("", ("run", "samples", "s", "Hz", "signals"), rows))

@@ -1,0 +1,231 @@
+"""sysid plan: what to fly inside the safety envelope, what it will buy, and what would tell two effects apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, progress, say
+from fieldsid.cli.options import Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
+from fieldsid.cli.progress import compiling
+from fieldsid.models.axis import Axis
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.models.model import Model
+    from fieldsid.planning.design.leg import Expected
+    from fieldsid.planning.design.plan import Plan
+    from fieldsid.planning.request import PlanRequest
+
+Text = str | None
+
+
+def _option(name: str, metavar: str, says: str) -> Any:
+    return typer.Option(name, metavar=metavar, help=says, show_default=False)
+
+
+Speeds = Annotated[Text, _option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.")]
+Believed = Annotated[Path | None, _option("--model", "YAML", "What is believed: a model or a prior file.")]
+PlannedAxis = Annotated[Axis | None, _option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.")]
+PriorName = Annotated[Text, _option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.")]
+Want = Annotated[
+    Text,
+    _option(
+        "--want",
+        "a22=5%,..",
+        "Standard errors to reach at every speed, in shares of the value; of the trim, in shares of full fin.",
+    ),
+]
+Minutes = Annotated[float | None, _option("--minutes", "MIN", "Time there is for all legs, turns included.")]
+Area = Annotated[Text, _option("--area", "LxW", "Length along the leg and width across it, m.")]
+DepthBand = Annotated[Text, _option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.")]
+MaxHeading = Annotated[Text, _option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.")]
+MaxTrack = Annotated[float | None, _option("--max-track", "M", "Largest distance from the leg's line.")]
+MaxPitch = Annotated[Text, _option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.")]
+MaxRoll = Annotated[Text, _option("--max-roll", "ANGLE", "Largest roll, `20deg`.")]
+FinMax = Annotated[Text, _option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.")]
+FinRate = Annotated[Text, _option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.")]
+Share = Annotated[float, typer.Option("--risk", metavar="SHARE", help="Accepted probability of leaving the envelope.")]
+WindowS = Annotated[float | None, _option("--window", "S", "Length of the part that is identified on; 33, to separate 60.")]
+RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight run before it.")]
+RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.")]
+Radius = Annotated[bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.")]
+OpenLoop = Annotated[bool, typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.")]
+Separate = Annotated[Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.")]
+FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.")]
+Course = Annotated[Text, _option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.")]
+Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.")]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.")]
+
+
+def command(
+    axis: PlannedAxis = None,
+    speeds: Speeds = None,
+    vehicle: VehicleFile = None,
+    model: Believed = None,
+    prior: PriorName = None,
+    want: Want = None,
+    minutes: Minutes = None,
+    area: Area = None,
+    depth_band: DepthBand = None,
+    max_heading: MaxHeading = None,
+    max_track: MaxTrack = None,
+    max_pitch: MaxPitch = None,
+    max_roll: MaxRoll = None,
+    fin_max: FinMax = None,
+    fin_rate: FinRate = None,
+    risk: Share = 0.05,
+    window: WindowS = None,
+    run_up: RunUpS = 10.0,
+    rate: RateHz = 20.0,
+    radius: Radius = False,
+    open_loop: OpenLoop = False,
+    separate: Separate = None,
+    diagnosis: FromDiagnosis = None,
+    course: Course = None,
+    write: Write = None,
+    seed: Seed = 1,
+    output: OutputDir = None,
+    figures: Figures = True,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Plan maneuvers: the fin commands that buy the accuracy you want inside your limits, in the fewest minutes.
+
+    The best of the catalogue and of optimised switching signals is tried on hundreds of draws of what is believed;
+    each leg says the standard error of every parameter, minutes, metres and the risk. With `-o` the plan, fin
+    commands, mission snippets and a figure are written. Every limit is printed, NOT LIMITED where there is none. With
+    `--separate` or `--from` there is one leg at every speed, the maneuver that tells the effects apart best.
+
+    Example: sysid plan --axis yaw --speeds 1.0,1.4,1.8 --want a22=5%,b2=3% --area 200x60 -o plan
+    """
+    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.planning.jit_warmup import SHARED_KERNELS, compile_planning
+    from fieldsid.planning.request import EnvelopeLimits, PlanRequest, planned
+
+    _check_write(write, output)
+    limiting = EnvelopeLimits(area, depth_band, max_heading, max_track, max_pitch, max_roll, fin_max, fin_rate, risk)
+    asked = PlanRequest(
+        axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
+        names_of(separate), diagnosis, seed, open_loop, course,
+    )  # fmt: skip
+    with compiling() as help_along, progress("planning", asked.legs) as step:
+
+        def ready() -> None:
+            compile_planning()
+            help_along(SHARED_KERNELS)
+
+        made = planned(asked, step, ready)
+    if model is not None:
+        check_effects([(model, made.model)])
+    files = [] if output is None else _written(made.plan, made.model, asked, output, write, figures=figures, force=force)
+    body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body))
+    if output is None:
+        say("nothing was written: add `-o DIR` for the plan, the fin commands, mission snippets and the figure")
+    return result
+
+
+def _check_write(write: str | None, output: Path | None) -> None:
+    """Refuse formats before the search and not after it."""
+    from fieldsid.errors import UsageError
+    from fieldsid.planning.output.command_files import check_formats
+
+    check_formats(names_of(write))
+    if write is not None and output is None:
+        raise UsageError("`--write` says what, `-o` where", found=f"--write {write}", hint="add `-o DIR`")
+
+
+def _written(
+    plan: Plan, model: Model, asked: PlanRequest, folder: Path, write: str | None, *, figures: bool, force: bool
+) -> list[Path]:
+    from fieldsid.planning.output.command_files import unwritten, write_all
+    from fieldsid.planning.output.plan_file import save_plan
+
+    inputs = [p for p in (asked.model, asked.vehicle, asked.diagnosis) if p is not None]
+    files = [save_plan(plan, folder / "plan.yaml", inputs=inputs, force=force)]
+    files += write_all(plan, folder, names_of(write), force=force)
+    for line in unwritten(plan):
+        say(line)
+    if figures:
+        from fieldsid.figures.plan import save_plan_figure
+        from fieldsid.planning.output.figure_data import figure_data
+
+        files.append(save_plan_figure([figure_data(plan, leg, model) for leg in plan.legs], folder / "plan.png", force=force))
+    return files
+
+
+def _render(to: Console, plan: Plan, body: Mapping[str, Any]) -> None:
+    from fieldsid.cli.console import table
+    from fieldsid.rounding import number
+
+    rows = [
+        (
+            number(leg.speed, 3),
+            leg.candidate.maneuver,
+            str(leg.passes),
+            number(leg.duration_s / 60, 2),
+            number(leg.distance_m, 3),
+            f"{100 * leg.break_probability:.1f}%",
+            *(number(v, 2) for v in _reached(leg.excursions)),
+        )
+        for leg in plan.legs
+    ]
+    columns = ("speed", "maneuver", "passes", "min", "m", "risk", "angle rad", "side m")
+    to.print(table(f"{plan.vehicle}, {plan.axis.value}: what to fly", columns, rows, left=2))
+    errors = [(number(leg.speed, 3), name, *_bought(e, leg.passes)) for leg in plan.legs for name, e in leg.expected.items()]
+    to.print(table("what it buys", ("speed", "parameter", "expected", "error", "at worst", "pulses need"), errors, left=2))
+    to.print(
+        f"{plan.minutes:.1f} minutes, {plan.metres:.0f} m; risk of leaving the envelope at most {plan.break_probability:.1%}"
+    )
+    _render_limits(to, plan)
+    for line in body.get("says", ()):
+        to.print(line)
+
+
+def _render_limits(to: Console, plan: Plan) -> None:
+    """Say every limit, and which of them no draw of the prior was tried on."""
+    from fieldsid.models.axis import Axis
+    from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
+
+    limits = limits_said(plan.envelope)
+    to.print("limits: " + "; ".join(f"{name} {words}" for name, words in limits.items()))
+    for leg in plan.legs:
+        own = limits_said(leg.envelope_in(plan.envelope))
+        other = [f"{name} {words}" for name, words in own.items() if words != limits[name]]
+        if other:
+            to.print(f"{leg.candidate.maneuver} at {leg.speed:g} m/s: {'; '.join(other)}")
+    unseen = ("pitch", "depth") if plan.axis is Axis.YAW else ("heading", "track", "roll")
+    watched = [name for name in unseen if limits[name] != NOT_LIMITED]
+    if watched:
+        to.print(f"not in the risk, only to be watched in flight: {', '.join(watched)}")
+
+
+def _reached(excursions: Mapping[str, float]) -> tuple[float, float]:
+    """Return the 95 % quantiles of angle and sideways distance, of whichever axis moves."""
+    angle = max(excursions.get(k, 0.0) for k in ("heading", "pitch"))
+    return angle, max(excursions.get(k, 0.0) for k in ("track", "depth"))
+
+
+def _bought(e: Expected, passes: int) -> tuple[str, str, str, str]:
+    """Return what is expected of a parameter, its error, that at worst, and what the paper's pulses need for it."""
+    from fieldsid.planning.design.leg import error_in_words
+    from fieldsid.rounding import with_error
+
+    if not isfinite(e.std_error):  # the maneuver does not show it
+        return with_error(e.value, e.std_error), "-", "-", _against(e.baseline, e.std_error, passes)
+    at_worst = error_in_words(e.value, e.std_error_high, e.relative * e.std_error_high / e.std_error)
+    error = error_in_words(e.value, e.std_error, e.relative)
+    return with_error(e.value, e.std_error), error, at_worst, _against(e.baseline, e.std_error, passes)
+
+
+def _against(baseline: float, std_error: float, passes: int) -> str:
+    """Say how many times the flying time the paper's pulses need for the same error."""
+    if not (isfinite(baseline) and isfinite(std_error) and baseline > 0 and std_error > 0):
+        return "-"
+    return f"{(baseline / std_error) ** 2 / passes:.1f} x"

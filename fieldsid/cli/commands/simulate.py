@@ -1,0 +1,124 @@
+"""sysid simulate: a model's own prediction of a maneuver or of a run's fin, as a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit
+from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile
+from fieldsid.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.logs.run import Run
+    from fieldsid.models.model import Model
+
+ManeuverSpec = Annotated[
+    str | None,
+    typer.Option("--maneuver", metavar="SPEC", help="`zigzag`, or `zigzag:amplitude=15deg,turn=20deg`.", show_default=False),
+]
+FinOf = Annotated[Path | None, typer.Option("--run", metavar="RUN", help="Replay the fin of this run.", show_default=False)]
+Speed = Annotated[
+    float | None, typer.Option("--speed", metavar="M_S", help="Speed; the model's own if not given.", show_default=False)
+]
+FinMax = Annotated[str, typer.Option("--fin-max", metavar="ANGLE", help="Largest fin angle about trim, `20deg` or `0.35rad`.")]
+RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", min=1.0, max=1000.0, help="Samples per second of a maneuver.")]
+NoiseSeed = Annotated[
+    int | None, typer.Option("--noise", metavar="SEED", help="Add the model's sensor noise from this seed.", show_default=False)
+]
+
+
+def command(
+    model: ModelFile,
+    maneuver: ManeuverSpec = None,
+    run: FinOf = None,
+    mapping: MappingFile = None,
+    speed: Speed = None,
+    fin_max: FinMax = "0.35rad",
+    rate: RateHz = 20.0,
+    noise: NoiseSeed = None,
+    output: OutputFile = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Simulate a model: fly a maneuver with it, or replay a run's fin, and keep the motion as a run.
+
+    A maneuver starts from rest about trim; the autopilot steers before, between and after its parts. A replay starts from the
+    run's first measured angle and rate. Without `-o` nothing is written.
+
+    Example: sysid simulate model.yaml --maneuver zigzag:amplitude=15deg --speed 1.4 -o zigzag.csv
+    """
+    from fieldsid.cli.user_effects import read_model
+
+    if (maneuver is None) == (run is None):
+        raise UsageError(
+            "give either a maneuver or a run",
+            found="both" if run else "neither",
+            hint="`--maneuver square_pulses` or `--run RUN`",
+        )
+    known = read_model(model)
+    made = _flown(known, maneuver or "", speed, fin_max, rate) if run is None else _replayed(known, run, mapping, speed)
+    if noise is not None:
+        from fieldsid.planning.flight.dry_run import with_noise
+
+        made = with_noise(made, known, noise)
+    if output is not None:
+        from dataclasses import replace
+
+        from fieldsid.logs import save_run
+
+        made = replace(made, name=Path(output.name.removesuffix(".gz")).stem)
+        save_run(made, output, force=force)
+    body = {
+        "schema": "fieldsid/simulation/1",
+        "model": str(model),
+        "run": made.name,
+        "file": None if output is None else str(output),
+        "samples": len(made),
+        "seconds": float(made.time[-1] - made.time[0]),
+        "signals": {n: {"low": float(v.min()), "high": float(v.max()), "end": float(v[-1])} for n, v in made.signals.items()},
+    }
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+
+
+def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
+    from fieldsid.angles import FIN, parse_angle
+    from fieldsid.maneuvers import Limits, Schedule, parse_spec
+    from fieldsid.planning.flight.dry_run import dry_run
+
+    return dry_run(
+        model,
+        *parse_spec(spec),
+        speed=model.law.reference if speed is None else speed,
+        limits=Limits(parse_angle(fin_max, "--fin-max", FIN)),
+        schedule=Schedule(rate_hz=rate),
+    )
+
+
+def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | None) -> Run:
+    from dataclasses import replace
+
+    from fieldsid.cli.inputs import read_run
+    from fieldsid.dynamics.free_run import simulate
+    from fieldsid.models.record import record_of
+    from fieldsid.planning.flight.dry_run import replayed
+
+    record = record_of(read_run(path, mapping=mapping), model.axis)
+    record = record if speed is None else replace(record, speed=speed)
+    return replayed(model, record, simulate(model, record))
+
+
+def _render(to: Console, body: Mapping[str, Any]) -> None:
+    from fieldsid.cli.console import table
+    from fieldsid.rounding import number
+
+    to.print(
+        f"{body['run']}: {body['samples']} samples, {body['seconds']:.1f} s" + (f", in {body['file']}" if body["file"] else "")
+    )
+    rows = [(name, *(number(v[k]) for k in ("low", "high", "end"))) for name, v in body["signals"].items()]
+    to.print(table("", ("signal", "low", "high", "end"), rows))

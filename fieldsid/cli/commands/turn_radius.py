@@ -1,0 +1,202 @@
+"""sysid turn-radius: radius over speed, both sides, with bands, against measured circles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, say, table, warn
+from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
+from fieldsid.cli.progress import refuse_closed
+from fieldsid.cli.skipped_logs import Skips
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.logs.run import Run
+    from fieldsid.plant.parameter_source import ParameterSource
+    from fieldsid.turning.prediction import TurnPrediction
+
+Speeds = Annotated[
+    str | None,
+    typer.Option("--speeds", metavar="LIST", help="Speeds in m/s, 0.5:2.5:0.1 or 1.0,1.6; those of the models if not given."),
+]
+RudderMax = Annotated[
+    str | None,
+    typer.Option(
+        "--rudder-max",
+        metavar="ANGLE",
+        help="Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest.",
+    ),
+]
+Measured = Annotated[
+    list[Path] | None, typer.Option("--measured", metavar="RUN", help="Run of a turning circle to compare with; may repeat.")
+]
+Runs = Annotated[
+    list[Path] | None,
+    typer.Option("--runs", metavar="RUN", help="Runs to take the loss of speed from; the models' own if not given."),
+]
+Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, u_turn, steady or simulated.")]
+OwnLaw = Annotated[
+    list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
+]
+FinZero = Annotated[
+    str, typer.Option("--fin-zero", metavar="ANGLE", help="Fin offsets below this, `1deg`, are not counted in the formula.")
+]
+
+
+def command(
+    models: ModelFiles,
+    speeds: Speeds = None,
+    rudder_max: RudderMax = None,
+    measured: Measured = None,
+    runs: Runs = None,
+    method: Method = "auto",
+    law: OwnLaw = None,
+    fin_zero: FinZero = "0.0175rad",
+    mapping: MappingFile = None,
+    vehicle: VehicleFile = None,
+    output: OutputDir = None,
+    figures: Figures = True,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Predict the turning radius over speed, port and starboard apart, with 95 % bands.
+
+    Models that carry effects, in a fit file too, are simulated to the settled circle, with the speed lost in the turn; a table
+    or first-order models go by the u-turn formula. Rows say what they rest on: measured, identified or extrapolated.
+
+    Example: sysid turn-radius models/*.yaml --rudder-max 0.35 --measured circle.parquet -o turning/
+    """
+    from fieldsid.angles import FIN, parse_angle
+    from fieldsid.cli.inputs import read_runs
+    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.face.speeds import speeds_of
+    from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.turning.radius import turn_radius
+
+    refuse_closed(output)
+    given = None if rudder_max is None else parse_angle(rudder_max, "--rudder-max", FIN)
+    source, skips = load_parameter_source(models, laws=law or ()), Skips()
+    check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
+    prediction = turn_radius(
+        source,
+        speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
+        _rudder(given, vehicle, source),
+        runs=_runs(runs, source, mapping, skips),
+        measured=read_runs(measured, mapping=mapping, refused=skips.skip) if measured else (),
+        method=method,
+        fin_zero=_fin_zero(fin_zero),
+        unfit=skips.skip,
+    )
+    body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
+    body["skipped_runs"] = skips.records
+    if output is not None:
+        body["figures"] = _written(prediction, body, output, source, figures=figures, force=force)
+    if not as_json:
+        warn(prediction.notes)
+    emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body))
+    skips.end(len(runs or []) + len(measured or []) - len(skips.records))
+    return body
+
+
+def _fin_zero(text: str) -> float:
+    from fieldsid.angles import FIN, parse_angle
+    from fieldsid.errors import UsageError
+
+    angle = parse_angle(text, "--fin-zero", FIN)
+    if angle < 0.0:
+        raise UsageError("a tolerance is not negative", found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
+    return angle
+
+
+def _rudder(given: float | None, vehicle: Path | None, source: ParameterSource) -> float:
+    """Return the rudder of the turn: the option, the vehicle's limit, or the largest the models were trained on."""
+    from fieldsid.face.arguments import rudder_of, vehicle_of
+
+    return given if given is not None else rudder_of(vehicle_of(vehicle), source, say)
+
+
+def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:
+    """Return the runs the models came from: those given, else the inputs the model files name, where they can still be read."""
+    from fieldsid.cli.inputs import mapping_of, read_runs
+    from fieldsid.face.arguments import run_files
+    from fieldsid.logs import Run, load_run
+    from fieldsid.logs.several.sifting import attempt
+
+    if given:
+        return read_runs(given, mapping=mapping, refused=skips.skip)
+    chosen = mapping_of(mapping)
+    outcomes = {path: attempt(lambda p: load_run(p, chosen), path) for path in run_files(source, say)}
+    lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
+    if lost:
+        say(f"runs of the models that cannot be read again: {', '.join(lost)}: name them with `--runs` for the loss of speed")
+    return [outcome for outcome in outcomes.values() if isinstance(outcome, Run)]
+
+
+def _written(
+    prediction: TurnPrediction, body: Mapping[str, Any], folder: Path, source: ParameterSource, *, figures: bool, force: bool
+) -> list[str]:
+    from fieldsid.artifacts import save_record
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.turn import figure, track_figure
+
+    inputs = [p for p in source.paths if p.is_file()]
+    rest = {k: v for k, v in body.items() if k not in ("schema", "figures")}
+    save_record(folder / "turn_radius.yaml", "fieldsid/turn-radius/1", rest, inputs=inputs, force=force)
+    if not figures:
+        return []
+    drawn = [save(figure(prediction), folder / "turn_radius.png", force=force)]
+    drawn += [save(track_figure(m.turn), folder / f"circle_{m.turn.run}.png", force=force) for m in prediction.measured]
+    return [str(p) for p in drawn]
+
+
+def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
+    from fieldsid.rounding import number
+
+    columns = ("side", "m/s", "radius m", "from", "to (95 %)", "deg/s", "180 deg s", "trust")
+    rows = [
+        (
+            r.side,
+            number(r.speed, 3),
+            number(r.radius, 3),
+            number(r.interval95[0], 3),
+            number(r.interval95[1], 3),
+            number(r.yaw_rate_max * 57.29577951308232, 3),
+            number(r.u_turn_time, 3),
+            r.trust,
+        )
+        for r in prediction.rows
+    ]
+    to.print(
+        table(f"rudder {prediction.rudder_max:.4g} rad, {', '.join(sorted({r.method for r in prediction.rows}))}", columns, rows)
+    )
+    _render_measured(to, prediction)
+    for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
+        to.print(f"extrapolated: {reason}")
+    for settling in prediction.settling:
+        to.print(f"what would settle it: {settling}")
+    for side, best in body["minimum"].items():
+        if best:
+            to.print(f"tightest at higher speed, {side}: {best['radius_m']:.2f} m at {best['speed_m_s']:.2f} m/s")
+    for path in body["figures"]:
+        to.print(f"figure: {path}", soft_wrap=True)
+
+
+def _render_measured(to: Console, prediction: TurnPrediction) -> None:
+    from fieldsid.rounding import number, with_error
+
+    if not prediction.measured:
+        return
+    rows = []
+    for m in prediction.measured:
+        circle = m.turn.circle
+        off = 100.0 * (m.predicted / circle.radius - 1.0)
+        band = f"{number(m.predicted95[0], 3)} .. {number(m.predicted95[1], 3)}"
+        radius = with_error(circle.radius, circle.radius_std_error)
+        rows.append((m.turn.run, number(m.turn.fin, 3), radius, number(m.predicted), band, f"{off:+.1f}"))
+    to.print()
+    to.print(table("measured circles", ("run", "fin", "radius m", "predicted", "95 %", "off %"), rows))

@@ -1,0 +1,1 @@
+"""The page of help and the manual on a terminal."""

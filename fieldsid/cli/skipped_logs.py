@@ -1,0 +1,46 @@
+"""Logs that a command could not use: told on stderr one by one, listed in its JSON, and the exit code says it too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from fieldsid.cli.console import say
+from fieldsid.errors import FieldsidError
+
+if TYPE_CHECKING:
+    from fieldsid.logs.run import Run
+
+
+class Skips:
+    """What one command skips; `skip` is what a step is given to tell of each log that it cannot use."""
+
+    def __init__(self) -> None:
+        self.records: list[dict[str, Any]] = []
+        self._runs: set[str] = set()
+
+    def skip(self, log: Path | Run, error: FieldsidError) -> None:
+        """Keep in mind that a log cannot be used, and say so with the reason."""
+        from fieldsid.logs.several.run_names import stem_of
+
+        file = log if isinstance(log, Path) else log.source
+        name = stem_of(log) if isinstance(log, Path) else log.name
+        if not isinstance(log, Path):
+            self._runs.add(name)
+        shown = str(file or "-")
+        self.records.append({"run": name, "file": shown, "what": error.what, "found": error.found, "hint": error.hint})
+        say(f"skipped `{shown}`: {error}\n")
+
+    def left_of(self, runs: Sequence[Run]) -> list[Run]:
+        """Return those of the runs read that were not skipped afterwards."""
+        return [run for run in runs if run.name not in self._runs]
+
+    def end(self, used: int) -> None:
+        """End the command with exit code 1 where logs were skipped, and say how many."""
+        if not self.records:
+            return
+        say(f"{len(self.records)} of {len(self.records) + used} logs skipped, for the reasons above")
+        raise typer.Exit(1)

@@ -1,0 +1,1 @@
+"""What a diagnosis is made from: the hold-out, the applicable effects, the noise floor."""

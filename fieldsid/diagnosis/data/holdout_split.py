@@ -1,0 +1,86 @@
+"""The hold-out: which runs a model is fitted to and which validate it, where the user named no validation runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.logs.run import Note
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.rounding import nine_digits
+
+TRAINING_SHARE = 0.65
+MIN_PART_S = 12.0
+QUIET_SPAN_S = 1.5
+QUIET_RATE_SHARE = 0.15
+
+
+def holdout_split(records: Sequence[Record]) -> tuple[tuple[Record, ...], tuple[Record, ...], tuple[Note, ...]]:
+    """Return training and validation records from one set, and a note that says what was done.
+
+    With three runs or more, the run of median speed is the validation run. With fewer, the last third of each run's excitation
+    is. Where that leaves too little to validate on, all runs are used for training, and the note says so.
+    """
+    if len(records) >= 3:
+        speeds = [nine_digits(r.speed) for r in records]
+        # of runs at one speed the middle one as they were given
+        by_speed = sorted(range(len(records)), key=speeds.__getitem__)
+        middle = by_speed[len(records) // 2] if np.isfinite(speeds).all() else len(records) - 1
+        rest = tuple(r for i, r in enumerate(records) if i != middle)
+        text = f"no validation run was given: {records[middle].name} was held back to judge by"
+        return rest, (records[middle],), (Note("held_back", text, {"run": records[middle].name}),)
+    parts = [_cut(r) for r in records]
+    if any(p is None for p in parts):
+        text = "no validation run was given and the runs are too short to hold a part back: judged on the runs fitted to"
+        return tuple(records), (), (Note("nothing_held_back", text, {"shortest_s": MIN_PART_S, "hint": "--validate RUN"}),)
+    whole = [p for p in parts if p is not None]
+    text = f"no validation run was given: the last part of {', '.join(r.name for r in records)} was held back to judge by"
+    return tuple(a for a, _ in whole), tuple(b for _, b in whole), (Note("held_back", text, {"share": 1 - TRAINING_SHARE}),)
+
+
+def _cut(record: Record) -> tuple[Record, Record] | None:
+    """Return both parts of a record, cut where the fin is at rest and its cumulated activity is nearest to TRAINING_SHARE.
+
+    A cut inside a pulse would start the second part with a fin and a hull in motion.
+    """
+    off = np.abs(record.fin - np.median(record.fin))
+    if not off.any():
+        return None
+    activity = np.cumsum(off)
+    wanted = record.time[int(np.searchsorted(activity, TRAINING_SHARE * activity[-1]))]
+    resting = quiet_before(record, off)
+    if not resting.any():
+        return None
+    index = int(np.flatnonzero(resting)[np.argmin(np.abs(record.time[resting] - wanted))])
+    first, last = record.time[index] - record.time[0], record.time[-1] - record.time[index]
+    if first < MIN_PART_S or last < 0.5 * MIN_PART_S or float(np.ptp(record.fin[index:])) < QUIET_RATE_SHARE * float(off.max()):
+        return None
+    return part_of(record, slice(0, index)), part_of(record, slice(index, None))
+
+
+def quiet_before(record: Record, off: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return the samples before which the fin was at rest near its median for QUIET_S, (n,)."""
+    moving = off > QUIET_RATE_SHARE * float(off.max())
+    last_moved = np.maximum.accumulate(np.where(moving, record.time, record.time[0] - QUIET_SPAN_S))
+    return np.asarray(record.time - last_moved >= QUIET_SPAN_S)
+
+
+def part_of(record: Record, samples: slice) -> Record:
+    """Return a part of a record."""
+    return Record(
+        name=record.name,
+        axis=record.axis,
+        time=record.time[samples],
+        fin=record.fin[samples],
+        fin_is_held=record.fin_is_held,
+        fin_is_measured=record.fin_is_measured,
+        angle=record.angle[samples],
+        rate=record.rate[samples],
+        angle_ok=record.angle_ok[samples],
+        rate_ok=record.rate_ok[samples],
+        signals={k: v[samples] for k, v in record.signals.items()},
+        speed=record.speed,
+    )

@@ -1,0 +1,42 @@
+"""The noise floor that errors are compared with: the error the sensors' noise alone would leave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+
+MIN_BASE_ERROR_SHARE = 0.01
+"""Smallest noise that models are compared under, as a share of the base model's error. A filtered log shows almost no noise; then
+the smallest inconsistency of its sensors would outweigh everything the base model fails to follow."""
+MIN_COLOUR_RATIO = 0.5
+"""Coloured over white sensor noise above which the reported floor includes the coloured part."""
+
+
+def reported_noise_floor(floor: Noise, noise: Noise) -> Noise:
+    """Return the sensor noise of both channels, with its coloured part where that exceeds MIN_COLOUR_RATIO.
+
+    A smaller coloured part varies from model to model; including it would move the floor between generations of a model.
+    """
+    return Noise(_with_colour(floor.angle, noise.coloured_angle), _with_colour(floor.rate, noise.coloured_rate))
+
+
+def resolution_floor(floor: Noise, errors: Noise) -> Noise:
+    """Return the smallest white noise that models are compared under: the floor, or a share of the base model's errors."""
+    return Noise(max(floor.angle, MIN_BASE_ERROR_SHARE * errors.angle), max(floor.rate, MIN_BASE_ERROR_SHARE * errors.rate))
+
+
+def is_noiseless(floor: Noise, least: Noise, records: Sequence[Record]) -> bool:
+    """Whether the noise floor is below the given least noise in every measured channel.
+
+    Every channel is asked for, because a jammed fin raises the error of the angle alone.
+    """
+    angle, rate = (any(bool(r.ok[channel].any()) for r in records) for channel in range(2))
+    return (least.angle > floor.angle or not angle) and (least.rate > floor.rate or not rate)
+
+
+def _with_colour(white: float, coloured: float) -> float:
+    return float(np.hypot(white, coloured)) if coloured > MIN_COLOUR_RATIO * white else white

@@ -1,0 +1,1 @@
+"""How models are compared: likelihood, predictive density, complexity penalty, acceptance rules."""

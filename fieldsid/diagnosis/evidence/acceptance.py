@@ -1,0 +1,93 @@
+"""The acceptance rules of an addition to a model: by its log evidence, and by the free-run errors.
+
+The log evidence holds the prior odds of what was added; the errors are those of training and of validation runs.
+"""
+
+from __future__ import annotations
+
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.models.model import Noise
+
+ALTERNATIVE_LOG_ODDS = 6.0
+"""Prior log odds against another kind of noise or another law of the speed than the usual: 400 to 1."""
+MIN_TRAINING_GAIN = 4.0
+"""Log likelihood on the training runs that an effect with nuisance parameters of each run must gain. On validation runs those
+parameters are fitted too, so that a gain there alone proves nothing. An effect without them must only not lose there."""
+MAX_ERROR_RATIO = 0.92
+"""Ratio the free-run error must fall to: a significant effect need not be important. Speed, trim and clock of a real vehicle
+always differ a little from the model's, which leaves a few percent of the noise."""
+MAX_VARIANT_ERROR_RATIO = 0.97
+"""Ratio the free-run error must fall to for another variant of an effect that has been accepted."""
+EXPLAINED_ERROR_RATIO = 1.02
+"""Error over the noise floor up to which the error counts as noise."""
+EQUAL_ERROR_RATIO = 1.03
+"""Ratio of two errors up to which two models predict equally well."""
+MAX_VALIDATION_ERROR_RATIO = 2.0
+"""Validation error over training error above which something besides a disturbance is missing: a disturbance is equal on both."""
+EXTRA_ERROR_RATIO_PER_EFFECT = 0.02
+"""By how much MAX_ERROR_RATIO is lowered for the third and each further effect: large sets of effects fit more by chance."""
+FAR_ERROR_RATIO = 4.0
+"""Error over the floor above which every leading addition is tried in its other variants: at such an error the textbook variant
+decides little."""
+MISSING_ERROR_RATIO = 1.5
+"""Error over the floor above which something is missing, even where no effect in its textbook variant gains evidence."""
+
+
+def is_accepted(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition gains log evidence and lowers the error."""
+    return gains_evidence(without, with_) and lowers_error(without, with_)
+
+
+def lowers_error(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition lowers the training or the validation error clearly, their product, and does not raise the latter.
+
+    Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
+    a model without the effect is low where its other parameters are biased towards those runs.
+    """
+    share = MAX_ERROR_RATIO - EXTRA_ERROR_RATIO_PER_EFFECT * max(0, len(with_.names) - 2)
+    unseen = with_.selection_errors.mean / without.selection_errors.mean
+    if not unseen < EQUAL_ERROR_RATIO:
+        return False
+    fitted = with_.train.mean / without.train.mean
+    return bool(min(unseen, fitted) < share and unseen * fitted < 1.0)
+
+
+def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition gains log evidence on the training runs alone."""
+    return bool(
+        with_.log_likelihood_by_run.sum() - with_.complexity_penalty
+        > without.log_likelihood_by_run.sum() - without.complexity_penalty
+    )
+
+
+def leaves_error(h: ScoredModel, floor: Noise) -> bool:
+    """Whether the error of a model exceeds the noise floor, from whatever cause."""
+    return max(h.selection_errors.over(floor), h.train.over(floor)) > EXPLAINED_ERROR_RATIO
+
+
+def variant_improves(plain: ScoredModel, formed: ScoredModel) -> bool:
+    """Whether another variant of the same effects gains evidence and lowers an error, and does not raise the validation error.
+
+    Of training and validation error one must fall clearly: on the other, an effect that is still missing may hide the
+    improvement.
+    """
+    unseen, fitted = formed.selection_errors.mean / plain.selection_errors.mean, formed.train.mean / plain.train.mean
+    return gains_evidence(plain, formed) and unseen < 1.0 and min(unseen, fitted) < MAX_VARIANT_ERROR_RATIO
+
+
+def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition gains log evidence over all runs, whatever happens to the free-run error."""
+    known = {e.name for e in without.effects}
+    own = any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
+    learned = float(with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()) > (MIN_TRAINING_GAIN if own else 0.0)
+    return learned and with_.log_evidence > without.log_evidence
+
+
+def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition gains log evidence on the training runs alone or over all runs."""
+    return gains_training_evidence(without, with_) or gains_evidence(without, with_)
+
+
+def validation_error_ratio(h: ScoredModel, floor: Noise) -> float:
+    """Return validation error over training error; 1 where there are no validation runs."""
+    return h.validation_errors.over(floor) / max(h.train.over(floor), 1.0) if h.validation else 1.0

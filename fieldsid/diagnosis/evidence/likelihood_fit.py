@@ -1,0 +1,145 @@
+"""Fits of one model (base and some effects) to the training runs: by output error and by maximum likelihood.
+
+Output error gives the free run. Maximum likelihood alternates generalised least squares of the parameters with an estimate of the
+noise model (disturbance moment, coloured sensor noise); its likelihood is what models are compared by. A model that lacks an
+effect needs a larger disturbance, which lowers its likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.fitting.covariance.noise_selection import residuals_of
+from fieldsid.fitting.initial.effect_screen import equivalent_solution
+from fieldsid.fitting.optimise.levenberg_marquardt import dynamics_of, levenberg_marquardt
+from fieldsid.fitting.optimise.residual_weights import white_weights
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
+from fieldsid.noise.whiten import noise_vector
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.rounding import nine_digits
+
+SINGLE_NOISE_KINDS, JOINT_NOISE = ("disturbance", "coloured"), "both"
+"""Kinds of noise that models are compared under, and both together."""
+MAX_ALTERNATIONS = 3
+MAX_GLS_ITERATIONS = 8
+MIN_LIKELIHOOD_GAIN = 0.5
+MAX_REMAINING_GAIN_RATIO = 10.0
+"""Largest gain in log likelihood of all iterations to come, in gains of the last one."""
+MAX_OUTPUT_ERROR_ITERATIONS = 25
+EQUAL_LOG_LIKELIHOOD = 1.0
+"""Difference in log likelihood within which two solutions of one model are equally good."""
+OUTPUT_ERROR_COST_TOLERANCE, LIKELIHOOD_COST_TOLERANCE = 1e-4, 1e-5
+"""Share of the sum of squares that an iteration must gain: of output error, whose errors are compared to a percent, and of
+generalised least squares, whose log likelihoods are compared to a half."""
+
+
+@dataclass(frozen=True, slots=True)
+class FittedProblem:
+    """A problem with its parameter vector x, and the white noise of each channel from the residuals at x."""
+
+    problem: Problem
+    x: FloatArray
+    weights: Noise
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of the model, in the order they were added."""
+        return self.problem.layout.effects
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(e.name for e in self.effects)
+
+
+@dataclass(frozen=True, slots=True)
+class LikelihoodFit:
+    """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there."""
+
+    fitted: FittedProblem
+    noise: Noise
+    log_likelihood: float
+    noise_kind: str
+    floor: Noise
+
+
+def fit_output_error(
+    problem: Problem,
+    start: FloatArray,
+    weights: Noise,
+    max_iterations: int = MAX_OUTPUT_ERROR_ITERATIONS,
+    tolerance: float = OUTPUT_ERROR_COST_TOLERANCE,
+) -> FittedProblem:
+    """Return the output-error fit from a start, reweighted once by its own residuals."""
+    found = levenberg_marquardt(problem, start, weights, max_iterations=max_iterations, tolerance=tolerance)
+    new = white_weights(problem, found.x)
+    if abs(np.log(new.angle / weights.angle)) + abs(np.log(new.rate / weights.rate)) > 0.1:
+        found = levenberg_marquardt(problem, found.x, new, max_iterations=max_iterations, tolerance=tolerance)
+        new = white_weights(problem, found.x)
+    return FittedProblem(problem, found.x, new)
+
+
+def fit_maximum_likelihood(
+    problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, rival: float = -np.inf
+) -> LikelihoodFit:  # fmt: skip
+    """Return the maximum-likelihood fit that starts from x.
+
+    Generalised least squares of the parameters and estimation of the noise alternate. `floor` is what the white part of the noise
+    stays near. The fit stops early where it cannot reach the log likelihood `rival`.
+    """
+    noise, likelihood = _noise_at(problem, x, start, floor, noise_kind)
+    for _ in range(MAX_ALTERNATIONS):
+        found = levenberg_marquardt(problem, x, noise, max_iterations=MAX_GLS_ITERATIONS, tolerance=LIKELIHOOD_COST_TOLERANCE)
+        new_noise, new = _noise_at(problem, found.x, noise, floor, noise_kind, wake=False)
+        if not new > likelihood:
+            break
+        gained, x, noise, likelihood = new - likelihood, found.x, new_noise, new
+        if gained < MIN_LIKELIHOOD_GAIN or likelihood + MAX_REMAINING_GAIN_RATIO * gained < rival:
+            break
+    return LikelihoodFit(FittedProblem(problem, x, white_weights(problem, x)), noise, likelihood, noise_kind, floor)
+
+
+def _noise_at(
+    problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, wake: bool = True
+) -> tuple[Noise, float]:  # fmt: skip
+    residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
+    return estimate_noise(problem.records, dynamics, residuals, noise_kind, start, floor=floor, reinitialise=wake)
+
+
+def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> LikelihoodFit:
+    """Return the likelier of a fit and its equivalent solution; of two equally likely ones, that with the smaller coefficient.
+
+    The equivalent solution has the same response at one speed (see `Effect.equivalent_solution`).
+    """
+    problem = ml_fit.fitted.problem
+    other = equivalent_solution(problem, ml_fit.fitted.x, effect)
+    if other is None:
+        return ml_fit
+    twin = fit_maximum_likelihood(problem, other, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)
+    place = problem.layout.names.index(effect.coefficients[0].name)
+    if abs(twin.log_likelihood - ml_fit.log_likelihood) < EQUAL_LOG_LIKELIHOOD:
+        return min(ml_fit, twin, key=lambda j: nine_digits(j.fitted.x[place]))
+    return twin if twin.log_likelihood > ml_fit.log_likelihood else ml_fit
+
+
+def likelihood_at(problem: Problem, x: FloatArray, ml_fit: LikelihoodFit) -> float:
+    """Return the log likelihood of other parameters of a model, under the likeliest noise of its kind for these parameters."""
+    return _noise_at(problem, x, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)[1]
+
+
+def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArray:
+    """Return each run's log likelihood, (R,)."""
+    residuals, dynamics, vector = residuals_of(problem, x), dynamics_of(problem, x), noise_vector(noise)
+    return np.array([log_likelihood([r], [d], [e], vector) for r, d, e in zip(problem.records, dynamics, residuals, strict=True)])
+
+
+def measured_count(records: Sequence[Record]) -> int:
+    """Return the number of measured values."""
+    return int(sum(r.angle_ok.sum() + r.rate_ok.sum() for r in records))

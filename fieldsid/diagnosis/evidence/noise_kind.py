@@ -1,0 +1,95 @@
+"""Kinds of noise that models are compared under: a disturbance moment, coloured sensor noise, or both together.
+
+Some logs hold both. A disturbance moves angle and rate together, the angle as the integral of the rate; coloured sensor noise is
+independent in each channel. So the data tell them apart: without sensor colour, adding it gains no likelihood, whatever is
+missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from fieldsid.diagnosis.data.noise_floor import MIN_COLOUR_RATIO, reported_noise_floor
+from fieldsid.diagnosis.evidence.acceptance import ALTERNATIVE_LOG_ODDS
+from fieldsid.diagnosis.evidence.likelihood_fit import (
+    JOINT_NOISE,
+    MIN_LIKELIHOOD_GAIN,
+    SINGLE_NOISE_KINDS,
+    FittedProblem,
+    LikelihoodFit,
+    fit_maximum_likelihood,
+)
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.models.model import Noise
+
+
+def fit_base(
+    fitted: FittedProblem, floor: Noise, resolution_floor: Noise, noise_kind: str, parallel: ParallelMap
+) -> LikelihoodFit:
+    """Return the base model under the likeliest kind of noise, or the one given, and under both together where that is likelier.
+
+    White noise is a member of every kind: a later kind is taken only where it gains more than MIN_LIKELIHOOD_GAIN.
+    """
+    best, *others = parallel.map(
+        lambda f: fit_maximum_likelihood(fitted.problem, fitted.x, floor, resolution_floor, f),
+        (noise_kind,) if noise_kind else SINGLE_NOISE_KINDS,
+    )
+    for other in others:
+        best = other if other.log_likelihood > best.log_likelihood + MIN_LIKELIHOOD_GAIN else best
+    return joint_noise_fit(best, parallel) if has_sensor_colour(best) else best
+
+
+def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:
+    """Return the fit of a model under disturbance and sensor colour together, where that is likelier on the training runs.
+
+    The parameters are refitted too: one kind of noise that has to stand for both biases them.
+    """
+    if own.noise_kind == JOINT_NOISE:
+        return own
+    problem = own.fitted.problem
+    other = fit_maximum_likelihood(
+        problem, own.fitted.x, own.noise, own.floor, next(f for f in SINGLE_NOISE_KINDS if f != own.noise_kind)
+    )
+    if not (has_sensor_colour(own) or has_sensor_colour(other)):
+        return own
+    # from what one kind alone has taken of both there may be no way back: from each of them
+    least = own.log_likelihood + ALTERNATIVE_LOG_ODDS
+    ends = parallel.map(
+        lambda j: fit_maximum_likelihood(problem, j.fitted.x, j.noise, own.floor, JOINT_NOISE, rival=least), (own, other)
+    )
+    both = max(ends, key=lambda j: j.log_likelihood)
+    return both if both.log_likelihood > least else own
+
+
+def fit_other_noise(
+    h: ScoredModel, floor: Noise, noise_kinds_tried: Collection[str], parallel: ParallelMap
+) -> LikelihoodFit | None:
+    """Return a model under a kind of noise that no search has used yet, where that is likelier; None where none is.
+
+    Both kinds together are tried only where the sensor noise of the fit is coloured.
+    """
+    own = h.likelihood_fit
+    for noise_kind in (f for f in SINGLE_NOISE_KINDS if f not in noise_kinds_tried):
+        ml_fit = fit_maximum_likelihood(own.fitted.problem, own.fitted.x, floor, own.floor, noise_kind)
+        if ml_fit.log_likelihood > own.log_likelihood + ALTERNATIVE_LOG_ODDS:
+            return ml_fit
+    if JOINT_NOISE in noise_kinds_tried or not has_sensor_colour(own):
+        return None
+    both = joint_noise_fit(own, parallel)
+    return None if both is own else both
+
+
+def has_sensor_colour(ml_fit: LikelihoodFit) -> bool:
+    """Whether the coloured sensor noise exceeds MIN_COLOUR_RATIO times the white one."""
+    noise, floor = ml_fit.noise, ml_fit.floor
+    return noise.coloured_angle > MIN_COLOUR_RATIO * floor.angle or noise.coloured_rate > MIN_COLOUR_RATIO * floor.rate
+
+
+def sensor_noise(floor: Noise, base: ScoredModel | None) -> Noise:
+    """Return the noise floor, with the sensors' coloured noise where the base was fitted under both kinds together."""
+    return (
+        reported_noise_floor(floor, base.likelihood_fit.noise)
+        if base is not None and base.likelihood_fit.noise_kind == JOINT_NOISE
+        else floor
+    )

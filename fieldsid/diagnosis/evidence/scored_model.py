@@ -1,0 +1,276 @@
+"""A fitted model with its free-run errors and its log evidence, by which models are ranked.
+
+    log evidence = log L(training runs) + log p(validation runs | training runs) - 1/2 k log N - prior log odds
+The first and third terms are the Schwarz approximation of the evidence of the training runs, the second is the predictive density
+of the validation runs. The prior log odds are those against each effect, and against each variant other than the textbook's.
+Source: Schwarz 1978, Annals of Statistics 6(2); Kass and Raftery 1995, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.likelihood_fit import (
+    MIN_LIKELIHOOD_GAIN,
+    FittedProblem,
+    LikelihoodFit,
+    fit_maximum_likelihood,
+    fit_output_error,
+    likelihood_at,
+    likelihood_by_run,
+    measured_count,
+)
+from fieldsid.diagnosis.evidence.predictive_density import ValidationRun, log_predictive_density, parameter_jacobian
+from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
+from fieldsid.fitting.predict.predict import frozen_problem, refit_nuisances, with_command_timing
+from fieldsid.fitting.predict.speed_correction import correct_speed, speed_sensitivity
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Effect, definitions_of
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record
+from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.numerics.arrays import FloatArray
+
+EFFECT_LOG_ODDS = 6.0
+"""Prior log odds against one effect of the catalogue, and against a variant other than the textbook's: 400 to 1, as dozens of
+both are tried."""
+
+ValidationFits = tuple[tuple[Problem, FloatArray], ...]
+
+
+@dataclass(frozen=True)
+class ScoredModel:
+    """A maximum-likelihood fit with its log likelihood by run, predictive density, penalty, and validation fits.
+
+    `output_error_fit` is the fit by output error, where its free run predicts the validation runs better.
+    """
+
+    likelihood_fit: LikelihoodFit
+    log_likelihood_by_run: FloatArray
+    validation_log_density: FloatArray
+    complexity_penalty: float
+    validation: tuple[Record, ...]
+    validation_fits: ValidationFits
+    output_error_fit: FittedProblem | None = None
+
+    @property
+    def reported_fit(self) -> FittedProblem:
+        """The fit whose free run is reported."""
+        return self.output_error_fit or self.likelihood_fit.fitted
+
+    @property
+    def model(self) -> Model:
+        """The model of the reported fit."""
+        fitted = self.reported_fit
+        return bare_model(fitted.problem, fitted.x, self.likelihood_fit.noise)
+
+    @property
+    def errors(self) -> Pair:
+        """Errors on the training and on the validation runs, each run with its own start refitted."""
+        return Pair(self.train, self.validation_errors)
+
+    @cached_property
+    def train(self) -> Errors:
+        """Errors on the training runs."""
+        return training_errors(self.reported_fit)
+
+    @cached_property
+    def validation_errors(self) -> Errors:
+        """Errors on the validation runs."""
+        flown = (
+            self.validation_fits
+            if self.output_error_fit is None
+            else validation_fits(self.model, self.output_error_fit, self.validation)
+        )
+        return validation_errors(flown, self.validation)
+
+    @property
+    def selection_errors(self) -> Errors:
+        """The errors that models are selected by: on the validation runs, or on the training runs where there are none."""
+        return self.validation_errors if self.validation else self.train
+
+    def evaluate_errors(self, *, fitted: bool = False) -> ScoredModel:
+        """Return itself with the selection errors computed, so that the process that fitted it computes them too.
+
+        `fitted`: the errors on the training runs as well.
+        """
+        _ = self.errors if fitted else self.selection_errors
+        return self
+
+    @property
+    def likelihood_model(self) -> Model:
+        """The model of the maximum-likelihood fit."""
+        return bare_model(self.likelihood_fit.fitted.problem, self.likelihood_fit.fitted.x, self.likelihood_fit.noise)
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects of the model."""
+        return self.likelihood_fit.fitted.effects
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return self.likelihood_fit.fitted.names
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence up to a constant that all models share."""
+        return float(self.log_likelihood_by_run.sum() + self.validation_log_density.sum() - self.complexity_penalty)
+
+
+def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredModel:
+    """Return a maximum-likelihood fit with its log likelihood by training run and log predictive density by validation run."""
+    problem, x = ml_fit.fitted.problem, ml_fit.fitted.x
+    flown = validation_fits(bare_model(problem, x, ml_fit.noise), ml_fit.fitted, validation)
+    return ScoredModel(
+        ml_fit,
+        likelihood_by_run(problem, x, ml_fit.noise),
+        validation_log_density(ml_fit, validation, flown),
+        bic_penalty(ml_fit, validation),
+        tuple(validation),
+        flown,
+    )
+
+
+def validation_fits(model: Model, fitted: FittedProblem, validation: Sequence[Record]) -> ValidationFits:
+    """Return the one-run problems of the validation runs: the model's values fixed, each run's nuisances fitted."""
+    return tuple(with_command_timing(*frozen_problem(model, record, fitted.effects), model.noise) for record in validation)
+
+
+def validation_log_density(ml_fit: LikelihoodFit, validation: Sequence[Record], flown: ValidationFits) -> FloatArray:
+    """Return each validation run's log predictive density, (R,)."""
+    if not validation:
+        return np.zeros(0)
+    runs = [
+        ValidationRun(
+            p,
+            x,
+            free_run_residual(p, x),
+            parameter_jacobian(ml_fit, p, r.speed),
+            speed_sensitivity(p, x, r.speed),
+            p.linearise(x, 0),
+        )
+        for (p, x), r in zip(flown, validation, strict=True)
+    ]
+    return log_predictive_density(ml_fit, runs, validation)
+
+
+def free_run_residual(problem: Problem, x: FloatArray, run: int = 0) -> FloatArray:
+    """Return the residual (2, n) of a run; where the motion grows without bound, the measurement less its median.
+
+    A model that diverges predicts nothing: its error is that of a model without any motion.
+    """
+    residual, _ = problem.residual(x, run)
+    if np.isfinite(residual).all():
+        return residual
+    r = problem.records[run]
+    return np.stack([np.where(ok, v - (np.median(v[ok]) if ok.any() else 0.0), 0.0) for v, ok in zip(r.both, r.ok, strict=True)])
+
+
+def prefer_output_error(
+    h: ScoredModel, floor: Noise, parent: ScoredModel | None = None, known: Sequence[FittedProblem] = ()
+) -> ScoredModel:
+    """Return the model with its output-error fit, where that predicts the validation runs better.
+
+    Generalised least squares is efficient for a model that is right, and may have the worse free run for one that is not. The
+    output-error fit must not raise the cost under the parent's noise: a gyro scale that improves the rate alone raises the cost
+    of the heading. `known` are output-error fits found before. Where the output-error fit has the higher likelihood too, the
+    first one had ended at a local minimum, and maximum likelihood is started again from there.
+    """
+    fitted, names = h.likelihood_fit.fitted, h.likelihood_fit.fitted.problem.layout.names
+    free = [fit_output_error(fitted.problem, fitted.x, fitted.weights), *(t for t in known if t.problem.layout.names == names)]
+    other = replace(h, output_error_fit=min(free, key=lambda t: t.weights.angle * t.weights.rate))
+    if other.selection_errors.over(floor) >= h.selection_errors.over(floor) or (
+        parent is not None and _contradicts(other, parent)
+    ):
+        return h
+    flown, ml_fit = other.reported_fit, h.likelihood_fit
+    if likelihood_at(flown.problem, flown.x, ml_fit) < ml_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
+        return other
+    again = fit_maximum_likelihood(flown.problem, flown.x, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)
+    h = score_model(again, h.validation)
+    other = replace(h, output_error_fit=flown)
+    return other if other.selection_errors.over(floor) < h.selection_errors.over(floor) else h
+
+
+def _contradicts(h: ScoredModel, parent: ScoredModel) -> bool:
+    costs = (cost_of(t.problem, t.x, parent.likelihood_fit.noise) for t in (h.reported_fit, parent.reported_fit))
+    return bool(next(costs) > next(costs))
+
+
+def validation_errors(flown: ValidationFits, validation: Sequence[Record]) -> Errors:
+    """Return the errors on the validation runs, each run's speed and start refitted."""
+    left = []
+    for (flown_problem, start), record in zip(flown, validation, strict=True):
+        floor = white_noise_floor([record])
+        problem, x, _ = correct_speed(flown_problem, start, floor)
+        left.append(free_run_residual(problem, refit_nuisances(problem, x, 0, floor, rescan=False)))
+    return pooled_errors(validation, left)
+
+
+def training_errors(fitted: FittedProblem) -> Errors:
+    """Return the errors of a fit on the training runs, each run's start refitted."""
+    problem = fitted.problem
+    left = []
+    for run, record in enumerate(problem.records):
+        left.append(
+            free_run_residual(problem, refit_nuisances(problem, fitted.x, run, white_noise_floor([record]), rescan=False), run)
+        )
+    return pooled_errors(problem.records, left)
+
+
+def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
+    """Return the prior log odds and 1/2 k log N.
+
+    Shared coefficients and authorities beyond the first count once, nuisances once for every run they fit.
+
+    The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
+    """
+    layout, records = ml_fit.fitted.problem.layout, ml_fit.fitted.problem.records
+    own = sum(len(e.nuisance) for e in layout.effects)
+    hidden = sum(1 for e in layout.effects if e.extra_states)
+    count = sum(len(e.shared) for e in layout.effects) + (0 if layout.groups.by_law else len(layout.groups.speeds) - 1)
+    total = sum(EFFECT_LOG_ODDS * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects) + 0.5 * count * np.log(
+        measured_count(records)
+    )
+    for record in (*records, *validation):
+        total += 0.5 * own * np.log(max(measured_count([record]), 2)) + hidden
+    return float(total)
+
+
+def pooled_errors(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
+    """Return the pooled rms of residuals (2, n) over the measured samples of all runs, and that of each run."""
+    each = tuple(_pooled([r], [e]) for r, e in zip(records, residuals, strict=True))
+    return replace(_pooled(records, residuals), each=each)
+
+
+def _pooled(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
+    values = []
+    for channel in range(2):
+        ok = [r.ok[channel] for r in records]
+        squares = sum(float(np.sum(e[channel][m] ** 2)) for e, m in zip(residuals, ok, strict=True))
+        count = sum(int(m.sum()) for m in ok)
+        values.append(float(np.sqrt(squares / count)) if count else float("nan"))
+    return Errors(values[0], values[1])
+
+
+def bare_model(problem: Problem, x: FloatArray, noise: Noise) -> Model:
+    """Return the model of a vector without covariance, for simulation only."""
+    layout = problem.layout
+    values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    return Model(
+        axis=layout.axis,
+        effects=tuple(e.name for e in layout.effects),
+        values=values,
+        units={s.name: s.unit for s in layout.parameters[: layout.shared]},
+        free=(),
+        covariance=np.zeros((0, 0)),
+        law=layout.law(values),
+        noise=noise,
+        own=definitions_of(layout.effects),
+    )

@@ -1,0 +1,95 @@
+"""A parallel map over this process and a forked worker, where the system has a second core and can fork.
+
+Results refer to the records and effects that both processes hold instead of copying them.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterable, Sequence
+from io import BytesIO
+from typing import Any, TypeVar
+
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Effect, variant_of, with_variant
+from fieldsid.models.record import Record
+from fieldsid.runtime import evaluation_counter
+from fieldsid.runtime.worker_pool import WorkerPickler, dumps, parallel_map
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class ParallelMap:
+    """The objects that two processes share: records by their place, effects by their name."""
+
+    def __init__(self, records: Iterable[Record], effects: Iterable[Effect]) -> None:
+        self.records = tuple(records)
+        self.effects = {e.name: e for e in effects}
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """Return a function of every item as `worker_pool.parallel_map` does, and count the worker's evaluations."""
+        before = evaluation_counter.evaluations()
+
+        def read(answer: bytes) -> dict[int, R]:
+            done, worked_out = self.loads(answer)
+            evaluation_counter.count_evaluation(worked_out)
+            return dict(done)
+
+        return parallel_map(function, items, lambda done: self.dumps((done, evaluation_counter.evaluations() - before)), read)
+
+    def dumps(self, value: object) -> bytes:
+        """Return a value as bytes that `loads` reads."""
+        return dumps(value, lambda out: _Writer(out, self))
+
+    def loads(self, answer: bytes) -> Any:
+        """Return the value that `dumps` was given, with the shared records and effects themselves in it."""
+        return _Reader(BytesIO(answer), self).load()
+
+
+class _Writer(WorkerPickler):
+    def __init__(self, out: BytesIO, known: ParallelMap) -> None:
+        super().__init__(out)
+        self.places = {id(r): i for i, r in enumerate(known.records)}
+        self.effects = known.effects
+
+    def persistent_id(self, obj: object) -> tuple[str, object] | None:
+        """Return the reference to a shared record or effect, None for anything else."""
+        if isinstance(obj, Record) and id(obj) in self.places:
+            return "record", self.places[id(obj)]
+        if isinstance(obj, Effect) and obj.name in self.effects:
+            names = tuple(c.name for c in obj.coefficients)
+            same = with_coefficients(self.effects[obj.name], names)
+            return ("effect", (obj.name, names)) if same is not None and same.coefficients == obj.coefficients else None
+        return None
+
+    def reducer_override(self, obj: object) -> Any:
+        """Return how a problem is built again without its cached arrays, and anything else as the base class does."""
+        if isinstance(obj, Problem):
+            return Problem, (obj.records, obj.layout)
+        return super().reducer_override(obj)
+
+
+class _Reader(pickle.Unpickler):
+    def __init__(self, stream: BytesIO, known: ParallelMap) -> None:
+        super().__init__(stream)
+        self.known = known
+
+    def persistent_load(self, pid: tuple[str, Any]) -> object:
+        """Return the record or effect of a reference, an effect in the variant that has these coefficients."""
+        kind, what = pid
+        if kind == "record":
+            return self.known.records[what]
+        name, coefficients = what
+        effect = with_coefficients(self.known.effects[name], coefficients)
+        if effect is None:
+            raise pickle.UnpicklingError(f"no form of {name} has {', '.join(coefficients)}")
+        return effect
+
+
+def with_coefficients(effect: Effect, names: tuple[str, ...]) -> Effect | None:
+    """Return an effect in the variant that has coefficients of these names, the effect itself where they are its own."""
+    if names == tuple(c.name for c in effect.coefficients):
+        return effect
+    form = variant_of(effect, names)
+    return None if form is None else with_variant(effect, form)

@@ -1,0 +1,44 @@
+"""The model that is written to a file: the values of the reported fit, with their covariance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.estimators.output_error import coloured_covariance
+from fieldsid.fitting.fit import model_of
+from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_marquardt, normal_equations
+from fieldsid.fitting.optimise.residual_weights import white_weights
+from fieldsid.fitting.predict.predict import refit_nuisances
+from fieldsid.fitting.problem.estimator import Solution, shared_covariance
+from fieldsid.models.model import Model
+from fieldsid.noise.white_floor import white_noise_floor
+
+
+def final_model(h: ScoredModel) -> Model:
+    """Return the model whose errors a scored model reports.
+
+    It is the maximum-likelihood one, or the output-error one where that predicts the validation runs better, with its covariance
+    under the noise of the maximum-likelihood fit.
+    """
+    fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
+    problem, layout = fitted.problem, fitted.problem.layout
+    x = fitted.x.copy()
+    x[: layout.shared] = [h.model.values[n] for n in layout.names]
+    if np.array_equal(x, fitted.x):
+        return _by_likelihood(h)
+    for run, record in enumerate(problem.records):
+        x = refit_nuisances(problem, x, run, white_noise_floor([record]))
+    weights = white_weights(problem, x)
+    found = levenberg_marquardt(problem, x, weights, max_iterations=0)
+    full = coloured_covariance(problem, found, weights, noise)
+    return model_of(problem, Solution(found.x, shared_covariance(problem, full, found.free), noise, "output_error"))
+
+
+def _by_likelihood(h: ScoredModel) -> Model:
+    """Return the model of the maximum-likelihood fit with its covariance."""
+    fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
+    slots = tuple(range(len(fitted.x)))
+    _, normal, _, _ = normal_equations(fitted.problem, fitted.x, noise, slots)
+    solution = Solution(fitted.x, shared_covariance(fitted.problem, covariance(normal), slots), noise, "pem")
+    return model_of(fitted.problem, solution)

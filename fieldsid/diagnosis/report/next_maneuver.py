@@ -1,0 +1,74 @@
+"""The next maneuver: one that tells the rivals apart, or excites what these runs could not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.verdict import SUFFICIENT_ERROR_RATIO, Verdict
+from fieldsid.errors import FieldsidError
+from fieldsid.models.effect import effect_named
+from fieldsid.models.model import Noise
+
+MOST_RIVALS = 3
+MIN_LOG_ODDS = 3.0
+"""Log odds below which a maneuver is not worth a dive: 20 to 1 for the right one."""
+
+
+def next_maneuver(
+    search: Search, verdict: Verdict, found: ScoredModel, skipped: Mapping[str, str], floor: Noise
+) -> dict[str, Any] | None:
+    """Return the next maneuver; None where no question is open.
+
+    For rivals it is the maneuver, within the fin angles already flown, whose refitted predictions differ most. A signal that the
+    logs lack is asked for only where the named effects leave an error above the noise floor.
+    """
+    if verdict.word == "undecided":
+        return _deciding(search, [found, *verdict.rivals][:MOST_RIVALS])
+    if verdict.word == "unexplained":
+        return {
+            "maneuver": "repeat the run",
+            "why": "what comes back at the same fin is the vehicle, what does not is the sea or a fault",
+        }
+    left = found.selection_errors.over(floor)
+    if skipped and verdict.word == "effect" and left > SUFFICIENT_ERROR_RATIO:
+        name = min(skipped)
+        why = f"{left:.2f} x the noise floor is left, and {name} could not be tried: {skipped[name]}"
+        return {"maneuver": "log the missing signal", "why": why}
+    return None
+
+
+def _deciding(search: Search, rivals: list[ScoredModel]) -> dict[str, Any]:
+    from fieldsid.planning.discriminate.discriminate import separate
+    from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
+
+    names = list(dict.fromkeys(n for h in rivals for n in h.names if n not in search.known))
+    command = {"separates": names, "command": f"sysid plan --separate {','.join('+'.join(h.names) for h in rivals)}"}
+    fin = min(max(float(np.max(np.abs(r.fin - np.median(r.fin)))) for r in search.records), LARGEST_FIN)
+    speeds = [r.speed for r in search.records if np.isfinite(r.speed)]
+    try:
+        found = separate(
+            [h.likelihood_model for h in rivals], Envelope(fin), speeds=(float(np.median(speeds)) if speeds else 1.0,), fast=True
+        )
+    except FieldsidError as error:
+        # nothing inside the limits separates them: what the effects themselves declare is still worth flying
+        return {**_declared(names), **command, "note": error.what}
+    odds = found.expected_log_odds
+    if odds < MIN_LOG_ODDS:
+        tried = f"no maneuver inside the fin angles flown is expected to give log odds of more than {odds:.1f} for the right one"
+        return {**_declared(names), **command, "expected_log_odds": odds, "note": tried}
+    return {**found.plain(), **command, "why": f"expected log odds {odds:.0f} for the right one"}
+
+
+def _declared(names: list[str]) -> dict[str, Any]:
+    """Return the maneuver that most of some effects declare to be excited by."""
+    votes: dict[str, int] = {}
+    for name in names:
+        for rank, maneuver in enumerate(effect_named(name).excited_by):
+            votes[maneuver] = votes.get(maneuver, 0) + 10 - rank
+    best = max(votes, key=lambda m: votes[m])
+    return {"maneuver": best, "why": f"it excites {', '.join(n for n in names if best in effect_named(n).excited_by)}"}

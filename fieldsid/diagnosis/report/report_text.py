@@ -1,0 +1,92 @@
+"""The sentences of a diagnosis, each with its number."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from fieldsid.diagnosis.evidence.acceptance import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, validation_error_ratio
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
+from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.verdict import Verdict, excess_explained, worsens
+from fieldsid.models.effect import effect_named, variant_of
+from fieldsid.models.model import Noise
+
+DISTURBED = 1e-5
+"""Disturbance moment, in rad/s^2, above which the report mentions it."""
+
+
+def over(search: Search, h: ScoredModel, floor: Noise) -> float:
+    """Return a model's selection error over a noise floor."""
+    return h.selection_errors.over(floor)
+
+
+def evidence(search: Search, h: ScoredModel, errors: Pair, floor: Noise, gain: float) -> str:
+    """Return what speaks for or against a model with these errors and this log evidence over the base, in one sentence."""
+    base = search.base()
+    kind = "unseen runs" if search.validation else "the runs it was fitted to"
+    fall = f"error on {kind} {over(search, base, floor):.2f} -> {over(search, h, floor):.2f} x noise floor"
+    share = f"{fall} ({100 * excess_explained(search, h, floor):.0f} % of the excess)"
+    said = f"makes it worse: {fall}" if worsens(search, h, floor) else share
+    lower, total = lower_on(errors, base.errors, floor)
+    return f"{said}; log evidence {gain:+.1f}; error lower on {lower} of {total} runs"
+
+
+def lower_on(errors: Pair, base: Pair, floor: Noise) -> tuple[int, int]:
+    """Return on how many training and validation runs the error falls by more than EQUAL_ERROR_RATIO, and of how many."""
+    pairs = list(zip((*errors.train.each, *errors.validation.each), (*base.train.each, *base.validation.each), strict=True))
+    return sum(EQUAL_ERROR_RATIO * now.over(floor) < was.over(floor) for now, was in pairs), len(pairs)
+
+
+def headline(search: Search, verdict: Verdict, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
+    """Return the verdict in a sentence."""
+    error, base = over(search, found, floor), over(search, search.base(), floor)
+    runs = "unseen runs" if search.validation else "the runs it was fitted to"
+    if verdict.word == "sufficient":
+        tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
+        return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
+    if verdict.word == "disturbed":
+        size = _sized(search, search.base(), base)
+        return f"no effect of the catalogue is missing: what is left, {size}, is {_disturbance(noise)}"
+    if verdict.word == "unexplained":
+        worse = validation_error_ratio(search.base(), search.floor)
+        return (
+            f"something is there that is not in the catalogue: error {_sized(search, search.base(), base)}, most of it in "
+            f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
+            f"it moves with {left.moves_with}"
+            + (f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else "")
+        )
+    names = " and ".join(verdict.effects)
+    says = "; ".join(_says(found, n) for n in verdict.effects)
+    fall = f"the error on {runs} falls from {_sized(search, search.base(), base)} to {_sized(search, found, error)}"
+    if verdict.word == "undecided":
+        others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
+        return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
+    return f"{names} ({says}): {fall}"
+
+
+def _disturbance(noise: Noise) -> str:
+    """Return what disturbs in words: a moment on the hull, or sensors that wander."""
+    if noise.disturbance > DISTURBED:
+        lasts = f"{noise.disturbance:.2g} rad/s^2 with a time constant of {noise.disturbance_time:.2g} s"
+        return f"a disturbance moment of {lasts} that does not follow the fin or the motion"
+    wander = f"{noise.coloured_angle:.2g} rad and {noise.coloured_rate:.2g} rad/s"
+    return f"sensors that wander by {wander} with a time constant of {noise.coloured_time:.2g} s"
+
+
+def _says(h: ScoredModel, name: str) -> str:
+    """Return what an effect of a model does, with its variant where that is not the textbook's."""
+    effect = effect_named(name)
+    fitted = {c.name for e in h.effects if e.name == name for c in e.coefficients}
+    form = variant_of(effect, fitted)
+    return effect.says if form is None else f"{effect.says}: {form.says}"
+
+
+def _sized(search: Search, h: ScoredModel, error: float) -> str:
+    """Return an error in words: over the noise floor, or in its own units where the logs show almost no noise."""
+    if not search.is_noiseless:
+        return f"{error:.2f} x the noise floor"
+    errors = h.selection_errors
+    parts = [(errors.angle_rms_rad, "rad"), (errors.rate_rms_rad_s, "rad/s")]
+    return " and ".join(f"{value:.2g} {unit}" for value, unit in parts if isfinite(value))

@@ -1,0 +1,218 @@
+"""Moves that add one effect to a model: which effects are worth fitting, and from which start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, fit_output_error
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.fitting.initial.effect_screen import (
+    Linearisation,
+    ScreenResult,
+    backtrack,
+    linearise_at,
+    scan_points,
+    screen_points,
+    with_effect,
+)
+from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
+from fieldsid.models.effect import Effect, Stage
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import BoolArray, FloatArray
+
+MAX_EFFECTS_AT_BASE, MAX_EFFECTS_LATER = 5, 4
+"""Effects that pass each of the two screens, that of the free run's error and that of the whitened error: of the base, and of a
+model with effects."""
+MIN_WHITENED_COST_FALL, MIN_OUTPUT_ERROR_COST_SHARE = 5.0, 0.02
+"""Fall of the whitened sum of squares, and share of the output-error sum of squares, below which an effect does not pass the
+screen."""
+MIN_ITERATED_COST_SHARE = 0.05
+"""Share of the output-error sum of squares that a move must have removed after its iterations; an accepted effect removes three
+times that."""
+EXTRA_ITERATED_EFFECTS, SCREEN_ITERATIONS = 3, 4
+"""Effects beyond `most` that the output-error screen iterates: far from the solution a first-order prediction is unreliable."""
+MAX_ITERATED_POINTS = 4
+"""Scan points of an effect that are iterated."""
+MIN_EVENT_SEPARATION_SHARE = 0.1
+"""Share of a run by which two times of an event must differ to be two separate starts."""
+MAX_TIME_SHIFTS, TIME_SHIFT_ITERATIONS = 3, 12
+"""Time shifts that are iterated, and the iterations of each."""
+
+
+@dataclass(frozen=True, slots=True)
+class SearchMove:
+    """A screened effect, the linearisation it was screened on, and whether output error is fitted from it first."""
+
+    screened: ScreenResult
+    linearisation: Linearisation
+    by_output_error: bool
+
+
+def add_effect(
+    parent: ScoredModel, left: Sequence[Effect], most: int | None, parallel: ParallelMap, *, anew: bool, flown: bool
+) -> list[SearchMove]:
+    """Return the moves worth evaluating: the `most` best of two screens, by output-error cost and by whitened cost.
+
+    All starts of every effect where `most` is None. `anew`: time shifts are tried too, because a base model that lacks one has
+    biased parameters (see `_iterate_time_shift`). `flown`: the output-error screen was done before, and is left out.
+    """
+    grounds = (
+        [(_likelihood_linearisation(parent), False)]
+        if flown
+        else [(_output_error_linearisation(parent), True), (_likelihood_linearisation(parent), False)]
+    )
+    # both screens at once, then all that is to be followed at once: each sharing out costs a copy of the process
+    asked = [(linearisation, effect) for linearisation, _ in grounds for effect in left]
+    points = parallel.map(lambda of: _best_points(*of), asked)
+    steps: list[_PendingMove] = []
+    for i, (linearisation, plain) in enumerate(grounds):
+        screened_points = sorted(points[i * len(left) : (i + 1) * len(left)], key=lambda points: points[0].predicted_cost)
+        worth = MIN_OUTPUT_ERROR_COST_SHARE * linearisation.cost if plain else MIN_WHITENED_COST_FALL
+        kept = (
+            screened_points
+            if most is None
+            else [
+                p
+                for p in screened_points[: most + plain * EXTRA_ITERATED_EFFECTS]
+                if linearisation.cost - p[0].predicted_cost > worth
+            ]
+        )
+        follows = plain and most is not None
+        steps += [
+            _PendingMove(linearisation, plain, follows, partial(iterate_points if follows else _backtracked, linearisation, p))
+            for p in kept
+        ]
+        if plain and anew:
+            steps += [
+                _PendingMove(linearisation, plain, False, partial(_iterate_time_shift, linearisation, e))
+                for e in left
+                if shifts_time(e)
+            ]
+    taken = list(zip(steps, parallel.map(lambda step: step.evaluate(), steps), strict=True))
+    best = sorted(
+        (SearchMove(p, s.linearisation, s.by_output_error) for s, p in taken if s.is_iterated),
+        key=lambda move: move.screened.predicted_cost,
+    )
+    found = best[:most] + [SearchMove(p, s.linearisation, s.by_output_error) for s, p in taken if not s.is_iterated]
+    return found if most is None else [w for w in found if not w.by_output_error or w is found[0] or _matters(w)]
+
+
+def _matters(move: SearchMove) -> bool:
+    """Whether a move of the output-error screen has removed a relevant share of the sum of squares after its iterations."""
+    return move.linearisation.cost - move.screened.predicted_cost > MIN_ITERATED_COST_SHARE * move.linearisation.cost
+
+
+@dataclass(frozen=True, slots=True)
+class _PendingMove:
+    """The computation that a move still needs: some iterations, to be ranked by their cost, or a backtracked start."""
+
+    linearisation: Linearisation
+    by_output_error: bool
+    is_iterated: bool
+    evaluate: Callable[[], ScreenResult]
+
+
+def by_effect(found: Sequence[SearchMove]) -> list[list[SearchMove]]:
+    """Return the moves grouped by effect, in their order."""
+    groups: dict[str, list[SearchMove]] = {}
+    for move in found:
+        groups.setdefault(move.screened.effect.name, []).append(move)
+    return list(groups.values())
+
+
+def is_redundant_start(move: SearchMove, parent: ScoredModel, known: ScoredModel) -> bool:
+    """Whether another start of the same model has reached the cost this move predicts, with its events at similar times."""
+    fitted, cost = known.likelihood_fit.fitted, move.screened.predicted_cost
+    if fitted.problem.layout.names == move.screened.problem.layout.names and _starts_apart(move.screened, fitted.x):
+        return False
+    if move.by_output_error:
+        return cost_of(fitted.problem, fitted.x, move.linearisation.noise) < (1.0 + MIN_OUTPUT_ERROR_COST_SHARE) * cost
+    return (
+        known.likelihood_fit.log_likelihood - parent.likelihood_fit.log_likelihood
+        > 0.5 * (move.linearisation.cost - cost) - MIN_LIKELIHOOD_GAIN
+    )
+
+
+def _starts_apart(screened: ScreenResult, x: FloatArray) -> bool:
+    """Whether an event of a run starts so far from where x has it that one would not converge to the other."""
+    events = {c.name for c in screened.effect.nuisance if c.unit == "run"}
+    slots = screened.problem.layout.parameters
+    return any(
+        abs(a - b) > MIN_EVENT_SEPARATION_SHARE for s, a, b in zip(slots, screened.start, x, strict=True) if s.name in events
+    )
+
+
+def _output_error_linearisation(parent: ScoredModel) -> Linearisation:
+    fitted = parent.likelihood_fit.fitted
+    free_run = parent.output_error_fit or fit_output_error(fitted.problem, fitted.x, fitted.weights)
+    return linearise_at(free_run.problem, free_run.x, free_run.weights)
+
+
+def _likelihood_linearisation(parent: ScoredModel) -> Linearisation:
+    fitted = parent.likelihood_fit.fitted
+    return linearise_at(fitted.problem, fitted.x, parent.likelihood_fit.noise)
+
+
+def _best_points(linearisation: Linearisation, effect: Effect) -> list[ScreenResult]:
+    """Return the scan points of an effect with the lowest predicted cost, the best first."""
+    return screen_points(linearisation, effect)[:MAX_ITERATED_POINTS]
+
+
+def _backtracked(linearisation: Linearisation, points: Sequence[ScreenResult]) -> ScreenResult:
+    """Return the first of some scan points with its start backtracked."""
+    return backtrack(linearisation, points[0])
+
+
+def iterate_points(
+    linearisation: Linearisation, points: Sequence[ScreenResult], max_iterations: int = SCREEN_ITERATIONS
+) -> ScreenResult:
+    """Return the best of some scan points after a few Levenberg-Marquardt iterations, its cost the one reached."""
+    tried = []
+    for point in points:
+        screened = backtrack(linearisation, point)
+        found = levenberg_marquardt(
+            screened.problem, screened.start, linearisation.noise, max_iterations=max_iterations, tolerance=1e-3
+        )
+        tried.append(replace(screened, predicted_cost=found.cost, start=found.x))
+    return min(tried, key=lambda p: p.predicted_cost)
+
+
+def _iterate_time_shift(linearisation: Linearisation, effect: Effect) -> ScreenResult:
+    """Return the screen result of an effect that shifts time: the best scan point after a few iterations.
+
+    A model that lacks a time shift has biased parameters, which no first-order step repairs. So the base parameters are estimated
+    again from the measurement shifted back.
+    """
+    base, starts = linearisation.problem.layout, []
+    for values in scan_points(linearisation, effect):
+        moved = [advance_measurement(r, next(iter(values.values()))) for r in linearisation.problem.records]
+        x = linearisation.x.copy()
+        x[: base.shared] = equation_error_start(moved, base)[: base.shared]
+        problem, start = with_effect(linearisation.problem, x, effect, values)
+        starts.append((cost_of(problem, start, linearisation.noise), problem, start))
+    tried = []
+    for _, problem, start in sorted(starts, key=lambda s: s[0])[:MAX_TIME_SHIFTS]:
+        found = levenberg_marquardt(problem, start, linearisation.noise, max_iterations=TIME_SHIFT_ITERATIONS, tolerance=1e-3)
+        tried.append(ScreenResult(effect, found.cost, start, found.x, problem))
+    return min(tried, key=lambda p: p.predicted_cost)
+
+
+def advance_measurement(record: Record, late_s: float) -> Record:
+    """Return a record with its measurement taken late_s seconds later, which removes a delay of that length."""
+    then = record.time + late_s
+
+    def moved(values: FloatArray, ok: BoolArray) -> FloatArray:
+        return np.interp(then, record.time[ok], values[ok]) if ok.any() else values
+
+    return replace(record, angle=moved(record.angle, record.angle_ok), rate=moved(record.rate, record.rate_ok))
+
+
+def shifts_time(effect: Effect) -> bool:
+    """Whether an effect shifts the command against the measurement: outside the hull, with a scanned coefficient in s."""
+    return effect.stage is not Stage.HYDRODYNAMICS and any(c.unit == "s" and c.scan for c in effect.shared)

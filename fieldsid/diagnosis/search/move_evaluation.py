@@ -1,0 +1,202 @@
+"""Moves of a search: each adds one effect to a model, is fitted from its start, and is scored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.acceptance import (
+    FAR_ERROR_RATIO,
+    MISSING_ERROR_RATIO,
+    gains_any_evidence,
+    gains_training_evidence,
+    is_accepted,
+    leaves_error,
+)
+from fieldsid.diagnosis.evidence.likelihood_fit import (
+    MIN_LIKELIHOOD_GAIN,
+    FittedProblem,
+    LikelihoodFit,
+    fit_maximum_likelihood,
+    fit_output_error,
+    prefer_smaller_equivalent,
+)
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.search.add_effect import (
+    MAX_EFFECTS_AT_BASE,
+    MAX_EFFECTS_LATER,
+    SearchMove,
+    add_effect,
+    by_effect,
+    is_redundant_start,
+)
+from fieldsid.diagnosis.search.search_state import SearchState
+from fieldsid.diagnosis.search.variant_search import VariantRequest
+from fieldsid.fitting.initial.effect_screen import overlay_parameters
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Effect
+from fieldsid.numerics.arrays import FloatArray
+
+
+@dataclass(slots=True)
+class MoveEvaluation(SearchState):
+    """A search that can add one effect to a model and score what comes of it."""
+
+    def forward_step(self, parent: ScoredModel, *, forced: bool = False) -> list[ScoredModel]:
+        """Return the parent with each effect that passes the screens, or with each when forced, fitted and scored, best first."""
+        key = frozenset(parent.names)
+        if key not in self.expanded:
+            self.expanded.add(key)
+            most = MAX_EFFECTS_AT_BASE if key == self.root else MAX_EFFECTS_LATER
+            left = [e for e in self.catalogue if e.name not in key]
+            found = add_effect(
+                parent,
+                left,
+                None if forced else most,
+                self.parallel,
+                anew=key == self.root,
+                flown=key in self.output_error_screened,
+            )
+            self._fit_from_output_error(parent)
+            self.output_error_screened.add(key)
+            later = self._evaluate_moves(parent, by_effect(found))
+            leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
+            self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
+            if self.budget.remaining():
+                self._refit_from_best_child(key)
+            self._prefer_output_error(key)
+            if self.budget.remaining():
+                self._try_laws_and_variants(key, self._leading(key))
+        return self._children(key)
+
+    def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
+        """Return the best children, and the one with most evidence on the training runs.
+
+        A wrong speed law may hide the last on the validation runs. Only the first where it reaches the noise floor, or where the
+        parent has effects and the child is near the floor or has a pair.
+        """
+        children = self._children(key)
+        best = sorted(children, key=lambda h: h.complexity_penalty - h.log_likelihood_by_run.sum())[:1]
+        names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:LEADING_CHILDREN], *best)))
+        early = key == self.root or (
+            len(key) < len(self.known) + TESTED_SUBSET_SIZE and any(self.error_ratio(h) > FAR_ERROR_RATIO for h in children[:1])
+        )
+        return names if early and any(leaves_error(h, self.floor) for h in children[:1]) else names[:1]
+
+    def _fit_from_output_error(self, parent: ScoredModel) -> None:
+        """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""
+        key = frozenset(parent.names)
+        names = [
+            n for n, free in self.output_error_fits.items() if free and len(n) == len(key) + 1 and key < n and n not in self.tried
+        ]
+
+        def fit_all(name: frozenset[str]) -> ScoredModel:
+            for free in self.output_error_fits[name]:
+                self._fit_child(parent, free.problem, free.x, next(e for e in free.effects if e.name not in key))
+            return self.tried[name].evaluate_errors()
+
+        self.tried |= dict(zip(names, self.parallel.map(fit_all, names), strict=True))
+
+    def _evaluate_moves(
+        self, parent: ScoredModel, groups: Sequence[Sequence[SearchMove]], *, every: bool = False
+    ) -> list[SearchMove]:
+        """Evaluate the moves of each effect; return those left out because an earlier start has reached their predicted cost.
+
+        `every` leaves none out. All moves are compared with the same rival, so that the result does not depend on their order.
+        """
+        rival = max((h.likelihood_fit.log_likelihood for h in self._children(frozenset(parent.names))), default=-np.inf)
+
+        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel, list[FittedProblem], list[int]]:
+            key = frozenset((*parent.names, group[0].screened.effect.name))
+            later = []
+            for i, move in enumerate(group):
+                if every or key not in self.tried or not is_redundant_start(move, parent, self.tried[key]):
+                    self._evaluate_move(parent, move, rival)
+                else:
+                    later.append(i)
+            return self.tried[key].evaluate_errors(), self.output_error_fits.get(key, []), later
+
+        left = []
+        for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
+            key = frozenset(found.names)
+            self.tried[key], self.output_error_fits[key] = found, free
+            left += [group[i] for i in later]
+        return left
+
+    def _evaluate_move(self, parent: ScoredModel, move: SearchMove, rival: float) -> None:
+        """Fit the model that a move leads to, and keep it where it has more evidence."""
+        screened, start = move.screened, move.screened.start
+        self.report("+".join((*parent.names, screened.effect.name)))
+        if move.by_output_error:
+            free = fit_output_error(screened.problem, start, parent.likelihood_fit.fitted.weights)
+            self.output_error_fits.setdefault(frozenset(free.names), []).append(free)
+            start = free.x
+        self._fit_child(parent, screened.problem, start, screened.effect, rival)
+
+    def _fit_child(self, parent: ScoredModel, p: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf) -> None:
+        """Fit by maximum likelihood from a start, and from the equivalent solution that has the same response at one speed."""
+        ml_fit = fit_maximum_likelihood(
+            p, start, parent.likelihood_fit.noise, self.resolution_floor, self.noise_kind, rival=rival
+        )
+        self._keep(prefer_smaller_equivalent(ml_fit, effect))
+
+    def _refit_from_best_child(self, key: frozenset[str]) -> None:
+        """Fit a model again from its best child's parameters: the cost may have several local minima.
+
+        Where that has more evidence, the leading children are fitted again from the new parameters.
+        """
+        child, parent = next(iter(self._children(key)), None), self.tried[key]
+        again = self._fit_from(parent, child) if child else parent.likelihood_fit
+        if again.log_likelihood > parent.likelihood_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
+            better = prefer_output_error(score_model(again, self.validation), self.floor)
+            if better.log_evidence > parent.log_evidence:
+                self.tried[key] = parent = better
+                for ml_fit in self.parallel.map(
+                    lambda child: self._fit_from(child, parent), self._children(key)[:LEADING_CHILDREN]
+                ):
+                    self._keep(ml_fit)
+
+    def _fit_from(self, h: ScoredModel, other: ScoredModel) -> LikelihoodFit:
+        """Fit a model from another model's parameters where that has them, from its own elsewhere."""
+        here, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
+        x = overlay_parameters(there.problem.layout, there.x, here.problem.layout, here.x)
+        return fit_maximum_likelihood(here.problem, x, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+
+    def _prefer_output_error(self, key: frozenset[str]) -> None:
+        """Give the leading children with more evidence than their parent their output-error fit, where that validates better."""
+        parent = self.tried[key]
+        children = [c for c in self._children(key)[:LEADING_CHILDREN] if c.log_evidence > parent.log_evidence]
+
+        def flown(child: ScoredModel) -> ScoredModel:
+            free = self.output_error_fits.get(frozenset(child.names), ())
+            return prefer_output_error(child, self.floor, parent, free).evaluate_errors(fitted=True)
+
+        self.tried |= {frozenset(child.names): child for child in self.parallel.map(flown, children)}
+
+    def _try_laws_and_variants(self, key: frozenset[str], names: Sequence[frozenset[str]], *, every: bool = False) -> None:
+        """Try another speed law and other variants of the effects for some children, kept where they have more evidence.
+
+        Where no child gains evidence and the parent's error is large, or with `every`, all children are tried: the missing effect
+        may be any of them in another variant.
+        """
+        parent = self.tried[key]
+        lost = every or (
+            self.error_ratio(parent) > MISSING_ERROR_RATIO and not any(gains_any_evidence(parent, self.tried[n]) for n in names)
+        )
+        names = [frozenset(c.names) for c in self._children(key)] if lost else names
+        # forms of what the parent has were tried on it: the best child tries them again, and the one that goes on
+        foremost = {*names[:1], *[n for n in names if is_accepted(parent, self.tried[n])][:1]}
+
+        helping = [n for n in names if lost or gains_any_evidence(parent, self.tried[n])]
+        self._try_other_speed_law([n for n in names if gains_training_evidence(parent, self.tried[n])])
+        self._try_variants([VariantRequest(self.tried[n], parent, None if n in foremost else n - key) for n in helping])
+
+
+LEADING_CHILDREN = 3
+"""Best children whose left-out moves are evaluated too, and which may take their output-error fit."""
+
+
+MAX_EFFECTS, TESTED_SUBSET_SIZE = 4, 2
+"""Largest number of added effects, and the size of a set whose subsets have all been tried before."""

@@ -1,0 +1,148 @@
+"""A search by output error alone, for logs with almost no noise: from a towing tank, or filtered before logging.
+
+The likelihood compares models by the disturbance that each still needs. Residuals that follow the fin or the motion are no
+disturbance, and without noise the smallest inconsistency of the sensors outweighs the hydrodynamics: the likeliest model need not
+predict best. Here an effect is added as long as it lowers the output-error fit's error on the validation runs by a twentieth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, fit_output_error
+from fieldsid.diagnosis.evidence.scored_model import (
+    ScoredModel,
+    bare_model,
+    score_model,
+    training_errors,
+    validation_errors,
+    validation_fits,
+)
+from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.search.search import Search
+from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, linearise_at, screen_effect, transfer_parameters
+from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.models.effect import Effect
+
+MAX_EFFECTS_TRIED, BEAM_WIDTH, MAX_EFFECTS = 5, 2, 3
+MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 200, 1e-7
+"""Iterations of each output-error fit, and the share of its sum of squares that an iteration must gain: convergence is slow."""
+MAX_FREE_RUN_ERROR_RATIO = 0.95
+"""Ratio that the error must fall to with each added effect."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeRunFit:
+    """An output-error fit, its errors, and their ratio to the base model's."""
+
+    output_error_fit: FittedProblem
+    errors: Pair
+    error_ratio: float
+
+
+def noiseless_search(search: Search) -> ScoredModel | None:
+    """Return the model that a beam search by validation error ends at, None where no effect lowers the error enough.
+
+    The best two models of every size are extended, because the best single effect need not be part of the best set. The models
+    without one of the final effects are added to what the search has tried.
+    """
+    base = search.base()
+    best = start = FreeRunFit(base.reported_fit, base.errors, 1.0)
+    front, seen = [start], dict[frozenset[str], FreeRunFit]()
+    for _ in range(MAX_EFFECTS):
+        grown: dict[frozenset[str], FreeRunFit] = {}
+        for current in front:
+            for new in _forward_candidates(search, current.output_error_fit):
+                _keep(seen, new)
+                if _error_ratio(new.errors, current.errors) <= MAX_FREE_RUN_ERROR_RATIO:
+                    _keep(grown, new)
+        front = sorted(grown.values(), key=lambda f: f.error_ratio)[:BEAM_WIDTH]
+        if not front or front[0].error_ratio > MAX_FREE_RUN_ERROR_RATIO * best.error_ratio:
+            break
+        best = front[0]
+    if best is start:
+        return None
+    best, without = _backward_eliminate(search, best, seen)
+    found, *less = search.parallel.map(partial(_scored, search), [best.output_error_fit, *(w.output_error_fit for w in without)])
+    search.tried |= {frozenset(h.names): h for h in (found, *less)}
+    return found
+
+
+def _keep(known: dict[frozenset[str], FreeRunFit], new: FreeRunFit) -> None:
+    """Keep a fit unless one of the same effects has the lower error."""
+    key = frozenset(new.output_error_fit.names)
+    if key not in known or new.error_ratio < known[key].error_ratio:
+        known[key] = new
+
+
+def _backward_eliminate(
+    search: Search, best: FreeRunFit, seen: dict[frozenset[str], FreeRunFit]
+) -> tuple[FreeRunFit, list[FreeRunFit]]:
+    """Return a fit without the effects that are no longer needed, and the fits without each of those that remain."""
+    while True:
+        effects = [e for e in best.output_error_fit.effects if e.name not in search.known]
+        if len(effects) < 2:
+            return best, []
+        for new in search.parallel.map(partial(_drop_effect, search, best.output_error_fit), effects):
+            _keep(seen, new)
+        less = [seen[frozenset(best.output_error_fit.names) - {e.name}] for e in effects]
+        idle = min(less, key=lambda f: f.error_ratio)
+        if best.error_ratio <= MAX_FREE_RUN_ERROR_RATIO * idle.error_ratio:
+            return best, less
+        best = idle
+
+
+def _drop_effect(search: Search, fitted: FittedProblem, gone: Effect) -> FreeRunFit:
+    problem = fitted.problem.with_effects([e for e in fitted.effects if e is not gone])
+    x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
+    return _evaluate(search, fit_output_error(problem, x, fitted.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE))
+
+
+def _scored(search: Search, fitted: FittedProblem) -> ScoredModel:
+    ml_fit = fit_maximum_likelihood(
+        fitted.problem, fitted.x, search.base().likelihood_fit.noise, search.resolution_floor, search.noise_kind
+    )
+    return replace(score_model(ml_fit, search.validation), output_error_fit=fitted)
+
+
+def _evaluate(search: Search, fitted: FittedProblem) -> FreeRunFit:
+    base = search.base()
+    flown = validation_fits(bare_model(fitted.problem, fitted.x, base.likelihood_fit.noise), fitted, search.validation)
+    errors = Pair(training_errors(fitted), validation_errors(flown, search.validation))
+    return FreeRunFit(fitted, errors, _error_ratio(errors, base.errors))
+
+
+def _forward_candidates(search: Search, current: FittedProblem) -> list[FreeRunFit]:
+    """Return the fits with one effect more, for the effects of lowest predicted cost, from two starts each."""
+    linearisation = linearise_at(current.problem, current.x, current.weights)
+    left = [e for e in search.catalogue if e.name not in current.names]
+    screened_points = sorted(search.parallel.map(partial(screen_effect, linearisation), left), key=lambda p: p.predicted_cost)
+
+    def followed(screened: ScreenResult) -> FreeRunFit:
+        search.report("+".join((*current.names, screened.effect.name)))
+        from_screen = fit_output_error(
+            screened.problem, backtrack(linearisation, screened).start, current.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE
+        )
+        return _evaluate(
+            search, min((from_screen, _from_declared_start(screened, current)), key=lambda t: t.weights.angle * t.weights.rate)
+        )
+
+    return search.parallel.map(followed, screened_points[:MAX_EFFECTS_TRIED])
+
+
+def _from_declared_start(screened: ScreenResult, current: FittedProblem) -> FittedProblem:
+    """Return the output-error fit from the equation-error start and declared start values: the base may be biased."""
+    problem = screened.problem
+    return fit_output_error(
+        problem, equation_error_start(problem.records, problem.layout), current.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE
+    )
+
+
+def _error_ratio(new: Pair, old: Pair) -> float:
+    """Return the ratio of two errors, the geometric mean over training and validation runs; 1 where either does not fall."""
+    unseen = np.isfinite(old.validation.mean)
+    sides = [new.train.mean / old.train.mean, *([new.validation.mean / old.validation.mean] if unseen else [])]
+    return float(np.exp(np.mean(np.log(sides)))) if max(sides) < 1.0 else 1.0

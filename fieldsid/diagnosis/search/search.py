@@ -1,0 +1,128 @@
+"""The search over sets of effects: best first, by forward steps, exchanges and backward elimination over one archive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+from fieldsid.diagnosis.evidence.acceptance import MAX_ERROR_RATIO, MISSING_ERROR_RATIO, leaves_error
+from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
+from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
+from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
+from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
+from fieldsid.diagnosis.search.multistart import MIN_ERROR_RATIO, multistart
+from fieldsid.diagnosis.search.speed_law_search import trim_follows_fin
+from fieldsid.fitting.initial.effect_screen import transfer_parameters
+from fieldsid.models.effect import Effect
+
+
+@dataclass(slots=True)
+class Search(MoveEvaluation):
+    """A best-first search over the sets of catalogued effects."""
+
+    def best(self) -> ScoredModel:
+        """Return the accepted set of effects with the highest log evidence."""
+        self._expand()
+        found = self._best_admissible()
+        nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
+        if (
+            self.error_ratio(found) > MISSING_ERROR_RATIO
+            and self.budget.remaining()
+            and (nothing or residuals_reject(found.likelihood_fit, self.parallel))
+        ):
+            untried = [e for e in self.catalogue if nothing and e.variants and self.root | {e.name} not in self.tried]
+            self._evaluate_moves(
+                self.base(), by_effect(add_effect(self.base(), untried, None, self.parallel, anew=False, flown=True))
+            )
+            self._try_laws_and_variants(self.root, [], every=True)
+            self._expand()
+            found = self._best_admissible()
+        if self.error_ratio(found) > MIN_ERROR_RATIO and self.budget.remaining():
+            found = multistart(
+                found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
+            )
+            self.tried[frozenset(found.names)] = found
+        return self._best_admissible()
+
+    def _expand(self) -> None:
+        """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise."""
+        self.base()
+        while (leading := self._next_to_expand()) is not None:
+            self.forward_step(leading)
+            self._drop_each()
+            self.update_noise_floor(self._best_admissible().likelihood_fit.fitted)
+            if self._switch_noise_or_trim():
+                self.base()
+
+    def _next_to_expand(self) -> ScoredModel | None:
+        """Return the leading model to expand next, None where all are expanded.
+
+        Leading are the base, the model of the highest log evidence, the same without each of its effects (their expansions
+        exchange that effect), and every model of accepted effects with a clearly lower error: its evidence may be lower only
+        because it lacks a small effect that the best model has besides a wrong one.
+        """
+        if self.root not in self.expanded:
+            return self.base()
+        if not self.budget.remaining():
+            return None
+        best = max(self.tried.values(), key=lambda h: h.log_evidence)
+        least = MAX_ERROR_RATIO * best.selection_errors.mean
+        front = [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
+        parts = [self.tried[k] for e in best.names if (k := frozenset(best.names) - {e}) in self.tried]
+        leading = [best, *front, *parts] if leaves_error(best, self.floor) else front
+        return next((h for h in leading if self._is_expandable(h)), None)
+
+    def _is_expandable(self, h: ScoredModel) -> bool:
+        """Whether a model is not expanded yet, is below the largest size, and leaves an error above the noise floor."""
+        is_new = frozenset(h.names) not in self.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
+        return is_new and leaves_error(h, self.floor)
+
+    def _drop_each(self) -> None:
+        """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle."""
+        best = max(self.tried.values(), key=lambda h: h.log_evidence)
+        if len(best.names) > len(self.known) + 1:
+            for gone in best.effects:
+                if gone.name not in self.known and frozenset(best.names) - {gone.name} not in self.tried:
+                    self._drop_effect(best, gone)
+
+    def _switch_noise_or_trim(self) -> bool:
+        """Start again under another kind of noise (once each), or under the other trim law, where that fits better.
+
+        A missing effect may have biased the first choice. Likelihoods compare only under one kind of noise, and a disturbance
+        that stands for coloured sensor noise lets the heading drift at no cost. The best model is kept, fitted again.
+        """
+        if not self.budget.remaining():
+            return False
+        found = self._best_admissible()
+        noise = partial(fit_other_noise, found, self.floor, self.noise_kinds_tried, self.parallel)
+        ml_fit, again = self.trim_laws.best_alternative(
+            found, self.tried, self.floor, self.resolution_floor, self.parallel, noise
+        )
+        if ml_fit is None and again is None:
+            return False
+        if ml_fit is not None:
+            self.noise_kind, again = ml_fit.noise_kind, score_model(ml_fit, self.validation)
+            self.tried, self.evidence_at_variants, self.expanded = {}, {}, set()
+        elif again is not None:
+            left, self.trim_of_fin = trim_follows_fin(self.base()), trim_follows_fin(again)
+            world = self.tried, self.evidence_at_variants, self.expanded, self.output_error_fits, self.output_error_screened
+            world = self.trim_laws.switch(self.noise_kind, world, law=left, other=self.trim_of_fin)
+            self.tried, self.evidence_at_variants, self.expanded, self.output_error_fits, self.output_error_screened = world
+        if again is not None and frozenset(again.names) != self.root:
+            known, again = self.tried.get(frozenset(again.names)), prefer_output_error(again, self.floor)
+            self.tried[frozenset(again.names)] = again if known is None or again.log_evidence > known.log_evidence else known
+        return True
+
+    def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
+        """Return a model without one of its effects, fitted from the parameters it has with it."""
+        fitted = h.likelihood_fit.fitted
+        problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
+        x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
+        ml_fit = fit_maximum_likelihood(problem, x, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+        key = frozenset(ml_fit.fitted.names)
+        before, kept = self.tried.get(key), self._keep(ml_fit)
+        if kept is not before:
+            self.tried[key] = prefer_output_error(kept, self.floor)
+        return self.tried[key]

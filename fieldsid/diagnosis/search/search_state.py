@@ -1,0 +1,188 @@
+"""What a search over sets of effects has found so far: scored models, noise kinds, the noise floor, the budget."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
+from fieldsid.diagnosis.evidence.acceptance import is_accepted, leaves_error
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem, LikelihoodFit
+from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.search.budget import MAX_EVALUATIONS_PER_RUN, Budget
+from fieldsid.diagnosis.search.speed_law_search import (
+    TrimLawSearch,
+    error_product,
+    fit_base_output_error,
+    other_speed_law,
+    speed_laws,
+)
+from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
+from fieldsid.fitting.covariance.noise_selection import residuals_of
+from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
+
+
+@dataclass(slots=True)
+class SearchState:
+    """Everything tried so far on one set of runs, by the set of effects; known effects are part of its base."""
+
+    records: tuple[Record, ...]
+
+    validation: tuple[Record, ...]
+
+    axis: Axis
+
+    catalogue: Sequence[Effect]
+
+    known: Sequence[str] = ()
+
+    report: Callable[[str], None] = lambda _text: None
+
+    thorough: bool = False
+    """Whether the evaluation budget is unlimited."""
+
+    floor: Noise = field(init=False)
+
+    tried: dict[frozenset[str], ScoredModel] = field(default_factory=dict)
+
+    noise_kind: str = ""
+
+    noise_kinds_tried: set[str] = field(default_factory=set)
+
+    trim_of_fin: bool | None = None
+
+    trim_laws: TrimLawSearch = field(default_factory=TrimLawSearch)
+
+    resolution_floor: Noise = field(init=False)
+
+    is_noiseless: bool = False
+    """Whether the base model's error is more than a hundred times the noise in every measured channel."""
+
+    expanded: set[frozenset[str]] = field(default_factory=set)
+
+    output_error_screened: set[frozenset[str]] = field(default_factory=set)
+
+    output_error_fits: dict[frozenset[str], list[FittedProblem]] = field(default_factory=dict)
+
+    evidence_at_variants: dict[frozenset[str], float] = field(default_factory=dict)
+
+    parallel: ParallelMap = field(init=False)
+
+    budget: Budget = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Compare models down to the sensors' noise until the error of the base model is known."""
+        both = (*self.records, *self.validation)
+        self.resolution_floor = self.floor = white_noise_floor(both)
+        self.parallel = ParallelMap(both, self.catalogue)
+        self.budget = Budget(len(both), np.inf if self.thorough else MAX_EVALUATIONS_PER_RUN)
+
+    @property
+    def root(self) -> frozenset[str]:
+        """The effects of the base."""
+        return frozenset(self.known)
+
+    def base(self) -> ScoredModel:
+        """Return the model of the known effects alone."""
+        if self.root not in self.tried:
+            self.report("base model")
+            laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
+            known = [e for e in self.catalogue if e.name in self.known]
+            fits = self.parallel.map(
+                lambda groups: fit_base_output_error(self.records, self.axis, known, groups, self.floor), laws
+            )
+            fitted = min(fits, key=lambda t: error_product(t, self.axis))
+            refuse_unbounded_motion(fitted.problem, fitted.x, "diagnose", instead="leave effects out of the model it starts from")
+            self.is_noiseless = is_noiseless(self.floor, resolution_floor(self.floor, fitted.weights), self.records)
+            self.update_noise_floor(fitted)
+            self.resolution_floor = resolution_floor(self.floor, fitted.weights)
+            ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.noise_kind, self.parallel)
+            self.noise_kind, self.noise_kinds_tried = ml_fit.noise_kind, self.noise_kinds_tried | {ml_fit.noise_kind}
+            self._keep(ml_fit)
+            self.tried[self.root] = prefer_output_error(self.tried[self.root], self.floor)
+            self._try_other_speed_law([self.root])
+            self._try_variants([VariantRequest(self.tried[self.root])])
+        return self.tried[self.root]
+
+    def update_noise_floor(self, fitted: FittedProblem) -> None:
+        """Lower the noise floor to what the third differences of a fit's residuals show, unless the log is noiseless."""
+        if not self.is_noiseless:
+            self.floor = lowered_noise_floor(self.floor, self.records, residuals_of(fitted.problem, fitted.x))
+
+    def _keep(self, ml_fit: LikelihoodFit) -> ScoredModel:
+        """Keep a fit where it has more evidence than the one known of its effects: the likelier one may validate worse."""
+        key = frozenset(ml_fit.fitted.names)
+        known, cost = self.tried.get(key), bic_penalty(ml_fit, self.validation)
+        if known is None or ml_fit.log_likelihood - cost > known.likelihood_fit.log_likelihood - known.complexity_penalty + 1e-3:
+            found = score_model(ml_fit, self.validation)
+            self.tried[key] = found if known is None or found.log_evidence > known.log_evidence else known
+        return self.tried[key]
+
+    def _children(self, key: frozenset[str]) -> list[ScoredModel]:
+        """Return the models of one effect more that were tried, the best first."""
+        children = [h for k, h in self.tried.items() if len(k) == len(key) + 1 and key < k]
+        return sorted(children, key=lambda h: -h.log_evidence)
+
+    def _try_other_speed_law(self, names: Sequence[frozenset[str]]) -> None:
+        """Fit models under the other speed law, and keep that where it has more evidence."""
+
+        def better(name: frozenset[str]) -> ScoredModel:
+            known = self.tried[name]
+            other = other_speed_law(known, self.resolution_floor, self.noise_kind, asks_for_more=leaves_error(known, self.floor))
+            return known if other is None else prefer_output_error(other, self.floor).evaluate_errors(fitted=True)
+
+        self.tried |= dict(zip(names, self.parallel.map(better, names), strict=True))
+
+    def _try_variants(self, asked: Sequence[VariantRequest]) -> None:
+        """Try other variants of the models' effects, unless that was done at the same evidence."""
+        asked = [
+            p
+            for p in asked
+            if p.model.log_evidence > self.evidence_at_variants.get(frozenset(p.model.names), -np.inf) + MIN_LIKELIHOOD_GAIN
+        ]
+        for h in FormSearch(self.resolution_floor, self.noise_kind, self.floor, self.parallel).try_variants(asked):
+            self.tried[frozenset(h.names)], self.evidence_at_variants[frozenset(h.names)] = h, h.log_evidence
+
+    def core_of(self, h: ScoredModel) -> frozenset[str]:
+        """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good."""
+        while idle := [w for w in self._less(h) if not is_accepted(w, h)]:
+            h = max(idle, key=lambda w: w.log_evidence)
+        return frozenset(h.names)
+
+    def _less(self, h: ScoredModel) -> list[ScoredModel]:
+        """Return the fitted models that lack one of a model's effects."""
+        return [self.tried[k] for n in h.names if n not in self.known and (k := frozenset(h.names) - {n}) in self.tried]
+
+    def evidences(self) -> dict[frozenset[str], float]:
+        """Return the log evidence of each accepted set: log sum exp over the models whose accepted effects are that set."""
+        sums: dict[frozenset[str], float] = {}
+        for h in self.ranked():
+            core = self.core_of(h)
+            sums[core] = float(np.logaddexp(sums.get(core, -np.inf), h.log_evidence))
+        return sums
+
+    def admissible(self, h: ScoredModel) -> bool:
+        """Whether every effect of a model is accepted."""
+        return self.core_of(h) == frozenset(h.names)
+
+    def _best_admissible(self) -> ScoredModel:
+        """Return the model of the accepted set with the highest log evidence."""
+        sums = self.evidences()
+        return self.tried[max(sums, key=lambda k: sums[k])]
+
+    def error_ratio(self, h: ScoredModel) -> float:
+        """Return a model's selection error over the noise floor, with coloured sensor noise where the base has it."""
+        return h.selection_errors.over(sensor_noise(self.floor, self.tried.get(self.root)))
+
+    def ranked(self) -> list[ScoredModel]:
+        """Return all scored models by log evidence, the best first, without those that diverge."""
+        return sorted((h for h in self.tried.values() if np.isfinite(h.log_evidence)), key=lambda h: -h.log_evidence)

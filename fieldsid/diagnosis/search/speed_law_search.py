@@ -1,0 +1,198 @@
+"""How speed enters a model: one speed for a group of runs or one each, one authority for all or one each, which trim law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeVar
+
+from fieldsid.diagnosis.evidence.acceptance import ALTERNATIVE_LOG_ODDS, MISSING_ERROR_RATIO, leaves_error
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, fit_output_error
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.fitting.initial.effect_screen import (
+    backtrack,
+    linearise_at,
+    screen_effect,
+    under_other_speed_law,
+    under_speed_groups,
+)
+from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.initial.trim_speed_law import MIN_TRIM_LAW_ERROR_GAIN, possible_trims, speeds_differ_in_group
+from fieldsid.fitting.problem.parameters import SpeedGroups, layout_of, speed_groups
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.models.speed_law import TRIM_OF_FIN
+from fieldsid.numerics.arrays import FloatArray
+
+T = TypeVar("T")
+
+SearchResults = tuple[
+    dict[frozenset[str], ScoredModel],
+    dict[frozenset[str], float],
+    set[frozenset[str]],
+    dict[frozenset[str], list[FittedProblem]],
+    set[frozenset[str]],
+]
+"""The models tried, the evidence their variants were tried at, the models expanded; output-error fits, and the models screened by
+them."""
+
+FINE_GROUP_WIDTH = 0.03
+"""Log ratio of speeds up to which runs form one group while models are compared. The line |b2| = 0.33 u^2 + 0.23 of the method's
+paper goes with powers from 1.2 to 1.7 between 1 and 2 m/s, so that u^2 is off by 1 to 2 % across such a group; in wider ones what
+it is off by is seen in the motion, and passes for effects that are not there."""
+MAX_TRIM_SWITCHES = 2
+"""Times a search starts again under the other trim law: a first effect may favour the law that a second one does not."""
+MIN_ONE_SPEED_ERROR_GAIN = 1.1
+"""Factor by which the product of both channels' errors must fall for the runs of a group to count as flown at one speed."""
+
+
+def speed_laws(records: Sequence[Record], *, trim_of_fin: bool | None) -> tuple[SpeedGroups, ...]:
+    """Return the speed groups to try: runs of a group at one speed or each at its own, under either trim law or the one given."""
+    groups = speed_groups(records, width=FINE_GROUP_WIDTH)
+    snapped = (False, True) if len(groups.speeds) < len(records) else (False,)
+    trims = possible_trims(groups) if trim_of_fin is None else (trim_of_fin,)
+    return tuple(speed_groups(records, width=FINE_GROUP_WIDTH, snapped=s, trim_of_fin=t) for t in trims for s in snapped)
+
+
+def fit_base_output_error(
+    records: tuple[Record, ...], axis: Axis, known: Sequence[Effect], groups: SpeedGroups, floor: Noise
+) -> FittedProblem:
+    """Return the output-error fit of the base model with its known effects, under a speed law."""
+    layout = layout_of(records, axis, (), groups)
+    fitted = fit_output_error(Problem(records, layout), equation_error_start(records, layout), floor)
+    for effect in known:
+        linearisation = linearise_at(fitted.problem, fitted.x, fitted.weights)
+        screened = backtrack(linearisation, screen_effect(linearisation, effect))
+        fitted = fit_output_error(screened.problem, screened.start, fitted.weights)
+    return fitted
+
+
+def error_product(fitted: FittedProblem, axis: Axis) -> float:
+    """Return the product of both channels' errors, larger by a factor for an unusual trim law or grouped speeds."""
+    groups = fitted.problem.layout.groups
+    usual = (1.0 if groups.trim_of_fin == TRIM_OF_FIN[axis] else MIN_TRIM_LAW_ERROR_GAIN) * (
+        MIN_ONE_SPEED_ERROR_GAIN if groups.snapped else 1.0
+    )
+    return fitted.weights.angle * fitted.weights.rate * usual
+
+
+def other_speed_law(h: ScoredModel, resolution_floor: Noise, noise_kind: str, *, asks_for_more: bool) -> ScoredModel | None:
+    """Return a model under another speed law (see `under_other_speed_law`) where that has more evidence, None elsewhere.
+
+    An authority shared by all speeds is determined far better. A group that does not follow the law, or a run that was not flown
+    at its group's speed, shows only once the missing effect is found.
+    """
+    fitted = h.likelihood_fit.fitted
+    groups = fitted.problem.layout.groups
+    if groups.snapped and asks_for_more:
+        own = speed_groups(fitted.problem.records, width=FINE_GROUP_WIDTH, trim_of_fin=groups.trim_of_fin)
+        own = replace(groups, snapped=False, run_speeds=own.run_speeds)
+        return _better(h, *under_speed_groups(fitted.problem, fitted.x, own), resolution_floor, noise_kind, 0.0)
+    one_speed = len(groups.speeds) == 1
+    if (one_speed or groups.by_law) and not (asks_for_more and speeds_differ_in_group(groups)):
+        return None
+    return _better(
+        h,
+        *under_other_speed_law(fitted.problem, fitted.x),
+        resolution_floor,
+        noise_kind,
+        ALTERNATIVE_LOG_ODDS if one_speed else 0.0,
+    )
+
+
+@dataclass(slots=True)
+class TrimLawSearch:
+    """Models under the other trim law, each fitted once, and the number of switches to it.
+
+    `left` holds what was tried before each switch, by noise kind and trim law: a search may switch back.
+    """
+
+    known: dict[tuple[tuple[str, ...], float], ScoredModel | None] = field(default_factory=dict)
+    switches: int = 0
+    left: dict[tuple[str, bool], SearchResults] = field(default_factory=dict)
+
+    def switch(self, noise_kind: str, world: SearchResults, *, law: bool, other: bool) -> SearchResults:
+        """Return what was tried under the other trim law before, and keep what was tried under the present one."""
+        self.switches += 1
+        self.left[noise_kind, law] = world
+        return self.left.get((noise_kind, other), ({}, {}, set(), {}, set()))
+
+    def best_alternative(
+        self,
+        found: ScoredModel,
+        tried: Mapping[frozenset[str], ScoredModel],
+        floor: Noise,
+        resolution_floor: Noise,
+        parallel: ParallelMap,
+        first: Callable[[], T],
+    ) -> tuple[T, ScoredModel | None]:
+        """Return the answer of `first`, and a model with more evidence under the other trim law than the one found, or None.
+
+        One of the effects found may stand in for that law. Where an error above the floor remains, the law itself may cause it:
+        the model found is tried, and of the others those with most evidence over all runs and over the training runs.
+        """
+        key, asked = frozenset(found.names), list[ScoredModel]()
+        if self.switches < MAX_TRIM_SWITCHES:
+            asked = [tried[k] for k in tried if k < key and len(k) == len(key) - 1]
+            asked += [found, *_most_evident([h for h in tried.values() if h is not found])] if leaves_error(found, floor) else []
+        keys = {(h.names, h.log_evidence): h for h in asked}
+        new = {k: partial(other_trim_law, h, resolution_floor) for k, h in keys.items() if k not in self.known}
+        parts: tuple[Callable[[], Any], ...] = (first, *new.values())
+        answer, *again = parallel.map(lambda part: part(), parts)
+        self.known |= dict(zip(new, again, strict=True))
+        better = [
+            h
+            for h in (self.known[k] for k in keys)
+            if h is not None and h.log_evidence > found.log_evidence and _predicts(h, found)
+        ]
+        return answer, max(better, key=lambda h: h.log_evidence, default=None)
+
+
+def _most_evident(tried: Collection[ScoredModel]) -> list[ScoredModel]:
+    """Return the models with most evidence, over all runs and over the training runs; none where none was tried."""
+    if not tried:
+        return []
+    over_training = max(tried, key=lambda h: float(h.log_likelihood_by_run.sum()) - h.complexity_penalty)
+    return [max(tried, key=lambda h: h.log_evidence), over_training]
+
+
+def _predicts(h: ScoredModel, found: ScoredModel) -> bool:
+    """Whether the validation error of a model under the other law is not far above that of the model found.
+
+    Where speeds are slightly wrong, a disturbance absorbs what either law leaves of the heading, and evidence alone decides by
+    chance.
+    """
+    return h.selection_errors.mean < MISSING_ERROR_RATIO * found.selection_errors.mean
+
+
+def trim_follows_fin(h: ScoredModel) -> bool:
+    """Return whether the trim of a model is an offset of the fin, which scales with the authority."""
+    return h.likelihood_fit.fitted.problem.layout.groups.trim_of_fin
+
+
+def other_trim_law(h: ScoredModel, resolution_floor: Noise) -> ScoredModel | None:
+    """Return a model under the other trim law where that has more evidence, None elsewhere."""
+    fitted, layout, noise_kind = h.likelihood_fit.fitted, h.likelihood_fit.fitted.problem.layout, h.likelihood_fit.noise_kind
+    records, varying = fitted.problem.records, any(e.terms is not None for e in h.effects)
+    for trim in possible_trims(speed_groups(records, width=FINE_GROUP_WIDTH), varying=varying):
+        if trim != layout.groups.trim_of_fin:
+            other = Problem(records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
+            fit = score_model(
+                fit_maximum_likelihood(other, fitted.x, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation
+            )
+            if fit.log_evidence > h.log_evidence + (0.0 if trim == TRIM_OF_FIN[layout.axis] else ALTERNATIVE_LOG_ODDS):
+                return fit
+    return None
+
+
+def _better(
+    h: ScoredModel, problem: Problem, x: FloatArray, resolution_floor: Noise, noise_kind: str, worth: float
+) -> ScoredModel | None:
+    """Return the scored model of a problem with the same effects, where it gains that much evidence, None elsewhere."""
+    other = score_model(fit_maximum_likelihood(problem, x, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation)
+    return other if other.log_evidence > h.log_evidence + worth else None

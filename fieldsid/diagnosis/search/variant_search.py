@@ -1,0 +1,168 @@
+"""The search over variants of an effect, each fitted from the solution of the textbook's variant."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.acceptance import (
+    MAX_VALIDATION_ERROR_RATIO,
+    gains_evidence,
+    leaves_error,
+    validation_error_ratio,
+    variant_improves,
+)
+from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.fitting.covariance.noise_selection import residuals_of
+from fieldsid.fitting.initial.effect_screen import transfer_parameters
+from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, cost_of, levenberg_marquardt
+from fieldsid.fitting.problem.parameters import ParameterLayout
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Coefficient, Effect, InitialGuesses, Stage, Variant, with_variant
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+
+MAX_STARTS, SCREEN_ITERATIONS, MAX_CONTINUED_STARTS, CONTINUED_ITERATIONS, COST_TOLERANCE = 6, 2, 3, 6, 1e-3
+"""Starts of a variant that are iterated, their iterations, how many of them continue, for how many iterations before the best is
+fitted by maximum likelihood; and the share of the cost an iteration must gain."""
+MIN_VARIANT_LIKELIHOOD_GAIN = 0.4
+"""Log likelihood, under the model's own noise, that a variant must have gained by then: the remaining iterations gain no more,
+and coefficients near zero change nothing on the validation runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class VariantRequest:
+    """A request to try the effects of a model, by default all, in other variants; `without` is the model less its last effect.
+
+    Where the model gains no evidence over the one without, a variant need not lower its error.
+    """
+
+    model: ScoredModel
+    without: ScoredModel | None = None
+    effects: Collection[str] | None = None
+
+    def accepts(self, formed: ScoredModel) -> bool:
+        """Whether a variant that gains evidence is accepted."""
+        return variant_improves(self.model, formed) or not (self.without is None or gains_evidence(self.without, self.model))
+
+
+@dataclass(frozen=True, slots=True)
+class FormSearch:
+    """A search over variants: the noise kind and floors that models are fitted under, and the parallel map."""
+
+    resolution_floor: Noise
+    noise_kind: str
+    floor: Noise
+    parallel: ParallelMap
+
+    def try_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel]:
+        """Return the models with their effects in the best variants, changed one by one as long as a change is accepted.
+
+        The variants of all models are fitted in one parallel map, because their numbers differ.
+        """
+        asked, left = list(asked), [i for i, request in enumerate(asked) if leaves_error(request.model, self.floor)]
+        while left:
+            best = zip(left, self._best_variants([asked[i] for i in left]), strict=True)
+            likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
+            formed = self.parallel.map(lambda of: prefer_output_error(of[1], self.floor).evaluate_errors(fitted=True), likely)
+            taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if asked[i].accepts(variant)}
+            for i, variant in taken.items():
+                asked[i] = replace(asked[i], model=variant)
+            left = [i for i, variant in taken.items() if leaves_error(variant, self.floor)]
+        return [request.model for request in asked]
+
+    def _best_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel | None]:
+        """Return for each model its variant with most evidence, None where no variant gains any."""
+        grounds = [_VariantStart.under(request.model, self.floor) for request in asked]
+        forms = [
+            (linearisation, e, variant)
+            for linearisation, request in zip(grounds, asked, strict=True)
+            for e in request.model.effects
+            if request.effects is None or e.name in request.effects
+            for variant in e.variants
+        ]
+        ml_fit = list(zip(forms, self.parallel.map(lambda of: self._fit_variant(*of), forms), strict=True))
+        found = [[h for (g, _, _), h in ml_fit if g is linearisation and h is not None] for linearisation in grounds]
+        return [max(of_one, key=lambda h: h.log_evidence, default=None) for of_one in found]
+
+    def _fit_variant(self, linearisation: _VariantStart, effect: Effect, variant: Variant) -> ScoredModel | None:
+        h = linearisation.model
+        problem, noise_kinds_tried = _best_start(h, effect, variant, linearisation.residuals)
+        if 0.5 * (linearisation.cost - noise_kinds_tried.cost) < linearisation.min_gain:
+            return None
+        ml_fit = fit_maximum_likelihood(
+            problem,
+            noise_kinds_tried.x,
+            h.likelihood_fit.noise,
+            self.resolution_floor,
+            self.noise_kind,
+            rival=h.likelihood_fit.log_likelihood,
+        )
+        return score_model(ml_fit, h.validation)
+
+
+@dataclass(frozen=True, slots=True)
+class _VariantStart:
+    """A model's residuals (2, n) of every run, their cost, and the log likelihood that a variant must gain to be fitted.
+
+    No gain is required where the validation error is far above the training error: a variant may act on the validation runs
+    alone.
+    """
+
+    model: ScoredModel
+    residuals: Sequence[FloatArray]
+    cost: float
+    min_gain: float
+
+    @classmethod
+    def under(cls, h: ScoredModel, floor: Noise) -> _VariantStart:
+        """Return the start of a model's variants over a noise floor."""
+        problem, x = h.likelihood_fit.fitted.problem, h.likelihood_fit.fitted.x
+        least = -np.inf if validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO else MIN_VARIANT_LIKELIHOOD_GAIN
+        return cls(h, residuals_of(problem, x), cost_of(problem, x, h.likelihood_fit.noise), least)
+
+
+def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence[FloatArray]) -> tuple[Problem, Minimum]:
+    """Return the variant's problem and the best of its starts after a few iterations under the model's noise.
+
+    The edges of an actuator (dead band, limit) are scanned again together with the variant: a cost with edges has local minima.
+    """
+    fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
+    old = fitted.problem.layout
+    problem = fitted.problem.with_effects([with_variant(e, variant) if e is effect else e for e in h.effects])
+    records = fitted.problem.records
+    again = [{}, *_start_points(records, left, effect.initial_guesses, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
+    points = [
+        (point, edges) for point in _start_points(records, left, variant.initial_guesses, variant.coefficients) for edges in again
+    ]
+    starts = [
+        _with_values(problem.layout, transfer_parameters(old, fitted.x, problem.layout, point), edges) for point, edges in points
+    ]
+    likely = sorted(starts, key=lambda x: cost_of(problem, x, noise))[:MAX_STARTS]
+    found = [levenberg_marquardt(problem, x, noise, max_iterations=SCREEN_ITERATIONS, tolerance=COST_TOLERANCE) for x in likely]
+    best = sorted(found, key=lambda d: d.cost)[:MAX_CONTINUED_STARTS]
+    return problem, min(
+        (levenberg_marquardt(problem, d.x, noise, max_iterations=CONTINUED_ITERATIONS, tolerance=COST_TOLERANCE) for d in best),
+        key=lambda d: d.cost,
+    )
+
+
+def _start_points(
+    records: Sequence[Record], left: Sequence[FloatArray], suggest: InitialGuesses | None, coefficients: Sequence[Coefficient]
+) -> list[dict[str, float]]:
+    """Return start values of shared coefficients: initial guesses from the residuals, else the points of the scan grids."""
+    if suggest is not None:
+        return suggest(records, left)
+    grids = {c.name: c.scan or (c.start,) for c in coefficients}
+    return [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
+
+
+def _with_values(layout: ParameterLayout, x: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """Return x with some shared parameters at other values."""
+    return np.array([values.get(s.name, v) for s, v in zip(layout.parameters, x, strict=True)])

@@ -1,0 +1,243 @@
+"""From parameters to the arrays the compiled core takes: the actuator before it, the sensor after it.
+
+One code path for effects present and absent: every hook of every effect is applied in its stage's order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from math import ceil, sqrt
+from operator import attrgetter
+
+import numpy as np
+
+from fieldsid.dynamics import integrate
+from fieldsid.models.axis import Axis
+from fieldsid.models.effect import Core, Effect, Motion, Terms, Values, over_intervals
+from fieldsid.models.fin_path import FinPath
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+
+MAX_RATE_STEP_PRODUCT, MAX_PIECES = 0.3, 200
+"""Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step), and most pieces."""
+DAMPING, STIFFNESS, CROSS_FACTOR, CROSS_INPUT = (
+    integrate.DRIVES.index(name) for name in ("damping", "stiffness", "cross_factor", "cross_push")
+)
+MOMENT, FLOW = ((integrate.DRIVES.index(f"{name}_start"), integrate.DRIVES.index(f"{name}_end")) for name in ("moment", "flow"))
+"""The places of the core's drives."""
+NO_CORE = Core()
+_CONSTANTS = attrgetter(*integrate.CONSTANTS)
+MAX_MOMENT_ITERATIONS = 30
+MOMENT_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """Base parameters at a run's own speed: damping (1/s), stiffness (1/s^2), authority (1/s^2), trim (rad/s^2).
+
+    `trim_of_fin`: the trim is an offset of the fin, so that a change of the authority within a run changes it too.
+    """
+
+    damping: float
+    stiffness: float
+    authority: float
+    trim: float
+    trim_of_fin: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class KernelInputs:
+    """Arrays of the core: drive (n-1, 8), constants (14,), pieces per interval; what they came from: fin path, terms, core."""
+
+    drive: FloatArray
+    constants: FloatArray
+    pieces: int
+    fin: FinPath
+    terms: Terms
+    core: Core
+
+
+def fin_path(record: Record, effects: Sequence[Effect], values: Values, commanded: FinPath | None = None) -> FinPath:
+    """Return the fin angle over the intervals after the actuator effects, in their order, of the log's or another command."""
+    path = record.commanded if commanded is None else commanded
+    for effect in sorted((e for e in effects if e.fin is not None), key=lambda e: e.order):
+        if effect.fin is not None:
+            path = effect.fin(path, values, record)
+    return path
+
+
+def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:
+    """Return the product of all factors and the sum of all additions of the effects' signal-driven terms."""
+    damping_factor: FloatArray | None = None
+    authority_factor: FloatArray | None = None
+    moment: FloatArray | None = None
+    damping: FloatArray | None = None
+    cross_factor: FloatArray | None = None
+    for effect in effects:
+        if effect.terms is None:
+            continue
+        t = effect.terms(values, record)
+        damping_factor = _times(damping_factor, t.damping_factor)
+        authority_factor = _times(authority_factor, t.authority_factor)
+        moment = _plus(moment, t.moment)
+        damping = _plus(damping, t.damping)
+        cross_factor = _times(cross_factor, t.cross_factor)
+    return Terms(damping_factor, authority_factor, moment, damping, cross_factor)
+
+
+def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
+    """Return the sum of the effects' coefficients in the core; scale is the run's speed over the model's reference speed."""
+    own = [effect.core(values, scale) for effect in effects if effect.core is not None]
+    return reduce(Core.plus, own) if own else NO_CORE
+
+
+def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Values, scale: float) -> KernelInputs:
+    """Return the core's arrays for one run; scale is the run's speed over the model's reference speed."""
+    fin = fin_path(record, effects, values)
+    terms = combined_terms(record, effects, values)
+    core = combined_core(effects, values, scale)
+    drive = np.empty((len(record) - 1, len(integrate.DRIVES)))
+    drive[:, DAMPING] = damping = damping_of(base, terms)
+    drive[:, STIFFNESS] = base.stiffness
+    drive[:, MOMENT[0]], drive[:, MOMENT[1]] = moments_of(base, fin, terms)
+    drive[:, CROSS_FACTOR] = cross_factor_of(terms)
+    drive[:, CROSS_INPUT] = cross_input_of(fin, core)
+    if core.crossflow != 0.0:
+        # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
+        cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
+        drive[:, FLOW[0]], drive[:, FLOW[1]] = cross[:-1], cross[1:]
+    else:
+        drive[:, FLOW[0] : FLOW[1] + 1] = 0.0
+    constants = constants_of(core)
+    return KernelInputs(drive, constants, _pieces(record, damping, base.stiffness, constants), fin, terms, core)
+
+
+def damping_of(base: Base, terms: Terms) -> FloatArray | float:
+    """Return the damping over each interval, (n-1,), or the one it is over all."""
+    damping = base.damping if terms.damping_factor is None else base.damping * over_intervals(terms.damping_factor)
+    return damping if terms.damping is None else damping + over_intervals(terms.damping)
+
+
+def moments_of(base: Base, fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
+    """Return the moment at both ends of each interval, (n-1,) each."""
+    start, end = (base.authority * side for side in scaled_fin(fin, terms))
+    if base.trim_of_fin and terms.authority_factor is not None:
+        trim = base.trim * terms.authority_factor
+        start, end = start + trim[:-1], end + trim[1:]
+    elif base.trim != 0.0:
+        start, end = start + base.trim, end + base.trim
+    return (start, end) if terms.moment is None else (start + terms.moment[:-1], end + terms.moment[1:])
+
+
+def cross_factor_of(terms: Terms) -> FloatArray | float:
+    """Return the speed over the run's own in the cross state's equation over each interval, (n-1,), or 1."""
+    return 1.0 if terms.cross_factor is None else over_intervals(terms.cross_factor)
+
+
+def cross_input_of(fin: FinPath, core: Core) -> FloatArray | float:
+    """Return the fin's input to the cross state's equation over each interval, (n-1,), or zero."""
+    return core.cross_fin * fin.mean if core.cross_fin != 0.0 else 0.0
+
+
+def constants_of(core: Core) -> FloatArray:
+    """Return a core's coefficients as the vector (14,) that the kernel takes; the fin's input to the cross state is a drive."""
+    return np.array(_CONSTANTS(core))
+
+
+def scaled_fin(fin: FinPath, terms: Terms) -> tuple[FloatArray, FloatArray]:
+    """Return fin angle times the authority factor at both ends of each interval, (n-1,) each."""
+    if terms.authority_factor is None:
+        return fin.start, fin.end
+    return fin.start * terms.authority_factor[:-1], fin.end * terms.authority_factor[1:]
+
+
+def integrate_record(record: Record, assembled: KernelInputs, start: FloatArray) -> FloatArray:
+    """Return angle, rate and cross state at the samples, (n, 3)."""
+    out = np.empty((len(record), 3))
+    integrate.integrate_motion(record.steps, assembled.drive, assembled.constants, start, assembled.pieces, out)
+    return out
+
+
+def with_moments(
+    record: Record, assembled: KernelInputs, effects: Sequence[Effect], values: Values, start: FloatArray
+) -> KernelInputs:
+    """Return the arrays with every state-dependent moment the core does not know, iterated to convergence.
+
+    Quasilinearisation: m(y, p) is replaced by its value and slopes along the last trajectory, the slopes joining
+    the held stiffness and damping; at the fixed point the slopes cancel (Bellman and Kalaba 1965).
+    """
+    own = [e for e in effects if e.moment is not None]
+    if not own:
+        return assembled
+    path = integrate_record(record, assembled, start)
+    current = assembled
+    for _ in range(MAX_MOMENT_ITERATIONS):
+        if not np.isfinite(path).all():
+            return current
+        drive = assembled.drive.copy()
+        for effect in own:
+            _add_moment(drive, effect, Motion(path[:, 0], path[:, 1]), values, record)
+        current = replace(assembled, drive=drive, pieces=_pieces(record, drive[:, 0], drive[:, 1], assembled.constants))
+        new = integrate_record(record, current, start)
+        change = float(np.max(np.abs(new[:, :2] - path[:, :2])))
+        path = new
+        if change < MOMENT_TOLERANCE * (1.0 + float(np.max(np.abs(new[:, :2])))):
+            break
+    return current
+
+
+def measured(motion: Motion, record: Record, effects: Sequence[Effect], values: Values) -> Motion:
+    """Return what the sensors show of a motion."""
+    for effect in effects:
+        if effect.measure is not None:
+            motion = effect.measure(motion, values, record)
+    return motion
+
+
+def _add_moment(drive: FloatArray, effect: Effect, motion: Motion, values: Values, record: Record) -> None:
+    if effect.moment is None:
+        return
+    step = 1e-5
+    value = effect.moment(motion, values, record)
+    by_angle = (
+        effect.moment(Motion(motion.angle + step, motion.rate), values, record)
+        - effect.moment(Motion(motion.angle - step, motion.rate), values, record)
+    ) / (2 * step)
+    by_rate = (
+        effect.moment(Motion(motion.angle, motion.rate + step), values, record)
+        - effect.moment(Motion(motion.angle, motion.rate - step), values, record)
+    ) / (2 * step)
+    slope_y, slope_p = over_intervals(by_angle), over_intervals(by_rate)
+    drive[:, 0] -= slope_p
+    drive[:, 1] -= slope_y
+    drive[:, 2] += value[:-1] - slope_p * motion.rate[:-1] - slope_y * motion.angle[:-1]
+    drive[:, 3] += value[1:] - slope_p * motion.rate[1:] - slope_y * motion.angle[1:]
+
+
+def pieces_for(step: float, *rates: float) -> int:
+    """Return the RK4 pieces of an interval of `step` s whose dynamics have these rates (1/s)."""
+    return ceil(min(max(1.0, step * max(rates) / MAX_RATE_STEP_PRODUCT), MAX_PIECES))
+
+
+def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray | float, constants: FloatArray) -> int:
+    cross = abs(float(constants[7])), sqrt(abs(float(constants[8])))
+    return pieces_for(record.longest, _largest(damping), sqrt(_largest(stiffness)), *cross)
+
+
+def _largest(values: FloatArray | float) -> float:
+    """Return the largest size of values, or of one."""
+    return max(float(values.max()), -float(values.min())) if isinstance(values, np.ndarray) else abs(values)
+
+
+def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+    if a is None or b is None:
+        return a if b is None else b
+    return a * b
+
+
+def _plus(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+    if a is None or b is None:
+        return a if b is None else b
+    return a + b

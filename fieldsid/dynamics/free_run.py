@@ -1,0 +1,124 @@
+"""Free-run simulation of a model along a record's fin: the model's own prediction, sensor effects included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measured, with_moments
+from fieldsid.errors import DivergenceError
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect, Motion, as_fitted, effect_held
+from fieldsid.models.model import Model
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+
+LIMITING_EFFECT = "quadratic_damping"
+"""The effect that holds a rate which the damping alone lets grow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """Simulated samples (n,): time s, measured angle rad, measured rate rad/s, cross state, fin angle rad."""
+
+    time: FloatArray
+    angle: FloatArray
+    rate: FloatArray
+    cross: FloatArray
+    fin: FloatArray
+
+
+def effects_of(model: Model) -> tuple[Effect, ...]:
+    """Return the effects that a model holds, in the forms it was fitted in; raises EffectError for one not known here."""
+    return tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
+
+
+def base_at(model: Model, speed: float) -> Base:
+    """Return the model's base parameters at a speed."""
+    names = NAMES[model.axis]
+    v = model.at_speed(speed)
+    stiffness = 0.0 if names.stiffness is None else v[names.stiffness]
+    return Base(v[names.damping], stiffness, v[names.authority], v[names.trim], model.law.trim_of_fin)
+
+
+def growing_hint(model: Model) -> str:
+    """Return what helps where a model grows without bound: the damping that holds it, where it has none."""
+    if LIMITING_EFFECT in model.effects:
+        return "the model is unstable there: identify again, from runs that reach as far"
+    effects = ",".join((*model.effects, LIMITING_EFFECT))
+    return f"the model is unstable there: `sysid identify RUN... --axis {model.axis.value} --effects {effects}`"
+
+
+def simulate(
+    model: Model,
+    record: Record,
+    *,
+    state: tuple[float, float, float] | None = None,
+    nuisance: Mapping[str, float] = MappingProxyType({}),
+    effects: tuple[Effect, ...] | None = None,
+) -> Trajectory:
+    """Return the free run of a model along a record.
+
+    state is the initial (angle rad, rate rad/s, cross state); by default the first measured angle and rate.
+    nuisance holds per-run coefficients (wave phase, event time); the coefficients' start values fill the rest.
+    Raises DivergenceError when the motion grows without bound.
+    """
+    parts = effects_of(model) if effects is None else effects
+    values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
+    values["damping_exponent"] = model.law.damping_exponent
+    if state is None:
+        state = (
+            float(record.angle[np.argmax(record.angle_ok)]),
+            float(record.rate[np.argmax(record.rate_ok)]) if record.rate_ok.any() else 0.0,
+            0.0,
+        )
+    start = np.array(state, dtype=np.float64)
+    arrays = assemble(record, parts, base_at(model, record.speed), values, model.law.scale(record.speed))
+    arrays = with_moments(record, arrays, parts, values, start)
+    out = integrate_record(record, arrays, start)
+    if not np.isfinite(out).all():
+        at = float(record.time[np.argmin(np.isfinite(out[:, 1]))])
+        raise DivergenceError(
+            f"the {model.axis.value} model grows without bound on run {record.name!r}",
+            found=f"diverged at t = {at:.2f} s",
+            hint=growing_hint(model),
+        )
+    shown = measured(Motion(out[:, 0], out[:, 1]), record, parts, values)
+    fin = np.append(arrays.fin.start, arrays.fin.end[-1])
+    return Trajectory(record.time, shown.angle, shown.rate, out[:, 2], fin)
+
+
+def command_record(
+    axis: Axis,
+    time: npt.ArrayLike,
+    fin: npt.ArrayLike,
+    *,
+    speed: float,
+    signals: Mapping[str, FloatArray] = MappingProxyType({}),
+    name: str = "command",
+) -> Record:
+    """Return a record made of a held fin command alone, time (n,) s and fin (n,) rad, at a speed in m/s.
+
+    Helper roles that are not given are filled as on a steady straight run: surge at `speed`, the rest zero.
+    """
+    t = np.ascontiguousarray(time, dtype=np.float64)
+    none = np.zeros(t.size, dtype=bool)
+    steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth", "cross")} | {"surge": np.full(t.size, speed)}
+    return Record(
+        name=name,
+        axis=axis,
+        time=t,
+        fin=np.ascontiguousarray(fin, dtype=np.float64),
+        fin_is_held=True,
+        fin_is_measured=False,
+        angle=np.zeros(t.size),
+        rate=np.zeros(t.size),
+        angle_ok=none,
+        rate_ok=none,
+        signals=MappingProxyType(steady | dict(signals)),
+        speed=speed,
+    )

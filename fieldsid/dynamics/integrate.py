@@ -1,0 +1,50 @@
+"""A vehicle's motion and its tangents: by the linear core where the motion is linear on an even clock, else by the general one.
+
+The equations, drives and constants are those of dynamics/nonlinear_kernel.py.
+"""
+
+from __future__ import annotations
+
+from fieldsid.dynamics.linear_kernel import linear_motion, linear_sensitivities
+from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion, nonlinear_sensitivities
+from fieldsid.numerics.arrays import FloatArray, IntArray
+
+DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
+CONSTANTS = (
+    "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
+    "cross_damping", "cross_rate", "cross_quadratic", "beyond_square", "heading_sin2", "heading_cos2", "heading_turn",
+)  # fmt: skip
+
+
+def integrate_motion(
+    steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
+) -> None:
+    """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on.
+
+    steps (n-1,) s, drive (n-1, 8) in the order of DRIVES, c (14,) in that of CONSTANTS, start (3,).
+    """
+    if not linear_motion(steps, drive, c, start, pieces, out):
+        nonlinear_motion(steps, drive, c, start, pieces, out)
+
+
+def integrate_with_sensitivities(
+    steps: FloatArray,
+    drive: FloatArray,
+    c: FloatArray,
+    start: FloatArray,
+    pieces: int,
+    columns: FloatArray,
+    place: IntArray,
+    factor: FloatArray,
+    d_c: FloatArray,
+    d_start: FloatArray,
+    out: FloatArray,
+    sens: FloatArray,
+) -> None:
+    """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
+
+    A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says; none goes
+    with the flow. d_c (P, 14) are those of the constants, d_start (P, 3) those of the initial state.
+    """
+    if not linear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens):
+        nonlinear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens)

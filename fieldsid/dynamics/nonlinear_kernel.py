@@ -1,0 +1,305 @@
+"""The compiled core of any motion: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
+
+    y' = p
+    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) + x
+         + hs sin z + hc cos z + hs2 sin 2z + hc2 cos 2z + rs (z - sin z) + rc (cos z - 1)
+    z = y - ht (t - the middle of the run)
+    x' = -e g x - (D/g) x|x| - f g^2 p + q
+    F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
+a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
+start to its end. The tangents are the
+derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.dynamics.linear_kernel import (
+    DIVERGED_RATE_RAD_S,
+    crosses_limit,
+    crosses_limit_by,
+    reverses,
+    set_all_diverged,
+    set_diverged,
+)
+from fieldsid.models.effect import REFERENCE_RATE_RAD_S, ZERO_RATE_RAD_S
+from fieldsid.numerics.arrays import FloatArray, IntArray
+from fieldsid.numerics.jit import inner, jit
+
+SMALLEST_SPEED_RATIO = 0.01
+"""Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
+SMALLEST_WEIGHT = 1e-150
+AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, FLOW, BY_LENGTH, SIN, COS, ARC, BY_TURN = range(16)
+"""What is kept of each stage of a step: the state and the share of the interval; the derivatives of p' by y and by p, of -x'
+by x and by the cross factor; and what the derivatives of the constants multiply."""
+STAGE_COLUMNS = 16
+
+
+@inner
+def crossflow(alpha: float, p: float) -> tuple[float, float, float]:
+    """Return F(alpha, p) and its derivatives by alpha and by p, from the closed form of the integral."""
+    if abs(alpha) >= 0.5 * abs(p):
+        s = 1.0 if alpha >= 0.0 else -1.0
+        return 16.0 / 3.0 * abs(alpha) * p, 16.0 / 3.0 * s * p, 16.0 / 3.0 * abs(alpha)
+    s = 1.0 if p >= 0.0 else -1.0
+    ratio = alpha / p
+    value = s * (p * p + 8.0 * alpha * alpha - 16.0 / 3.0 * alpha * alpha * ratio * ratio)
+    by_alpha = s * (16.0 * alpha - 64.0 / 3.0 * alpha * ratio * ratio)
+    by_p = s * (2.0 * p + 32.0 / 3.0 * alpha * ratio * ratio * ratio)
+    return value, by_alpha, by_p
+
+
+@inner
+def power_drag(p: float, beyond: float) -> tuple[float, float]:
+    """Return p|p| (|p|/ORDINARY)^beyond and its logarithmic derivative by `beyond`; both are nil at rest."""
+    if abs(p) < ZERO_RATE_RAD_S:
+        return 0.0, 0.0
+    log = np.log(abs(p) / REFERENCE_RATE_RAD_S)
+    return p * abs(p) * np.exp(beyond * log), log
+
+
+@inner
+def _weight(stage: int) -> float:
+    """Return the weight of a stage of the RK4 rule, times six."""
+    return 1.0 + (stage % 3 != 0)
+
+
+@inner
+def _reach(stage: int) -> float:
+    """Return the part of a step at which a stage is taken."""
+    return 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+
+
+@inner
+def _total(steps: FloatArray) -> float:
+    """Return the sum of steps; a loop compiles in a fraction of what an array's method takes."""
+    total = 0.0
+    for i in range(steps.shape[0]):
+        total += steps[i]
+    return total
+
+
+@jit
+def nonlinear_motion(
+    steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
+) -> None:
+    """Fill out (n, 3) as `integrate.integrate_motion` does, whatever the motion and the clock."""
+    n = steps.shape[0] + 1
+    y, p, x = start[0], start[1], start[2]
+    out[0, 0], out[0, 1], out[0, 2] = y, p, x
+    turning, late = reverses(c), -0.5 * _total(steps)
+    for i in range(n - 1):
+        h = steps[i] / pieces
+        a, k = drive[i, 0], drive[i, 1]
+        e, f_cross, hold, q = (
+            c[7] * drive[i, 4],
+            c[8] * drive[i, 4] ** 2,
+            c[9] / max(drive[i, 4], SMALLEST_SPEED_RATIO),
+            drive[i, 5],
+        )
+        for piece in range(pieces):
+            ky, kp, kx = 0.0, 0.0, 0.0
+            ty, tp, tx = 0.0, 0.0, 0.0
+            for stage in range(4):
+                g = _reach(stage) * h
+                part = (piece + _reach(stage)) / pieces
+                ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
+                m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
+                drag = ps * abs(ps) if c[10] == 0.0 else power_drag(ps, c[10])[0]
+                f = -a * ps - k * ys + m - c[0] * drag + xs
+                if c[1] != 0.0:
+                    w = drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part
+                    f -= c[1] * crossflow(w / c[2], ps)[0]
+                if turning:
+                    seen = ys - c[13] * (late + part * steps[i])
+                    sin, cos = np.sin(seen), np.cos(seen)
+                    f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0)
+                    f += 2.0 * c[11] * sin * cos + c[12] * (1.0 - 2.0 * sin * sin)
+                ky, kp, kx = ps, f, -(e + hold * abs(xs)) * xs - f_cross * ps + q
+                ty += _weight(stage) * ky
+                tp += _weight(stage) * kp
+                tx += _weight(stage) * kx
+            y += h / 6.0 * ty
+            p += h / 6.0 * tp
+            x += h / 6.0 * tx
+        if not abs(p) < DIVERGED_RATE_RAD_S:
+            set_diverged(out, i + 1)
+            return
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        late += steps[i]
+
+
+@inner
+def _map_row(row: int, h: float, turn: float, stages: FloatArray, rows: FloatArray, push: FloatArray, pull: FloatArray) -> None:
+    """Fill one row of a step's linear map: rows (3, 9) of the state and of what enters, push and pull (3, 4) of each stage.
+
+    A tangent obeys s' = A_l s + b u_l at stage l of the step, so that s -> s + sum_l W_l (A_l s + b u_l) with
+    W_4 = h/6, W_3 = h/3 + h W_4 A_4, W_2 = h/3 + h/2 W_3 A_3, W_1 = h/6 + h/2 W_2 A_2: the same for every parameter.
+    """
+    in_y, in_p, in_x = 1.0 * (row == 0), 1.0 * (row == 1), 1.0 * (row == 2)
+    of_y, of_p, of_x = in_y, in_p, in_x
+    v_y, v_p, v_x, part = 0.0, 0.0, 0.0, 0.0
+    one, of_cross, by_factor = 0.0, 0.0, 0.0
+    for back in range(4):
+        l = 3 - back
+        whole = _weight(l) * h / 6.0
+        w_y, w_p, w_x = part * v_y + whole * in_y, part * v_p + whole * in_p, part * v_x + whole * in_x
+        v_y, v_p, v_x = w_p * stages[BY_Y, l], w_y + w_p * stages[BY_P, l] - w_x * turn, w_p - w_x * stages[BY_X, l]
+        of_y, of_p, of_x = of_y + v_y, of_p + v_p, of_x + v_x
+        one, of_cross, by_factor = one + w_p, of_cross + w_x, by_factor - w_x * stages[BY_FACTOR, l]
+        push[row, l], pull[row, l] = w_p, w_x
+        part = _reach(l) * h
+    rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3] = of_y, of_p, of_x, one
+    rows[row, 7], rows[row, 8] = of_cross, by_factor
+
+
+@inner
+def _map_rates(row: int, stages: FloatArray, push: FloatArray, rows: FloatArray) -> None:
+    """Fill what changes from step to step, and from piece to piece of one, in a row of the linear map of a linear motion."""
+    rising, by_a, by_k = 0.0, 0.0, 0.0
+    for l in range(4):
+        rising += push[row, l] * stages[PART, l]
+        by_a, by_k = by_a - push[row, l] * stages[AT_P, l], by_k - push[row, l] * stages[AT_Y, l]
+    rows[row, 4], rows[row, 5], rows[row, 6] = rising, by_a, by_k
+
+
+@jit
+def nonlinear_sensitivities(
+    steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
+    factor: FloatArray, d_c: FloatArray, d_start: FloatArray, out: FloatArray, sens: FloatArray,
+) -> None:  # fmt: skip
+    """Fill out (n, 3) and sens (P, 2, n) as `integrate.integrate_with_sensitivities` does, whatever the motion and the clock.
+
+    All parameters go through one linear map a step, see `_map_row`.
+    """
+    n, count = steps.shape[0] + 1, d_c.shape[0]
+    s, has_c = np.zeros((count, 3)), np.zeros(count)
+    stages, rows, push, pull = np.zeros((STAGE_COLUMNS, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
+    turning, flowing, raised, late = reverses(c), c[1] != 0.0, c[10] != 0.0, -0.5 * _total(steps)
+    crossing = crosses_limit(drive, c, start)
+    for j in range(count):
+        for l in range(3):
+            s[j, l] = d_start[j, l]
+        for l in range(d_c.shape[1]):
+            has_c[j] += d_c[j, l] != 0.0
+        sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
+        turning, flowing = turning or reverses(d_c[j]), flowing or d_c[j, 1] != 0.0
+        raised, crossing = (
+            raised or d_c[j, 10] != 0.0,
+            crossing or crosses_limit_by(d_c[j]) or s[j, 2] != 0.0 or factor[j, 5] != 0.0,
+        )
+    bent = crossing or turning or flowing or raised or c[0] != 0.0
+    last_h, last_a, last_k = -1.0, 0.0, 0.0
+    y, p, x = start[0], start[1], start[2]
+    out[0, 0], out[0, 1], out[0, 2] = y, p, x
+    for i in range(n - 1):
+        h = steps[i] / pieces
+        a, k = drive[i, 0], drive[i, 1]
+        fast = drive[i, 4]
+        floored = max(fast, SMALLEST_SPEED_RATIO)
+        damp, turn, hold, q = c[7] * fast, c[8] * fast * fast, c[9] / floored, drive[i, 5]
+        for piece in range(pieces):
+            ky, kp, kx = 0.0, 0.0, 0.0
+            ty, tp, tx = 0.0, 0.0, 0.0
+            for stage in range(4):
+                g, part, wt = _reach(stage) * h, (piece + _reach(stage)) / pieces, _weight(stage)
+                ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
+                m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
+                drag, log = ps * abs(ps), 0.0
+                by_y, by_p = -k, -a - 2.0 * c[0] * abs(ps)
+                if raised:
+                    drag, log = power_drag(ps, c[10])
+                    by_p = -a - (2.0 + c[10]) * c[0] * drag / (ps if abs(ps) > ZERO_RATE_RAD_S else 1.0)
+                f = -a * ps - k * ys + m - c[0] * drag + xs
+                if flowing:
+                    alpha = (drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part) / c[2]
+                    flow, by_alpha, by_rate = crossflow(alpha, ps)
+                    f -= c[1] * flow
+                    by_p -= c[1] * by_rate
+                    stages[FLOW, stage], stages[BY_LENGTH, stage] = flow, c[1] * by_alpha * alpha / c[2]
+                if turning:
+                    clock = late + part * steps[i]
+                    seen = ys - c[13] * clock
+                    sin, cos = np.sin(seen), np.cos(seen)
+                    sin2, cos2 = 2.0 * sin * cos, 1.0 - 2.0 * sin * sin
+                    f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0) + c[11] * sin2 + c[12] * cos2
+                    slope = c[3] * cos - c[4] * sin + 2.0 * (c[11] * cos2 - c[12] * sin2) + c[5] * (1.0 - cos) - c[6] * sin
+                    by_y += slope
+                    stages[SIN, stage], stages[COS, stage], stages[ARC, stage] = sin, cos, seen - sin
+                    stages[BY_TURN, stage] = slope * clock
+                square = xs * abs(xs)
+                stages[AT_Y, stage], stages[AT_P, stage], stages[AT_X, stage], stages[PART, stage] = ys, ps, xs, part
+                stages[BY_Y, stage], stages[BY_P, stage], stages[BY_X, stage] = by_y, by_p, damp + 2.0 * hold * abs(xs)
+                stages[BY_FACTOR, stage] = c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square
+                stages[DRAG, stage], stages[BY_POWER, stage] = drag, c[0] * log * drag
+                ky, kp, kx = ps, f, -damp * xs - hold * square - turn * ps + q
+                ty += wt * ky
+                tp += wt * kp
+                tx += wt * kx
+            y += h / 6.0 * ty
+            p += h / 6.0 * tp
+            x += h / 6.0 * tx
+            for row in range(2 + crossing):
+                if bent or not (a == last_a and k == last_k and abs(h - last_h) < 1e-9 * h):
+                    _map_row(row, h, turn, stages, rows, push, pull)
+                _map_rates(row, stages, push, rows)
+            last_h, last_a, last_k = h, a, k
+            for j in range(count):
+                # written out: each call that hands over arrays would cost as much as what it does
+                sy, sp, sx = s[j, 0], s[j, 1], s[j, 2]
+                to_y = rows[0, 0] * sy + rows[0, 1] * sp
+                to_p = rows[1, 0] * sy + rows[1, 1] * sp
+                to_x = 0.0
+                if crossing:
+                    to_y += rows[0, 2] * sx
+                    to_p += rows[1, 2] * sx
+                    to_x = rows[2, 0] * sy + rows[2, 1] * sp + rows[2, 2] * sx
+                if factor[j, 2] != 0.0 or factor[j, 3] != 0.0:
+                    m = factor[j, 2] * columns[place[j, 2], i]
+                    slope = factor[j, 3] * columns[place[j, 3], i] - m
+                    to_y += rows[0, 3] * m + rows[0, 4] * slope
+                    to_p += rows[1, 3] * m + rows[1, 4] * slope
+                    if crossing:
+                        to_x += rows[2, 3] * m + rows[2, 4] * slope
+                if factor[j, 0] != 0.0 or factor[j, 1] != 0.0:
+                    d_a, d_k = factor[j, 0] * columns[place[j, 0], i], factor[j, 1] * columns[place[j, 1], i]
+                    to_y += rows[0, 5] * d_a + rows[0, 6] * d_k
+                    to_p += rows[1, 5] * d_a + rows[1, 6] * d_k
+                    if crossing:
+                        to_x += rows[2, 5] * d_a + rows[2, 6] * d_k
+                if crossing and (factor[j, 4] != 0.0 or factor[j, 5] != 0.0):
+                    d_fast, d_q = factor[j, 4] * columns[place[j, 4], i], factor[j, 5] * columns[place[j, 5], i]
+                    to_y += rows[0, 7] * d_q + rows[0, 8] * d_fast
+                    to_p += rows[1, 7] * d_q + rows[1, 8] * d_fast
+                    to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
+                if has_c[j] > 0.0:
+                    for l in range(4):
+                        ps, xs = stages[AT_P, l], stages[AT_X, l]
+                        e = -d_c[j, 0] * stages[DRAG, l] - d_c[j, 10] * stages[BY_POWER, l]
+                        if flowing:
+                            e += d_c[j, 2] * stages[BY_LENGTH, l] - d_c[j, 1] * stages[FLOW, l]
+                        if turning:
+                            sin, cos = stages[SIN, l], stages[COS, l]
+                            e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * stages[ARC, l] + d_c[j, 6] * (cos - 1.0)
+                            e += 2.0 * d_c[j, 11] * sin * cos + d_c[j, 12] * (1.0 - 2.0 * sin * sin)
+                            e -= d_c[j, 13] * stages[BY_TURN, l]
+                        to_y += push[0, l] * e
+                        to_p += push[1, l] * e
+                        if crossing:
+                            z = d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * xs * abs(xs)
+                            to_y -= pull[0, l] * z
+                            to_p -= pull[1, l] * z
+                            to_x += push[2, l] * e - pull[2, l] * z
+                # a start's influence dies out; below the normal numbers it would only cost time, eightfold
+                s[j, 0] = to_y if abs(to_y) > SMALLEST_WEIGHT else 0.0
+                s[j, 1] = to_p if abs(to_p) > SMALLEST_WEIGHT else 0.0
+                s[j, 2] = to_x if abs(to_x) > SMALLEST_WEIGHT else 0.0
+        if not abs(p) < DIVERGED_RATE_RAD_S:
+            set_diverged(out, i + 1)
+            set_all_diverged(sens, i + 1)
+            return
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        late += steps[i]
+        for j in range(count):
+            sens[j, 0, i + 1], sens[j, 1, i + 1] = s[j, 0], s[j, 1]

@@ -1,0 +1,122 @@
+"""What a step takes where nothing is given: the folder's vehicle and effects, the limits of the fin, the models' own runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from fieldsid.effects._user_folder import add_user_effects
+from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.models.axis import Axis
+from fieldsid.registry import near
+from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
+
+if TYPE_CHECKING:
+    from fieldsid.schedule import Schedule
+    from fieldsid.turning import ParameterSource
+
+File: TypeAlias = "str | PathLike[str]"
+OWN_EFFECTS = Path("effects")
+
+
+def own_effects() -> None:
+    """Make the user's effects of the working folder known, as every command does; raises EffectError naming the file."""
+    if OWN_EFFECTS.is_dir():
+        add_user_effects(OWN_EFFECTS)
+
+
+def axis_of(axis: Axis | str) -> Axis:
+    """Return an axis by its name; raises UsageError."""
+    known = [a.value for a in Axis]
+    if axis not in known:
+        raise UsageError(f"there is no axis {axis!r}", found=", ".join(known), hint=near(str(axis), known))
+    return Axis(axis)
+
+
+def names_of(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names given one by one, or as the command line takes them: `a,b` or `a+b`."""
+    parts = names.replace("+", ",").split(",") if isinstance(names, str) else names
+    return tuple(n.strip() for n in parts if n.strip())
+
+
+def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle | None:
+    """Return a vehicle, that of a file, or without one that of the working folder where it has one; raises VehicleError."""
+    if isinstance(vehicle, Vehicle):
+        return vehicle
+    return find_vehicle(Path()) if vehicle is None else load_vehicle(Path(vehicle))
+
+
+def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
+    """Return the fin limits of a vehicle in rad by signal, without those it does not state."""
+    if vehicle is None:
+        return {}
+    limits = {"rudder_rad": vehicle.rudder_max_rad, "elevator_rad": vehicle.elevator_max_rad}
+    return {signal: limit for signal, limit in limits.items() if limit is not None}
+
+
+def rudder_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None]) -> float:
+    """Return the rudder of a turn in rad where none is given: the vehicle's limit, or the largest the models were trained on.
+
+    say is told of the last. Raises UsageError where there is none.
+    """
+    if vehicle is not None and vehicle.rudder_max_rad is not None:
+        return vehicle.rudder_max_rad
+    trained = _trained(source)
+    if trained is not None:
+        say(f"rudder: {trained:.4g} rad, the largest in the models' runs; `--rudder-max` takes another")
+        return trained
+    raise UsageError(
+        "how far does the rudder go in the turn", found="no --rudder-max and no vehicle.yaml", hint="add `--rudder-max 0.26`"
+    )
+
+
+def fin_limits_of(
+    given: float | None, fin_rate: float | None, vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None]
+) -> tuple[float, float | None]:
+    """Return the limit of the fin (rad), given or found as `rudder_of` does, and of its rate (rad/s), given or the vehicle's."""
+    rate = fin_rate if fin_rate is not None or vehicle is None else vehicle.fin_rate_rad_s
+    if given is not None:
+        return given, rate
+    if vehicle is not None and (limit := vehicle.fin_max_rad(source.axis.value)) is not None:
+        return limit, rate
+    trained = _trained(source)
+    if trained is not None:
+        say(f"fin limit: {trained:.4g} rad, the largest in the models' runs; `--fin-limit` takes another")
+        return trained, rate
+    raise UsageError("how far does the fin go", found="no --fin-limit and no vehicle.yaml", hint="add `--fin-limit 0.26`")
+
+
+def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]:
+    """Return the logs that the model files of a source name, where they still are; say is told where some are not.
+
+    Models without effects go by a formula, which needs none.
+    """
+    from fieldsid.plant.parameter_source import logs_of
+
+    if not any(m.effects for m in source.models):
+        return []
+    named = logs_of(source.paths)
+    there = [p for p in named if p.is_file() or p.is_dir()]
+    if len(there) < len(named):
+        say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
+    return there
+
+
+def designed_from(schedule: Schedule, name: str) -> list[Path]:
+    """Return the files of the models a schedule was designed from; raises ArtifactError where they are not there any more."""
+    named = [Path(str(m["path"])) for m in schedule.provenance.get("models", [])]
+    missing = [p for p in named if not p.is_file()]
+    if not named or missing:
+        raise ArtifactError(
+            f"the models of `{name}` are not where they were",
+            found=", ".join(map(str, missing)) or "none named",
+            hint=f"name them: `sysid schedule verify {name} --model MODEL`",
+        )
+    return named
+
+
+def _trained(source: ParameterSource) -> float | None:
+    fins: Sequence[float] = [m.trained["fin_max"] for m in source.models if m.trained.get("fin_max", 0.0) > 0]
+    return max(fins, default=None)

@@ -1,0 +1,141 @@
+"""What a fit's residual says of the path from the log to the fin: an ignored delay, a clock that is off, a hidden instability.
+
+Each is suspected by one Gauss-Newton step from the fit with one effect more, under the noise of the fit: a score test.
+What is said is that of a refit with the effect: a step tells whether, not how far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.errors import FieldsidError
+from fieldsid.fitting.covariance.reml import MAX_NOISE_SAMPLES, gls_step, linearise_runs
+from fieldsid.fitting.initial.effect_screen import with_effect
+from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_marquardt
+from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, white_weights
+from fieldsid.fitting.problem.estimator import Solution
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Note
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import effect_named
+from fieldsid.noise.whiten import noise_vector
+
+CLEAR_STD_ERRORS = 4.0
+"""Standard errors from which an estimate counts."""
+MIN_DELAY_S, MAX_INITIAL_DELAY_S = 0.02, 0.2
+"""Smallest delay that is reported, and the largest that a refit starts from: the larger a first-order step, the less reliable it
+is."""
+MIN_DRAG_LIKELIHOOD_GAIN = 10.0
+"""Log likelihood the refit with quadratic damping must gain."""
+FIN_TIMING = ("delay", "servo_lag", "rate_limit", "backlash", "clock_offset")
+LIMITING_EFFECTS = ("quadratic_damping", "crossflow_drag")
+
+
+def score_tests(problem: Problem, solution: Solution) -> tuple[Note, ...]:
+    """Return the suspicions a fit's residual raises."""
+    problem, known = problem.first(MAX_NOISE_SAMPLES // len(problem.records)), {e.name for e in problem.layout.effects}
+    notes: list[Note] = []
+    if not known & set(FIN_TIMING):
+        notes += _timing(problem, solution)
+    if not known & set(LIMITING_EFFECTS):
+        notes += _instability(problem, solution)
+    return tuple(notes)
+
+
+def score_test(problem: Problem, solution: Solution, effect: str, name: str, at: float) -> tuple[float, float]:
+    """Return what one step gives for a coefficient of an effect that is not in the fit, and its error."""
+    longer, x = with_effect(problem, solution.x, effect_named(effect), {name: at})
+    step, inverse = gls_step(linearise_runs(longer, x), len(x), noise_vector(solution.noise))
+    slot = longer.layout.names.index(name)
+    return at + float(step[slot]), float(np.sqrt(inverse[slot, slot]))
+
+
+@dataclass(frozen=True, slots=True)
+class Lateness:
+    """A refit with the fin late (s > 0) or early: how late, the damping with it, its error, and without it in the same fit."""
+
+    late: float
+    damping: float
+    damping_error: float
+    without: float
+
+
+def lateness(problem: Problem, solution: Solution, begin: float) -> Lateness | None:
+    """Return how late the vehicle answers the logged fin, from a refit that begins at a lateness in s of either sign.
+
+    Early can only be a clock. None where the refit does not settle within the coefficient's bounds, clear of zero, at a lower
+    error: then nothing is known of how late it is.
+    """
+    effect, name = ("delay", "delay") if begin > 0.0 else ("clock_offset", "offset")
+    weights = solution.weights or white_weights(problem, solution.x)
+    longer, x = with_effect(
+        problem, solution.x, effect_named(effect), {name: float(np.clip(begin, -MAX_INITIAL_DELAY_S, MAX_INITIAL_DELAY_S))}
+    )
+    without, found = levenberg_marquardt(problem, solution.x, weights), levenberg_marquardt(longer, x, weights)
+    slot, at = longer.layout.names.index(name), longer.layout.names.index(NAMES[problem.layout.axis].damping)
+    error = np.sqrt(np.diag(covariance(found.normal)))
+    late, bounds = float(found.x[slot]), longer.layout.parameters[slot]
+    settled = found.converged and found.cost < without.cost and bounds.low < late < bounds.high
+    if not settled or late * begin < 0.0 or abs(late) < max(CLEAR_STD_ERRORS * float(error[slot]), MIN_DELAY_S):
+        return None
+    before = float(without.x[problem.layout.names.index(NAMES[problem.layout.axis].damping)])
+    return Lateness(late, float(found.x[at]), float(error[at]), before)
+
+
+def _timing(problem: Problem, solution: Solution) -> Iterator[Note]:
+    value, error = score_test(problem, solution, "delay", "delay", 0.5 * MIN_DELAY_S)
+    if not np.isfinite(value) or abs(value) < max(CLEAR_STD_ERRORS * error, MIN_DELAY_S):
+        return
+    found = lateness(problem, solution, value)
+    if found is None:
+        return
+    name = NAMES[problem.layout.axis].damping
+    known = abs(found.damping) > CLEAR_STD_ERRORS * found.damping_error
+    bias = 100.0 * (found.without / found.damping - 1.0) if known else None
+    moves = f"left out, it moves {problem.layout.shown(name)} from {found.damping:.3g} to {found.without:.3g} 1/s" + (
+        f" ({bias:+.0f} %)" if known else ""
+    )
+    data = {"value": found.late, "limit": MIN_DELAY_S, "with": found.damping, "without": found.without, "bias_percent": bias}
+    if found.late > 0.0:
+        yield Note(
+            "ignored_delay",
+            f"the vehicle answers about {1e3 * found.late:.0f} ms after the logged fin (limit {1e3 * MIN_DELAY_S:.0f} ms): "
+            f"{moves}; log the measured fin, or use `--effects delay` or `--effects servo_lag`",
+            data,
+        )
+    else:
+        yield Note(
+            "negative_delay",
+            f"the vehicle answers about {-1e3 * found.late:.0f} ms BEFORE the logged fin: no lag can be negative, it is a clock "
+            f"that is off, or a controller; {moves}; use `--effects clock_offset`, or stamp both by one clock",
+            data,
+        )
+
+
+def _instability(problem: Problem, solution: Solution) -> Iterator[Note]:
+    """Yield the finding that quadratic damping holds a vehicle whose linear yaw is unstable."""
+    value, error = score_test(problem, solution, "quadratic_damping", "quadratic", 0.05)
+    if not value > CLEAR_STD_ERRORS * error:
+        return
+    longer, x = with_effect(problem, solution.x, effect_named("quadratic_damping"), {"quadratic": 0.05})
+    try:
+        found = levenberg_marquardt(longer, x, white_weights(problem, solution.x), max_iterations=15, tolerance=1e-5)
+    except FieldsidError:
+        return
+    name = NAMES[problem.layout.axis].damping
+    slot = longer.layout.names.index(name)
+    damping = float(found.x[slot])
+    spread = float(np.sqrt(covariance(found.normal)[slot, slot]))
+    gained = negative_log_likelihood(problem, solution.x) - negative_log_likelihood(longer, found.x)
+    if damping < -2.0 * spread and gained > MIN_DRAG_LIKELIHOOD_GAIN:
+        yield Note(
+            "hidden_instability",
+            f"UNSTABLE: with quadratic damping the fit is far better (log likelihood {gained:+.0f}) and "
+            f"{problem.layout.shown(name)} = {damping:.3g} "
+            f"+/- {spread:.2g} 1/s is negative: the vehicle turns by itself, the linear fit hides it; "
+            "use `--effects quadratic_damping`",
+            {"value": damping, "std_error": spread, "limit": 0.0, "gained": gained},
+        )

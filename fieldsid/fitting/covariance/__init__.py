@@ -1,0 +1,1 @@
+"""Standard errors: the noise by restricted likelihood, small-sample corrections."""

@@ -1,0 +1,1 @@
+"""Initial values: without simulation, by screening effects, by forward build-up."""

@@ -1,0 +1,327 @@
+"""The screen of effects: the first-order prediction of how far the cost falls if one effect is added, at each scan point.
+
+At a scan point the residual e and the sensitivities C to the effect's coefficients are computed; both are projected off the span
+of the parent's sensitivities, and C is solved for. There is no descent: screening the catalogue costs as much as one refit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.fitting.initial.joint_grid_search import joint_grid_search
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
+from fieldsid.fitting.problem.parameters import ParameterLayout, SpeedGroups, group_name, layout_of
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Coefficient, Effect
+from fieldsid.models.model import Noise
+from fieldsid.noise.whiten import whiten
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.gram_least_squares import solve_normal_equations
+from fieldsid.rounding import nine_digits
+
+MAX_SCAN_POINTS = 12
+MAX_BACKTRACKS = 4
+WEAK_START_SHARE = 0.03
+"""Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's."""
+MIN_COLUMN_NORM, MIN_INDEPENDENT_SHARE = 1e-9, 1e-8
+MIN_HULL_RATE_1_S = 1e-3
+"""1/s; a base model that lacks an effect may have almost no damping."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenResult:
+    """The prediction for one effect: cost (weighted sum of squares), scan point, start after a full step, and its problem."""
+
+    effect: Effect
+    predicted_cost: float
+    point: FloatArray
+    start: FloatArray
+    problem: Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Linearisation:
+    """A model linearised at x: its residuals (2, n), and an orthonormal basis (rows, rank) of its whitened sensitivities.
+
+    For each run also a basis of the sensitivities to its nuisances, and the sensitivities to the shared parameters (S, rows).
+    """
+
+    problem: Problem
+    x: FloatArray
+    noise: Noise
+    basis: FloatArray
+    nuisance_basis: tuple[FloatArray, ...]
+    shared: tuple[FloatArray, ...]
+    residuals: tuple[FloatArray, ...]
+    cost: float
+
+
+def with_effect(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[str, float]) -> tuple[Problem, FloatArray]:
+    """Return the problem with one effect more, and the parent's x with the effect's coefficients at the given values."""
+    problem = parent.with_effects((*parent.layout.effects, effect))
+    layout = problem.layout
+    start = transfer_parameters(parent.layout, x, layout, values)
+    if effect.extra_states and "damping_exponent" in layout.names:
+        # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
+        place = layout.names.index("damping_exponent")
+        start[place] = np.clip(start[place], 0.0, 1.2)
+    return problem, start
+
+
+def transfer_parameters(
+    old: ParameterLayout, x: FloatArray, new: ParameterLayout, values: Mapping[str, float] = MappingProxyType({})
+) -> FloatArray:
+    """Return x of one layout in another's order; parameters the first lacks take the given values, else their start values."""
+    known = {(s.name, s.run): v for s, v in zip(old.parameters, x, strict=True)}
+    return np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in new.parameters])
+
+
+def under_other_speed_law(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a problem under the other speed law, and x transferred to it.
+
+    At several speeds: one authority for all groups, or one for each. At a single one: damping that scales with the runs' slightly
+    different speeds, or not.
+    """
+    old = problem.layout.groups
+    several = len(old.speeds) > 1
+    return under_speed_groups(
+        problem, x, replace(old, by_law=not old.by_law) if several else replace(old, exponent=1.0 - old.exponent)
+    )
+
+
+def under_speed_groups(problem: Problem, x: FloatArray, groups: SpeedGroups) -> tuple[Problem, FloatArray]:
+    """Return a problem with its runs' speeds taken in another way, and x carried over."""
+    old = problem.layout
+    new = layout_of(problem.records, old.axis, old.effects, groups)
+    authority = NAMES[old.axis].authority
+    shared = float(x[old.names.index(authority)])
+    lifted = {group_name(authority, groups, g): shared * groups.over_reference(g) ** 2 for g in range(len(groups.speeds))}
+    return Problem(problem.records, new), transfer_parameters(old, x, new, lifted)
+
+
+def overlay_parameters(old: ParameterLayout, x: FloatArray, new: ParameterLayout, own: FloatArray) -> FloatArray:
+    """Return a layout's own vector with the numbers of another layout's wherever that has them."""
+    known = {(s.name, s.run): v for s, v in zip(old.parameters, x, strict=True)}
+    return np.array([known.get((s.name, s.run), v) for s, v in zip(new.parameters, own, strict=True)])
+
+
+def equivalent_solution(problem: Problem, x: FloatArray, effect: Effect) -> FloatArray | None:
+    """Return x at the equivalent solution of an effect, of the same response at one speed; None where there is none."""
+    layout = problem.layout
+    values = dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    twin = None if effect.equivalent_solution is None else effect.equivalent_solution(values, layout.axis)
+    if twin is None:
+        return None
+    names, start = NAMES[layout.axis], x.copy()
+    for i, slot in enumerate(layout.parameters):
+        if slot.name in twin:
+            start[i] = np.clip(twin[slot.name], slot.low, slot.high)
+        elif slot.name.startswith(f"{names.authority}@") and values[names.authority] != 0.0:
+            start[i] *= twin.get(names.authority, values[names.authority]) / values[names.authority]
+    return start
+
+
+def linearise_at(problem: Problem, x: FloatArray, noise: Noise) -> Linearisation:
+    """Return the linearisation of a model at x, of all runs and of each run alone."""
+    columns, own, shared, residuals, total = [], [], [], [], 0.0
+    first_own = problem.layout.shared
+    for run, record in enumerate(problem.records):
+        result = problem.linearise(x, run)
+        residuals.append(result.residual)
+        white, _ = whiten(record, noise, result.base.damping, result.base.stiffness, result.stack)
+        flat = white.reshape(white.shape[0], -1)
+        total += float(flat[0] @ flat[0])
+        block = np.zeros((flat.shape[1], len(problem.layout.parameters)))
+        block[:, list(result.columns)] = flat[1:].T
+        columns.append(block)
+        own.append(_orthonormal(block[:, first_own:]))
+        shared.append(block[:, :first_own].T)
+    return Linearisation(
+        problem, x, noise, _orthonormal(np.concatenate(columns)), tuple(own), tuple(shared), tuple(residuals), total
+    )
+
+
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (rows, rank) of columns (rows, k), some of which may depend on others.
+
+    Where one does, the decomposition makes up a direction for it and keeps those after it from that: it is done again without.
+    """
+    size = np.linalg.norm(columns, axis=0)
+    kept = columns[:, size > 0] / size[size > 0]
+    while True:
+        q, r = np.linalg.qr(kept)
+        independent = np.abs(np.diag(r)) > MIN_INDEPENDENT_SHARE
+        if independent.all():
+            return np.asarray(q)
+        kept = kept[:, independent]
+
+
+def screen_effect(linearisation: Linearisation, effect: Effect) -> ScreenResult:
+    """Return the best screen result of an effect over its shared scan grid, its nuisance grids searched run by run."""
+    return screen_points(linearisation, effect)[0]
+
+
+def screen_points(linearisation: Linearisation, effect: Effect) -> list[ScreenResult]:
+    """Return the screen results at every point of an effect's shared scan grid, the best first."""
+    problem, begun = with_effect(linearisation.problem, linearisation.x, effect, {})
+    new, screened_points = _new_slots(problem, effect), []
+    for values in scan_points(linearisation, effect):
+        x = begun.copy()
+        x[new] = [values.get(problem.layout.every[i], x[i]) for i in new]
+        for c in effect.nuisance:
+            x = _best_per_run(linearisation, problem, x, new, c)
+        screened_points.append(ScreenResult(effect, *_first_order(linearisation, problem, x, new), problem))
+    return sorted(screened_points, key=lambda p: nine_digits(p.predicted_cost))
+
+
+def scan_points(linearisation: Linearisation, effect: Effect) -> list[dict[str, float]]:
+    """Return the scan points of an effect's shared coefficients: its initial guesses, else the points of its grids."""
+    if effect.initial_guesses is not None and (
+        suggested := effect.initial_guesses(linearisation.problem.records, linearisation.residuals)
+    ):
+        return suggested
+    pace = hull_rate(linearisation.problem, linearisation.x)
+    scans = [[np.clip(v * pace**c.rate_exponent, c.low, c.high) for v in c.scan] or [_screen_value(c)] for c in effect.shared]
+    grids = [tuple(dict.fromkeys(scan)) for scan in scans]
+    points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
+    step = -(-len(points) // MAX_SCAN_POINTS)
+    points = points[::step]
+    signed = {c.name for c in effect.shared if c.low < 0.0 < c.high and c.scan}
+    return points + [{n: WEAK_START_SHARE * v if n in signed else v for n, v in point.items()} for point in points if signed]
+
+
+def _screen_value(c: Coefficient) -> float:
+    """Return where the screen takes a coefficient without a grid: zero for one of either sign, where its slope is exact.
+
+    Its declared start is typical of a small vehicle; on a slow ship it is as wrong as a moment of the size of the heading's own.
+    """
+    return 0.0 if c.low < 0.0 < c.high else c.start
+
+
+def hull_rate(problem: Problem, x: FloatArray) -> float:
+    """Return the characteristic rate of the hull at the reference speed, 1/s, from its damping and stiffness.
+
+    Nonlinear drag may leave the linear damping near zero: then the rate that the fin's moment keeps up gives a lower bound.
+    """
+    layout = problem.layout
+    names, values = NAMES[layout.axis], dict(zip(layout.names, x[: layout.shared].tolist(), strict=True))
+    stiffness = 0.0 if names.stiffness is None else values[names.stiffness]
+    fin = np.concatenate([r.fin[r.rate_ok] for r in problem.records])
+    rate = np.concatenate([r.rate[r.rate_ok] for r in problem.records])
+    swing = float(np.std(rate)) if rate.size else 0.0
+    kept_up = abs(values[names.authority]) * float(np.std(fin)) / swing if swing > 0.0 else 0.0
+    return float(max(abs(values[names.damping]) + np.sqrt(abs(stiffness)), kept_up, MIN_HULL_RATE_1_S))
+
+
+def _new_slots(problem: Problem, effect: Effect) -> list[int]:
+    names = {c.name for c in effect.coefficients} | ({"rate_before"} if effect.extra_states else set())
+    return [i for i, s in enumerate(problem.layout.parameters) if s.name in names]
+
+
+def whitened_rows_of_run(
+    linearisation: Linearisation, problem: Problem, x: FloatArray, run: int, new: Sequence[int]
+) -> FloatArray:
+    """Return one run's whitened residual and its derivatives by the new parameters, (1 + k, m)."""
+    record = problem.records[run]
+    result = problem.linearise(x, run, new)
+    if not np.isfinite(result.stack).all():
+        rows = np.zeros((1 + len(new), 2 * len(record)))
+        rows[0] = 1e6
+        return rows
+    white, _ = whiten(record, linearisation.noise, result.base.damping, result.base.stiffness, result.stack)
+    flat = white.reshape(white.shape[0], -1)
+    if result.columns == tuple(new):
+        return flat
+    rows = np.zeros((1 + len(new), flat.shape[1]))
+    rows[[0, *(1 + list(new).index(slot) for slot in result.columns)]] = flat
+    return rows
+
+
+def whitened_rows(linearisation: Linearisation, problem: Problem, x: FloatArray, new: Sequence[int]) -> FloatArray:
+    """Return the whitened residual of all runs and its derivatives by the new parameters, (1 + k, rows)."""
+    return np.concatenate(
+        [whitened_rows_of_run(linearisation, problem, x, run, new) for run in range(len(problem.records))], axis=1
+    )
+
+
+def _first_order(
+    linearisation: Linearisation, problem: Problem, x: FloatArray, new: Sequence[int]
+) -> tuple[float, FloatArray, FloatArray]:
+    """Return the predicted cost after one step in the new parameters, the point the step starts from, and its bounded end."""
+    rows, index = whitened_rows(linearisation, problem, x, new), list(new)
+    left = project_out(linearisation.basis, rows)
+    step = _gauss_newton_step(left, np.einsum("ij,ij->i", rows, rows)[1:])
+    low, high = problem.layout.low[index], problem.layout.high[index]
+    start = x.copy()
+    wished = x[index] + step
+    start[index] = np.clip(wished, low + 1e-3 * (x[index] - low), high - 1e-3 * (high - x[index]))
+    if np.any((wished < low) | (wished > high)):
+        step = start[index] - x[index]
+    after = left[0] - step @ left[1:]
+    return float(after @ after), x, start
+
+
+def _gauss_newton_step(left: FloatArray, before: FloatArray) -> FloatArray:
+    """Return the Gauss-Newton step (k,) of projected rows (1 + k, rows), their squares (k,) before the projection `before`."""
+    gram = left @ left.T
+    useful = np.diag(gram)[1:] > 1e-12 * np.maximum(before, MIN_COLUMN_NORM**2)
+    step, places = np.zeros(before.size), 1 + np.flatnonzero(useful)
+    if places.size:
+        step[useful] = solve_normal_equations(gram[places[:, None], places], gram[places, 0])
+    return step
+
+
+def backtrack(linearisation: Linearisation, screened: ScreenResult) -> ScreenResult:
+    """Return a screen result with its start moved back towards the scan point until its cost is no higher than there."""
+    problem, x, start = screened.problem, screened.point, screened.start
+    limit = cost_of(problem, x, linearisation.noise)
+    for _ in range(MAX_BACKTRACKS):
+        if cost_of(problem, start, linearisation.noise) <= limit:
+            return replace(screened, start=start)
+        start = 0.6 * x + 0.4 * start
+    return replace(screened, start=x)
+
+
+def project_out(basis: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return rows (k, m) with the orthonormal columns of a basis (m, r) projected out."""
+    return np.asarray(rows - (rows @ basis) @ basis.T)
+
+
+def _best_per_run(
+    linearisation: Linearisation, problem: Problem, x: FloatArray, new: Sequence[int], c: Coefficient
+) -> FloatArray:
+    """Return x with one nuisance at the best grid point of each run, under shared numbers that are equal for all runs.
+
+    Alone, each run would choose the event that suits it best, large or small; a run without an event would still find one.
+    """
+    x = x.copy()
+    shared = [i for i in new if problem.layout.parameters[i].run < 0]
+    grid = c.scan or (c.start,)
+    places, squares = [], []
+    for run in range(len(problem.records)):
+        slot = next(i for i in problem.layout.nuisances_of(run) if problem.layout.parameters[i].name == c.name)
+        own = [i for i in new if i != slot and problem.layout.parameters[i].run == run]
+        for value in grid:
+            x[slot] = value
+            rows = whitened_rows_of_run(linearisation, problem, x, run, [*shared, *own])
+            basis = _extend_basis(linearisation.nuisance_basis[run], rows[1 + len(shared) :].T)
+            left = project_out(basis, np.concatenate([rows[: 1 + len(shared)], linearisation.shared[run]]))
+            squares.append(left @ left.T)
+        places.append(slot)
+    square = np.array(squares).reshape(len(places), len(grid), *squares[0].shape)
+    low, high = (bound[shared] - x[shared] for bound in (problem.layout.low, problem.layout.high))
+    x[places] = np.array(grid)[joint_grid_search(square, low, high)]
+    return x
+
+
+def _extend_basis(basis: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (rows, rank) of the span of a basis and further columns."""
+    if not columns.any():
+        return basis
+    return np.concatenate([basis, _orthonormal(columns - basis @ (basis.T @ columns))], axis=1)

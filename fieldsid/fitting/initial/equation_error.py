@@ -1,0 +1,133 @@
+"""Start values without simulation (equation error): the equation of motion integrated over short windows, by least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.fitting.problem.parameters import ParameterLayout, group_name
+from fieldsid.models.axis import NAMES
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import BoolArray, FloatArray
+
+INTEGRATION_WINDOW_S = 0.6
+FALLBACK_DAMPING, FALLBACK_STIFFNESS = 0.3, 0.0
+"""Damping in 1/s and stiffness in 1/s^2 to start from where the equation asks for an unstable vehicle."""
+MAX_GROWTH = 1e6
+"""Largest growth of a start within a record: no sensor resolves a start to a millionth, so a free run that grows more
+diverges."""
+
+
+def equation_error_start(records: Sequence[Record], layout: ParameterLayout) -> FloatArray:
+    """Return the layout's start vector with the base parameters from windowed equation error."""
+    x = np.array([s.start for s in layout.parameters])
+    names, groups = NAMES[layout.axis], layout.groups
+    columns = [s.name for s in layout.parameters[: layout.shared]]
+    base = [names.damping, *([] if names.stiffness is None else [names.stiffness])]
+    base += [*dict.fromkeys(group_name(names.authority, groups, i) for i in range(len(groups.speeds))), names.trim]
+    rows, targets = [], []
+    for run, record in enumerate(records):
+        block, target = _windows(record, stiff=names.stiffness is not None)
+        full = np.zeros((len(target), len(base)))
+        share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
+        full[:, 0] = block[:, 0] * share
+        if names.stiffness is not None:
+            full[:, 1] = block[:, 1]
+        lift = share**2 if groups.by_law else 1.0
+        full[:, base.index(group_name(names.authority, groups, groups.of_run[run]))] = block[:, 2] * lift
+        full[:, -1] = block[:, 3] * (share**2 if groups.trim_of_fin else 1.0)
+        rows.append(full)
+        targets.append(target)
+    matrix, target = np.concatenate(rows), np.concatenate(targets)
+    if len(target) < len(base):
+        return x
+    longest = max(float(r.time[-1] - r.time[0]) for r in records)
+    solution = _stable(matrix, target, longest, stiff=names.stiffness is not None)
+    for name, value in zip(base, solution, strict=True):
+        slot = layout.parameters[columns.index(name)]
+        x[columns.index(name)] = float(np.clip(value, slot.low, slot.high))
+    return x
+
+
+def _stable(matrix: FloatArray, target: FloatArray, length: float, *, stiff: bool) -> FloatArray:
+    """Return the least-squares solution (k,) with damping, and stiffness if any, fixed where it grows over a record of length s.
+
+    From measurements that are late or early a stable vehicle looks unstable, and an unstable start diverges.
+    """
+    held: dict[int, float] = {}
+    while True:
+        rest = [i for i in range(matrix.shape[1]) if i not in held]
+        solution = np.zeros(matrix.shape[1])
+        solution[list(held)] = list(held.values())
+        solution[rest] = _solved(matrix[:, rest], target - matrix @ solution)
+        if 0 not in held and solution[0] <= 0.0:
+            held[0] = FALLBACK_DAMPING
+        elif stiff and 1 not in held and _pace_of_growth(solution[0], solution[1]) * length > np.log(MAX_GROWTH):
+            held[1] = FALLBACK_STIFFNESS
+        else:
+            return solution
+
+
+def _pace_of_growth(damping: float, stiffness: float) -> float:
+    """Return the real part of the fastest growing motion of y'' = -damping y' - stiffness y, 1/s."""
+    return 0.5 * (float(np.sqrt(max(damping**2 - 4.0 * stiffness, 0.0))) - damping)
+
+
+def _solved(matrix: FloatArray, target: FloatArray) -> FloatArray:
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
+    return np.asarray(np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale)
+
+
+def _share(speed: float, reference: float) -> float:
+    ok = np.isfinite(speed) and np.isfinite(reference)
+    return float(speed / reference) if ok else 1.0
+
+
+def _windows(record: Record, *, stiff: bool) -> tuple[FloatArray, FloatArray]:
+    """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of one run."""
+    h = record.steps
+    rate, ok = _rate(record)
+    angle = (
+        np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
+    )
+    count = max(2, round(INTEGRATION_WINDOW_S / float(np.median(h))))
+    if len(record) <= count + 2:
+        return np.zeros((0, 4)), np.zeros(0)
+    sums = [_integral(0.5 * (v[:-1] + v[1:]) * h) for v in (rate, angle)]
+    fin = _integral(record.commanded.mean * h)
+    time = record.time - record.time[0]
+    span = slice(count, None), slice(None, -count)
+    parts = [s[span[0]] - s[span[1]] for s in (*sums, fin, time)]
+    smooth = _smoothed(rate)
+    target = smooth[span[0]] - smooth[span[1]]
+    good = _whole(ok, count)
+    block = np.column_stack([-parts[0], -parts[1] if stiff else 0 * parts[1], parts[2], parts[3]])
+    return block[good], target[good]
+
+
+def _rate(record: Record) -> tuple[FloatArray, BoolArray]:
+    """Return the measured rate, or the smoothed slope of the angle where there is none."""
+    if record.rate_ok.any():
+        known = record.rate_ok
+        return np.interp(record.time, record.time[known], record.rate[known]), known
+    known = record.angle_ok
+    angle = _smoothed(np.interp(record.time, record.time[known], record.angle[known]), 9)
+    return np.gradient(angle, record.time), known
+
+
+def _smoothed(values: FloatArray, width: int = 5) -> FloatArray:
+    width = min(width, values.size)
+    kernel = np.ones(width) / width
+    weight = np.convolve(np.ones_like(values), kernel, mode="same")
+    return np.asarray(np.convolve(values, kernel, mode="same") / weight)
+
+
+def _whole(ok: BoolArray, count: int) -> BoolArray:
+    missing = _integral((~ok).astype(float))[: ok.size]
+    total = np.append(missing, missing[-1] + float(not ok[-1]))[: ok.size + 1]
+    return np.asarray((total[count : ok.size] - total[: ok.size - count]) < 0.2 * count)
+
+
+def _integral(values: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(values)])

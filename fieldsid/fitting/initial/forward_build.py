@@ -1,0 +1,82 @@
+"""Start values of a fit with several effects by forward build-up: the base model, then the best effect, one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fieldsid.fitting.initial.effect_screen import (
+    backtrack,
+    equivalent_solution,
+    linearise_at,
+    screen_points,
+    transfer_parameters,
+)
+from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
+from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, white_weights
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.model import Noise
+from fieldsid.numerics.arrays import FloatArray
+
+MAX_BUILD_ITERATIONS = 40
+MAX_SCAN_POINTS = 3
+RELATIVE_COST_TOLERANCE = 1e-5
+EQUAL_LOG_LIKELIHOOD = 1.0
+"""Log likelihood within which two starts fit equally well."""
+
+
+def forward_build(problem: Problem, floor: Noise) -> FloatArray:
+    """Return the start vector of a problem's layout; the base parameters' own where it has no effects."""
+    layout = problem.layout
+    if not layout.effects:
+        return equation_error_start(problem.records, layout)
+    current = problem.with_effects(())
+    x = _refined(current, equation_error_start(current.records, current.layout), floor)
+    left = list(layout.effects)
+    while left:
+        linearisation = linearise_at(current, x, white_weights(current, x))
+        points = min((screen_points(linearisation, effect) for effect in left), key=lambda p: p[0].predicted_cost)[
+            :MAX_SCAN_POINTS
+        ]
+        effect, current = points[0].effect, points[0].problem
+        x = _best(current, [_refined(current, backtrack(linearisation, p).start, linearisation.noise) for p in points])
+        twin = equivalent_solution(current, x, effect)
+        if twin is not None:
+            x = _best(current, [x, _refined(current, twin, linearisation.noise)])
+        left.remove(effect)
+    x = _best(
+        problem,
+        [transfer_parameters(current.layout, x, layout), _refined(problem, equation_error_start(problem.records, layout), floor)],
+    )
+    return plausible(problem, x, floor)
+
+
+def plausible(problem: Problem, x: FloatArray, floor: Noise) -> FloatArray:
+    """Return x, or an equivalent solution that fits as well with the smaller effect: a servo is faster than its hull.
+
+    At one speed no data distinguish the two; the larger lag with the faster hull is possible but unlikely.
+    """
+    for effect in problem.layout.effects:
+        twin = equivalent_solution(problem, x, effect)
+        place = problem.layout.names.index(effect.coefficients[0].name)
+        if twin is None or twin[place] >= x[place]:
+            continue
+        other = _refined(problem, twin, floor)
+        if (
+            negative_log_likelihood(problem, other) <= negative_log_likelihood(problem, x) + EQUAL_LOG_LIKELIHOOD
+            and other[place] < x[place]
+        ):
+            x = other
+    return x
+
+
+def _best(problem: Problem, candidates: Sequence[FloatArray]) -> FloatArray:
+    return min(candidates, key=lambda x: negative_log_likelihood(problem, x))
+
+
+def _refined(problem: Problem, start: FloatArray, noise: Noise) -> FloatArray:
+    """Return the output-error solution from a start, reweighted once by its residuals."""
+    found = levenberg_marquardt(problem, start, noise, max_iterations=MAX_BUILD_ITERATIONS, tolerance=RELATIVE_COST_TOLERANCE).x
+    return levenberg_marquardt(
+        problem, found, white_weights(problem, found), max_iterations=MAX_BUILD_ITERATIONS, tolerance=RELATIVE_COST_TOLERANCE
+    ).x

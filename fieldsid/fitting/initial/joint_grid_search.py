@@ -1,0 +1,75 @@
+"""The grid points of a nuisance, one for each run, at which one common step of the shared parameters costs least."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.gram_least_squares import SINGULAR_EIGENVALUE_SHARE, solve_normal_equations
+from fieldsid.rounding import nine_digits
+
+MAX_GRID_ITERATIONS = 8
+
+COST_ROUNDING_SHARE = 1e-9
+"""Share of a cost within which two costs are equal: the order of summation, which depends on the processor, changes it that
+much."""
+
+
+def joint_grid_search(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the grid points (R,) with the least total cost after one common step, within its bounds (k,).
+
+    square (R, G, 1 + k + S, 1 + k + S) are each run's products at each grid point, the parent's shared parameters last. First the
+    steps that single runs would take are compared, with the parent's shared parameters projected out of each run. Then step and
+    grid points alternate; at last with the parent's shared parameters common to all runs, because an event at a run's start that
+    persists is to that run alone equivalent to another trim.
+    """
+    alone = _schur_complement(square, 1 + low.size)
+    chosen = _alternate_grid_and_step(alone, _best_single_run_step(alone, low, high), low, high)
+    return _alternate_grid_and_step(square, chosen, low, high)
+
+
+def _schur_complement(square: FloatArray, first: int) -> FloatArray:
+    """Return products (..., first, first) with the columns from `first` on projected out."""
+    scale = np.sqrt(np.maximum(np.einsum("...ii->...i", square)[..., first:], 1e-300))
+    rest = square[..., first:, first:] / scale[..., :, None] / scale[..., None, :]
+    cross = square[..., :first, first:] / scale[..., None, :]
+    inverse = np.linalg.pinv(rest, rcond=SINGULAR_EIGENVALUE_SHARE, hermitian=True)
+    return np.asarray(square[..., :first, :first] - cross @ inverse @ cross.swapaxes(-1, -2))
+
+
+def _costs(square: FloatArray, step: FloatArray) -> FloatArray:
+    """Return each run's cost at each grid point after a step, (R, G)."""
+    row = np.concatenate([[1.0], -step])
+    return np.asarray(np.einsum("i,rgij,j->rg", row, square, row))
+
+
+def _bounded_step(one: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the step of products (1 + K, 1 + K), its first numbers within their bounds (k,)."""
+    step = solve_normal_equations(one[1:, 1:], one[1:, 0])
+    step[: low.size] = np.clip(step[: low.size], low, high)
+    return step
+
+
+def _best_single_run_step(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the grid points (R,) for the best of the steps that single runs would take at a grid point."""
+    alone = (_costs(square, _bounded_step(one, low, high)) for one in square.reshape(-1, *square.shape[2:]))
+    return _first_least(min(alone, key=lambda costs: nine_digits(float(costs.min(axis=1).sum()))))
+
+
+def _first_least(costs: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the first of each row's grid points that cost the least (R,): while a fin rests, an event's time changes nothing."""
+    return np.asarray((costs <= (1.0 + COST_ROUNDING_SHARE) * costs.min(axis=1, keepdims=True)).argmax(axis=1))
+
+
+def _alternate_grid_and_step(
+    square: FloatArray, chosen: npt.NDArray[np.intp], low: FloatArray, high: FloatArray
+) -> npt.NDArray[np.intp]:  # fmt: skip
+    """Return the grid points (R,) at which the common step of all runs and each run's best grid point agree."""
+    runs = np.arange(square.shape[0])
+    for _ in range(MAX_GRID_ITERATIONS):
+        again = _first_least(_costs(square, _bounded_step(square[runs, chosen].sum(axis=0), low, high)))
+        if (again == chosen).all():
+            break
+        chosen = again
+    return chosen

@@ -1,0 +1,1 @@
+"""Minimising the whitened sum of squares."""

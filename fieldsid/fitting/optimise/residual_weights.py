@@ -1,0 +1,39 @@
+"""What a free run leaves in each channel: the weights of output error, and the likelihood that two fits compare by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.errors import EffectError
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.model import Noise
+from fieldsid.numerics.arrays import FloatArray
+
+
+def squares_of(problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the sum of squared residuals of angle and rate over all runs (2,), and their counts (2,)."""
+    squares, counts = np.zeros(2), np.zeros(2)
+    for run, record in enumerate(problem.records):
+        residual, _ = problem.residual(x, run)
+        squares += np.einsum("ij,ij->i", residual, residual)
+        counts += (record.angle_ok.sum(), record.rate_ok.sum())
+    return squares, counts
+
+
+def white_weights(problem: Problem, x: FloatArray) -> Noise:
+    """Return the residual standard deviation of both channels, 1 where a channel was not measured or diverged."""
+    squares, counts = squares_of(problem, x)
+    sigma = np.sqrt(squares / np.maximum(counts, 1.0))
+    sigma = np.where(np.isfinite(sigma) & (squares > 0.0), sigma, 1.0)
+    return Noise(float(sigma[0]), float(sigma[1]))
+
+
+def negative_log_likelihood(problem: Problem, x: FloatArray) -> float:
+    """Return minus the log likelihood of white residuals of unknown size, infinite where x cannot be simulated."""
+    try:
+        squares, counts = squares_of(problem, x)
+    except EffectError:
+        return float("inf")
+    if not np.isfinite(squares).all():
+        return float("inf")
+    return float(0.5 * np.sum(counts * np.log(np.maximum(squares, 1e-300) / np.maximum(counts, 1.0))))

@@ -1,0 +1,223 @@
+"""A model's free run on a record, its initial state and per-run nuisances refitted, its parameters not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from fieldsid.display import Brief
+from fieldsid.dynamics.assemble import fin_path
+from fieldsid.dynamics.free_run import effects_of, growing_hint
+from fieldsid.errors import DivergenceError
+from fieldsid.fitting.initial.initial_state_prior import initial_state_prior
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
+from fieldsid.fitting.predict import command_timing, speed_correction
+from fieldsid.fitting.problem.parameters import Parameter, ParameterLayout, SpeedGroups, layout_of
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Note
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Effect
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import Record
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.whiten import is_white
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.rounding import nine_digits
+
+MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
+"""Iterations for a run's nuisances, and the share of the sum of squares that an iteration must gain."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Prediction(Brief):
+    """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances.
+
+    `faster` is the relative speed correction, see speed_correction.py. `as_logged` is the rms residual (rad, rad/s) with the
+    log's own speed and command times, None where both are unchanged.
+    """
+
+    record: Record
+    angle: FloatArray
+    rate: FloatArray
+    fin: FloatArray
+    state: tuple[float, float, float]
+    nuisance: Mapping[str, float]
+    faster: float = 0.0
+    as_logged: tuple[float, float] | None = None
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus simulated, (2, n), zero where nothing was measured."""
+        return np.where(self.record.ok, self.record.both - np.stack([self.angle, self.rate]), 0.0)
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What the run was taken to have done otherwise than its log has it: when its commands came, and how fast it was."""
+        return tuple(
+            n
+            for n in (command_timing.timing_note(self.record), speed_correction.speed_note(self.record, self.faster))
+            if n is not None
+        )
+
+
+def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None = None) -> Prediction:
+    """Return a model's free run on a record; raises DivergenceError when it grows without bound."""
+    floor = white_noise_floor([record])
+    logged, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
+    problem, x = with_command_timing(logged, x, floor)
+    as_timed = problem
+    problem, x, faster = speed_correction.correct_speed(problem, x, floor)
+    x = refit_nuisances(problem, x, 0, floor, rescan=False)
+    as_logged = None if as_timed is logged and not speed_correction.is_worth_reporting(faster) else _rms_as_logged(logged, x)
+    motion, _ = problem.simulate(x, 0)
+    if not np.isfinite(motion.rate).all():
+        at = float(record.time[np.argmin(np.isfinite(motion.rate))])
+        raise DivergenceError(
+            f"the model grows without bound on run {record.name!r}",
+            found=f"diverged at t = {at:.2f} s",
+            hint=growing_hint(model),
+        )
+    values = problem.values_of(x, 0)
+    fin = fin_path(problem.records[0], problem.layout.effects, values)
+    nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
+    path = np.append(fin.start, fin.end[-1])
+    return Prediction(problem.records[0], motion.angle, motion.rate, path, problem.state_of(x, 0), nuisance, faster, as_logged)
+
+
+def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
+    """Return what runs were taken to have done otherwise than their logs have it, those a model diverges on left out."""
+    notes: list[Note] = []
+    for record in records:
+        try:
+            notes += predict(model, record).notes
+        except DivergenceError:
+            continue
+    return tuple(notes)
+
+
+def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
+    """Return a problem of one record whose shared parameters have the model's values at the record's speed, and its start."""
+    layout = layout_of([record], model.axis, effects)
+    of_fin = model.law.trim_of_fin
+    exponent, speed = model.law.damping_exponent, model.law.effective(record.speed)
+    groups = SpeedGroups((model.law.reference,), (0,), 0, (speed,), trim_of_fin=of_fin, exponent=exponent)
+    layout = replace(layout, groups=groups)
+    values = values_at_speed(model.law, model.values, model.axis, record.speed)
+    x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.parameters)])
+    return Problem((record,), layout), x
+
+
+def values_at_speed(law: SpeedLaw, values: Mapping[str, float], axis: Axis, speed: float) -> dict[str, float]:
+    """Return a model's values as the one-run problem at a speed takes them.
+
+    Its layout scales the authority by s^2, and a trim of the fin with it; the law's own values are divided by that.
+    """
+    names, scale = NAMES[axis], law.scale(speed)
+    trim = values[names.trim] * law.trim_factor(speed) / (scale**2 if law.trim_of_fin else 1.0)
+    return dict(values) | {names.authority: law.authority(speed, values[names.authority]) / scale**2, names.trim: trim}
+
+
+def _rms_as_logged(problem: Problem, x: FloatArray) -> tuple[float, float]:
+    """Return the rms residual of a one-run problem, angle (rad) and rate (rad/s), NaN for a channel not measured."""
+    record = problem.records[0]
+    residual, _ = problem.residual(refit_nuisances(problem, x, 0, white_noise_floor([record])), 0)
+    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else float("nan") for e, ok in zip(residual, record.ok, strict=True)]
+    return rms[0], rms[1]
+
+
+def with_command_timing(problem: Problem, x: FloatArray, noise: Noise) -> tuple[Problem, FloatArray]:
+    """Return a one-run problem and x with the run's nuisances fitted under a noise.
+
+    The jumps of its command are timed between the samples where that explains the motion better.
+    """
+    record = problem.records[0]
+    x = refit_nuisances(problem, x, 0, noise)
+    better = command_timing.command_timing(problem, x, white_noise_floor([record]))
+    if better is None:
+        return problem, x
+    problem = Problem((better,), problem.layout)
+    return problem, refit_nuisances(problem, x, 0, noise, rescan=False)
+
+
+def refit_nuisances(problem: Problem, x: FloatArray, run: int, noise: Noise, *, rescan: bool = True) -> FloatArray:
+    """Return x with a run's nuisances (initial state, phases, event times) refitted, the rest unchanged.
+
+    `rescan`: event times are searched over their grids too, not only from their present values.
+
+    Under white noise a second pass weighs the run by its own residual and applies the prior of the initial state, so that the
+    initial state cannot hide an error of the model.
+    """
+    own = problem.layout.nuisances_of(run)
+    alone = Problem((problem.records[run],), _layout_of_one(problem.layout, run))
+    keep = [*range(problem.layout.shared), *own]
+    free = range(problem.layout.shared, len(keep))
+    starts = scanned_starts(alone, x[keep]) if rescan else [x[keep]]
+    found = [
+        levenberg_marquardt(
+            alone, start, noise, free=free, max_iterations=MAX_NUISANCE_ITERATIONS, tolerance=NUISANCE_COST_TOLERANCE
+        )
+        for start in starts
+    ]
+    best = min(found, key=lambda d: d.cost)
+    out = x.copy()
+    if not np.isfinite(best.cost):
+        return out
+    prior = initial_state_prior(alone, 0, noise) if is_white(noise) else None
+    if prior is not None:
+        best = levenberg_marquardt(
+            alone,
+            best.x,
+            _left_over(alone, best.x, noise),
+            free=free,
+            max_iterations=MAX_NUISANCE_ITERATIONS,
+            tolerance=NUISANCE_COST_TOLERANCE,
+            prior=prior,
+        )
+    out[keep] = best.x
+    return out
+
+
+def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
+    """Return the residual standard deviations of one run, at least those of its noise."""
+    residual, _ = problem.residual(x, 0)
+    record = problem.records[0]
+    rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else 0.0 for e, ok in zip(residual, record.ok, strict=True)]
+    return Noise(max(rms[0], noise.angle), max(rms[1], noise.rate))
+
+
+def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
+    """Return starts with every per-run nuisance at the best points of its scan grid, and x itself, each once."""
+    layout = problem.layout
+    grids = {
+        i: c.scan
+        for i, s in enumerate(layout.parameters)
+        if s.run >= 0
+        for e in layout.effects
+        for c in e.nuisance
+        if c.name == s.name and c.scan
+    }
+    if not grids:
+        return [x]
+    noise = white_noise_floor(problem.records)
+    scored = []
+    for point in product(*grids.values()):
+        trial = x.copy()
+        trial[list(grids)] = point
+        scored.append((nine_digits(cost_of(problem, trial, noise)), tuple(point), trial))
+    scored.sort(key=lambda item: item[:2])
+    return [x, *(trial for _, _, trial in scored[:2] if not np.array_equal(trial, x))]
+
+
+def _layout_of_one(layout: ParameterLayout, run: int) -> ParameterLayout:
+    slots = [*layout.parameters[: layout.shared], *[_moved(layout.parameters[i]) for i in layout.nuisances_of(run)]]
+    g = layout.groups
+    groups = replace(g, of_run=(g.of_run[run],), run_speeds=(g.run_speeds[run],))
+    return replace(layout, groups=groups, parameters=tuple(slots))
+
+
+def _moved(slot: Parameter) -> Parameter:
+    return Parameter(slot.name, slot.unit, slot.low, slot.high, slot.start, 0)

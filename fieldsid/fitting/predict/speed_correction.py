@@ -1,0 +1,130 @@
+"""The maximum a posteriori correction of a run's speed: measured to a third of a percent, twice which enters the authority.
+
+The heading integrates that: a turn of two radians that is half a percent short is off by five times a compass's noise. So the
+speed of a predicted run is a nuisance, as its initial state is, with the measurement as its prior: the relative correction e
+minimises
+
+    sum over channels |r - S e|^2 / (L s^2) + (e / MEASURED_SPEED_STD_ERROR)^2,   |e| <= MAX_STD_ERRORS MEASURED_SPEED_STD_ERROR,
+
+r the residual and S its derivative by the speed, both with the initial state projected out, s the rms of r and L its correlation
+length, so that the residual of a wrong model has little weight. A speed that was not measured is not corrected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fieldsid.fitting.predict.command_timing import MAX_CORRELATION_LAG_S, correlation_length, residual_rms
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Note
+from fieldsid.models.axis import NAMES
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.gram_least_squares import solve_normal_equations
+
+MEASURED_SPEED_STD_ERROR, GUESSED_SPEED_STD_ERROR = 0.003, 0.01
+"""Standard error, as a share, that the speed of a run is taken to have, where it was measured and where it was not."""
+MAX_STD_ERRORS = 3.0
+"""Errors of the measurement that a speed is moved by at most."""
+MAX_SPEED_ITERATIONS, CONVERGED_STD_ERRORS = 4, 0.02
+"""Rounds, each with the weights of what the last one has left, and the change in errors of the measurement that ends them."""
+MIN_REPORTED_SHARE = 0.001
+SURPRISING_STD_ERRORS = 2.0
+"""Standard errors from which on a speed that is off is a finding of its own."""
+
+
+def speed_sensitivity(problem: Problem, x: FloatArray, speed: float) -> FloatArray:
+    """Return by how much a one-run problem's shared parameters (F,) change with one standard error of the run's speed."""
+    return (MEASURED_SPEED_STD_ERROR if np.isfinite(speed) else GUESSED_SPEED_STD_ERROR) * _moves(problem, x)
+
+
+def correct_speed(problem: Problem, x: FloatArray, floor: Noise) -> tuple[Problem, FloatArray, float]:
+    """Return a one-run problem at the run's own speed, x (N,) with its start moved along, and the share it was faster by."""
+    groups = problem.layout.groups
+    if not (np.isfinite(groups.run_speeds[0]) and np.isfinite(groups.speeds[groups.reference])):
+        return problem, x, 0.0
+    moved, own, faster = problem, x, 0.0
+    for _ in range(MAX_SPEED_ITERATIONS):
+        step = _step(moved, own, faster, floor)
+        if step is None:
+            return problem, x, 0.0
+        new = float(
+            np.clip(faster + step[-1], -MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR, MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR)
+        )
+        own = own.copy()
+        own[problem.layout.shared :] += step[:-1]
+        moved, change, faster = _at_speed_share(problem, new), new - faster, new
+        if abs(change) < CONVERGED_STD_ERRORS * MEASURED_SPEED_STD_ERROR:
+            break
+    return moved, own, faster
+
+
+def is_worth_reporting(faster: float) -> bool:
+    """Whether a share is worth telling of."""
+    return abs(faster) >= MIN_REPORTED_SHARE
+
+
+def speed_note(record: Record, faster: float) -> Note | None:
+    """Return the note on a run that was flown at another speed than its log has, None where that is next to nothing.
+
+    One that is off by more than its measurement should be is a finding: of the log's scale, or of the model.
+    """
+    if not is_worth_reporting(faster):
+        return None
+    way, errors = "faster" if faster > 0.0 else "slower", abs(faster) / MEASURED_SPEED_STD_ERROR
+    said = (
+        f"{record.name}: as the motion says, flown {100 * abs(faster):.2f} % {way} than the {record.speed:.3f} m/s of its log, "
+        f"{errors:.1f} x the standard error of {100 * MEASURED_SPEED_STD_ERROR:g} % that a measured speed is taken to have"
+    )
+    if errors >= SURPRISING_STD_ERRORS:
+        most = (
+            f" ({100 * MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR:g} % is the most it is moved by)"
+            if errors > MAX_STD_ERRORS - CONVERGED_STD_ERRORS
+            else ""
+        )
+        said += f"{most}: the scale of its speed is probably off, or the model is at this speed"
+    return Note(
+        "own_speed",
+        said,
+        {"run": record.name, "faster": faster, "speed_m_s": record.speed, "std_error": MEASURED_SPEED_STD_ERROR},
+    )
+
+
+def _at_speed_share(problem: Problem, share: float) -> Problem:
+    groups = problem.layout.groups
+    speeds = (groups.run_speeds[0] * (1.0 + share),)
+    return Problem(problem.records, replace(problem.layout, groups=replace(groups, run_speeds=speeds)))
+
+
+def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> FloatArray | None:
+    """Return the change of the run's nuisances and, last, of its speed correction; None where the motion diverges."""
+    record, shared = problem.records[0], problem.layout.shared
+    result = problem.linearise(x, 0)
+    if not np.isfinite(result.stack).all():
+        return None
+    slopes = np.zeros((x.size, *result.residual.shape))
+    slopes[list(result.columns)] = result.sensitivity * record.ok
+    columns = np.concatenate([slopes[shared:], np.tensordot(_moves(problem, x), slopes[:shared], axes=1)[None]])
+    weight = _weights(record, result.residual, floor)[:, None]
+    flat, left = (columns * weight).reshape(columns.shape[0], -1), (result.residual * weight).ravel()
+    gram, right = flat @ flat.T, flat @ left
+    gram[-1, -1] += MEASURED_SPEED_STD_ERROR**-2
+    right[-1] -= faster * MEASURED_SPEED_STD_ERROR**-2
+    return solve_normal_equations(gram, right)
+
+
+def _weights(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
+    """Return the weight of each channel (2,): over the rms of what is left of it, correlated samples counted once."""
+    lags = round(MAX_CORRELATION_LAG_S / float(np.median(record.steps)))
+    lengths = [correlation_length(e[ok], lags) if ok.any() else 1.0 for e, ok in zip(residual, record.ok, strict=True)]
+    return 1.0 / (residual_rms(record, residual, floor) * np.sqrt(lengths))
+
+
+def _moves(problem: Problem, x: FloatArray) -> FloatArray:
+    """Return the derivatives (F,) of a one-run problem's shared parameters by the relative speed correction."""
+    layout, names = problem.layout, NAMES[problem.layout.axis]
+    powers = {names.damping: layout.groups.exponent, names.authority: 2.0, names.trim: 2.0 * layout.groups.trim_of_fin}
+    return np.array([powers.get(n, 0.0) * x[i] for i, n in enumerate(layout.names)])

@@ -1,0 +1,75 @@
+"""The contract of an estimator: a name, a sentence, and a function from a problem to a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fieldsid.display import Brief
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.logs.run import Note
+from fieldsid.models.model import Noise
+from fieldsid.numerics.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class History(Brief):
+    """Parameters over time of a recursive estimator: time (m,) s, values and std_errors (m, p), settle time of each."""
+
+    time: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+    std_errors: FloatArray
+    settled_s: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The result of an estimator: vector (N,) of the layout, covariance (S, S) of its shared parameters, noise, notes.
+
+    A shared parameter that was not estimated has zero variance. `nuisances_fitted` is false where the runs' initial states are
+    still at their start values. `weights` is the noise whose weighted squares x minimises, None where that is the white noise of
+    its own residuals, or where x minimises no such sum.
+    """
+
+    x: FloatArray
+    covariance: FloatArray
+    noise: Noise
+    method: str
+    notes: tuple[Note, ...] = ()
+    nuisances_fitted: bool = True
+    history: History | None = None
+    weights: Noise | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a user may set: filter bandwidth lambda (rad/s), forgetting factor of the recursive method."""
+
+    bandwidth: float = 4.0
+    forgetting: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Estimator:
+    """One method; `takes_effects` tells whether it can estimate effects, `joint` whether several runs at once."""
+
+    name: str
+    says: str
+    source: str
+    solve: Callable[[Problem, Options], Solution]
+    takes_effects: bool = True
+    joint: bool = True
+    info: Mapping[str, str] = field(default_factory=dict)
+
+
+def shared_covariance(problem: Problem, full: FloatArray, free: tuple[int, ...]) -> FloatArray:
+    """Return the block (S, S) of a covariance (F, F) over free parameters that belongs to the shared parameters."""
+    count = problem.layout.shared
+    out = np.zeros((count, count))
+    keep = [i for i, slot in enumerate(free) if slot < count]
+    where = [free[i] for i in keep]
+    out[np.ix_(where, where)] = full[np.ix_(keep, keep)]
+    return out

@@ -1,0 +1,196 @@
+"""A joint fit as a function: parameters in, free-run residuals and exact sensitivities of every run out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+
+from fieldsid.dynamics.assemble import Base, KernelInputs, assemble, combined_core, integrate_record, measured, with_moments
+from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout, group_name, layout_of
+from fieldsid.fitting.problem.sensitivities import Sensitivities
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Effect, Motion, Values
+from fieldsid.models.fin_path import FinPath
+from fieldsid.models.record import Record, first_part
+from fieldsid.models.speed_law import over_reference
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.runtime.evaluation_counter import count_evaluation
+
+MAX_CACHED_SAMPLES = 20_000
+"""Samples of the longest run whose arrays are kept for the next call."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """One run's free run: measured-like angle and rate (n,).
+
+    Stack (1 + P, 2, n) of its residual and sensitivities of `columns`.
+    """
+
+    angle: FloatArray
+    rate: FloatArray
+    columns: tuple[int, ...]
+    stack: FloatArray
+    base: Base
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus simulated, (2, n), zero where nothing was measured."""
+        return np.asarray(self.stack[0])
+
+    @property
+    def sensitivity(self) -> FloatArray:
+        """Derivatives of what the sensors show by the parameters, (P, 2, n)."""
+        return np.asarray(self.stack[1:])
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Records and the parameters estimated from them; `known` caches each run's kernel inputs of the last call."""
+
+    records: tuple[Record, ...]
+    layout: ParameterLayout
+    known: dict[int, tuple[tuple[object, ...], KernelInputs]] = field(default_factory=dict, compare=False, repr=False)
+
+    def first(self, samples: int) -> Problem:
+        """Return the problem on the first samples of every run; itself where none is longer."""
+        if all(len(r) <= samples for r in self.records):
+            return self
+        return Problem(tuple(first_part(r, samples) for r in self.records), self.layout)
+
+    def with_effects(self, effects: Sequence[Effect]) -> Problem:
+        """Return the problem of the same records and speed groups with other effects."""
+        return Problem(self.records, layout_of(self.records, self.layout.axis, effects, self.layout.groups))
+
+    def base_of(self, x: FloatArray, run: int) -> Base:
+        """Return a run's base parameters."""
+        return self._base(dict(zip(self.layout.names, x[: self.layout.shared].tolist(), strict=True)), run)
+
+    def _base(self, v: Values, run: int) -> Base:
+        names, layout = NAMES[self.layout.axis], self.layout
+        share, ratio = self.scales(run)
+        authority = v[self.authority_of(run)] * ratio**2
+        return Base(
+            v[names.damping] * share ** v.get("damping_exponent", layout.groups.exponent),
+            0.0 if names.stiffness is None else v[names.stiffness],
+            authority,
+            v[names.trim] * (over_reference(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
+            layout.groups.trim_of_fin,
+        )
+
+    def scales(self, run: int) -> tuple[float, float]:
+        """Return speed over reference speed, and speed over the one that the run's authority parameter belongs to."""
+        g = self.layout.groups
+        speed = g.run_speeds[run]
+        if not isfinite(speed) or not isfinite(g.speeds[g.reference]):
+            return 1.0, 1.0
+        return speed / g.speeds[g.reference], g.over_group(run)
+
+    def values_of(self, x: FloatArray, run: int) -> dict[str, float]:
+        """Return the effects' coefficients as a run sees them."""
+        layout, numbers = self.layout, x.tolist()
+        values = {"damping_exponent": layout.groups.exponent} | dict(zip(layout.names, numbers, strict=False))
+        for place in layout.nuisances_of(run):
+            values[layout.every[place]] = numbers[place]
+        return values
+
+    def state_of(self, x: FloatArray, run: int) -> tuple[float, float, float]:
+        """Return a run's initial state: angle, rate, and the cross state that the rate before the run has led to."""
+        angle, rate, cross = self._start_of(self.values_of(x, run), run)
+        return float(angle), float(rate), float(cross)
+
+    def _start_of(self, values: Values, run: int) -> FloatArray:
+        before = values.get("rate_before")
+        core = None if before is None else combined_core(self.layout.effects, values, self.scales(run)[0])
+        return np.array(
+            [values["angle0"], values["rate0"], 0.0 if core is None or before is None else core.steady_cross_state(before)]
+        )
+
+    def _arrays(self, base: Base, values: Values, run: int) -> KernelInputs:
+        """Return the core's arrays, those of the last call where nothing but the run's start has changed."""
+        key = (base, *(v for name, v in values.items() if name not in START_NAMES))
+        last, record = self.known.get(run), self.records[run]
+        if last is not None and last[0] == key:
+            return last[1]
+        arrays = assemble(record, self.layout.effects, base, values, self.scales(run)[0])
+        if len(record) <= MAX_CACHED_SAMPLES:
+            self.known[run] = key, arrays
+        return arrays
+
+    def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
+        """Return one run's free run as the sensors would show it."""
+        count_evaluation()
+        record, effects = self.records[run], self.layout.effects
+        values = self.values_of(x, run)
+        base, start = self._base(values, run), self._start_of(values, run)
+        arrays = with_moments(record, self._arrays(base, values, run), effects, values, start)
+        out = integrate_record(record, arrays, start)
+        return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
+
+    def residual(self, x: FloatArray, run: int) -> tuple[FloatArray, Base]:
+        """Return measured minus simulated, (2, n), zero where nothing was measured; and the run's base."""
+        motion, base = self.simulate(x, run)
+        return _difference(self.records[run], motion, np.empty((2, len(self.records[run])))), base
+
+    def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
+        """Return one run's free run with its sensitivities to the free parameters that affect it."""
+        count_evaluation()
+        slots, pushes = self._sensitivities(x, run, free)
+        out, stack = pushes.integrate(slots)
+        shown = pushes.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])
+        _difference(self.records[run], shown, stack[0])
+        return RunResult(shown.angle, shown.rate, slots, stack, pushes.base)
+
+    def command_sensitivities(self, x: FloatArray, run: int, commanded: Sequence[FinPath]) -> FloatArray:
+        """Return how one run's free run would move with each of K other commands, to first order, (K, 2, n)."""
+        return self._sensitivities(x, run, ())[1].command_sensitivities(commanded)
+
+    def linearise_chunked(
+        self, x: FloatArray, run: int, free: Sequence[int], length: int
+    ) -> tuple[tuple[int, ...], Iterator[tuple[slice, FloatArray, FloatArray]]]:
+        """Return the free parameters that affect a run, and its samples in chunks: which, motion (m, 3), sensitivities (P, 2, m).
+
+        For effects without sensor and extra states only: a chunk starts from the angle and rate at which the last one ended.
+        """
+        slots, pushes = self._sensitivities(x, run, free)
+        return slots, pushes.integrate_chunked(slots, length)
+
+    def _sensitivities(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], Sensitivities]:
+        record, layout = self.records[run], self.layout
+        values = self.values_of(x, run)
+        base, start = self._base(values, run), self._start_of(values, run)
+        wanted = range(len(x)) if free is None else set(free)
+        slots = tuple(i for i in (*self._shared_of(run), *layout.nuisances_of(run)) if i in wanted)
+        arrays = with_moments(record, self._arrays(base, values, run), layout.effects, values, start)
+        return slots, Sensitivities(record, layout, self.scales(run), self.authority_of(run), base, values, start, arrays)
+
+    def authority_of(self, run: int) -> str:
+        """Return the name of a run's authority parameter."""
+        g = self.layout.groups
+        return group_name(NAMES[self.layout.axis].authority, g, g.of_run[run])
+
+    def _shared_of(self, run: int) -> Sequence[int]:
+        """Return the shared parameters that affect a run: not another speed group's authority, unless the trim refers to it."""
+        layout, g = self.layout, self.layout.groups
+        if g.by_law or len(g.speeds) == 1:
+            return range(layout.shared)
+        authority, own = NAMES[layout.axis].authority, {self.authority_of(run)}
+        if g.trim_of_fin:
+            own.add(authority)
+        return [i for i, n in enumerate(layout.names) if n in own or not (n == authority or n.startswith(f"{authority}@"))]
+
+    def start(self) -> FloatArray:
+        """Return the start vector of the layout."""
+        return np.array([s.start for s in self.layout.parameters])
+
+
+def _difference(record: Record, motion: Motion, out: FloatArray) -> FloatArray:
+    """Fill out (2, n) with measured minus shown, zero where nothing was measured, and return it."""
+    np.subtract(record.angle, motion.angle, out=out[0])
+    np.subtract(record.rate, motion.rate, out=out[1])
+    if not record.is_whole:
+        out[~record.ok] = 0.0
+    return out

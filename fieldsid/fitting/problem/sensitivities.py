@@ -1,0 +1,317 @@
+"""Forward sensitivities: the derivatives of the kernel's inputs by each parameter, integrated along with the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.dynamics import integrate
+from fieldsid.dynamics.assemble import (
+    CROSS_FACTOR,
+    CROSS_INPUT,
+    MOMENT,
+    Base,
+    KernelInputs,
+    combined_core,
+    combined_terms,
+    constants_of,
+    cross_factor_of,
+    cross_input_of,
+    damping_of,
+    fin_path,
+    integrate_record,
+    measured,
+    moments_of,
+    scaled_fin,
+)
+from fieldsid.dynamics.assemble import DAMPING as OF_DAMPING
+from fieldsid.dynamics.assemble import STIFFNESS as OF_STIFFNESS
+from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout
+from fieldsid.models.axis import NAMES
+from fieldsid.models.effect import Core, Effect, Motion, Values, over_intervals
+from fieldsid.models.fin_path import FinPath
+from fieldsid.models.record import Record
+from fieldsid.models.speed_law import over_reference
+from fieldsid.numerics.arrays import FloatArray
+
+CROSS = START_NAMES.index("rate_before")
+DAMPING, RATE, SQUARE = (integrate.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate", "cross_quadratic"))
+EXPONENT_STEP = 1e-4
+"""Half width of the central difference by the exponent of the speed law."""
+
+DRIVE_COUNT = max(OF_DAMPING, OF_STIFFNESS, CROSS_FACTOR, CROSS_INPUT, *MOMENT) + 1
+CONSTANT_COUNT = len(integrate.CONSTANTS)
+"""Number of drives that a parameter may change (the flow is none of them), and of constants of the kernel."""
+
+DriveDerivatives = Mapping[int, tuple[float, FloatArray | None]]
+"""The derivatives of the drives by one number: a factor, and the (n-1,) that it multiplies, none where that is one."""
+UNIT_DRIVE = (1.0, None)
+
+
+@dataclass(frozen=True, slots=True)
+class Sensitivities:
+    """The derivatives of one record's kernel inputs by each parameter, which the sensitivities are integrated from.
+
+    `scales` are the record's speed over the reference speed and over the speed of its own group; `authority` is the name of its
+    authority.
+    """
+
+    record: Record
+    layout: ParameterLayout
+    scales: tuple[float, float]
+    authority: str
+    base: Base
+    values: dict[str, float]
+    start: FloatArray
+    arrays: KernelInputs
+
+    def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+        """Return motion (n, 3) before the sensor, and a stack (1 + P, 2, n): room for a residual, and the sensitivities."""
+        drives, d_c, d_start = self._input_jacobians(slots)
+        stack = np.empty((1 + len(slots), 2, len(self.record)))
+        out = self._integrate_with_sensitivities(slice(0, len(self.record) - 1), drives, d_c, self.start, d_start, stack[1:])
+        return out, stack
+
+    def integrate_chunked(self, slots: tuple[int, ...], length: int) -> Iterator[tuple[slice, FloatArray, FloatArray]]:
+        """Yield the same in pieces of `length` intervals, without the cross state's sensitivity from piece to piece."""
+        drives, d_c, d_start = self._input_jacobians(slots)
+        start, last = self.start, len(self.record) - 1
+        for first in range(0, last, length):
+            part = slice(first, min(first + length, last))
+            sens = np.empty((len(slots), 2, part.stop - part.start + 1))
+            out = self._integrate_with_sensitivities(part, drives, d_c, start, d_start, sens)
+            start, d_start = out[-1].copy(), np.column_stack([sens[:, :, -1], np.zeros(len(slots))])
+            end = part.stop + 1 if part.stop == last else part.stop
+            yield slice(first, end), out[: end - first], sens[:, :, : end - first]
+
+    def command_sensitivities(self, commanded: Sequence[FinPath]) -> FloatArray:
+        """Return the first-order change (K, 2, n) of angle and rate with each of K other commands, sensors included."""
+        a, b, count = self.arrays, self.base.authority, len(commanded)
+        paths = [fin_path(self.record, self.layout.effects, self.values, c) for c in commanded]
+        own = scaled_fin(a.fin, a.terms)
+        drives = []
+        for path in paths:
+            start, end = (new - old for new, old in zip(scaled_fin(path, a.terms), own, strict=True))
+            drives.append({MOMENT[0]: (b, start), MOMENT[1]: (b, end), CROSS_INPUT: (a.core.cross_fin, path.mean - a.fin.mean)})
+        whole, d_c, sens = (
+            slice(0, len(self.record) - 1),
+            np.zeros((count, CONSTANT_COUNT)),
+            np.empty((count, 2, len(self.record))),
+        )
+        out = self._integrate_with_sensitivities(whole, drives, d_c, self.start, np.zeros((count, 3)), sens)
+        self.through_sensors(Motion(out[:, 0], out[:, 1]), (), sens)
+        return sens
+
+    def _input_jacobians(self, slots: tuple[int, ...]) -> tuple[list[DriveDerivatives], FloatArray, FloatArray]:
+        """Return the derivatives by the parameters: of the drives, of the constants (P, 14), of the initial states (P, 3)."""
+        count = len(slots)
+        drives: list[DriveDerivatives] = []
+        d_c, d_start = np.zeros((count, CONSTANT_COUNT)), np.zeros((count, 3))
+        hidden = "rate_before" in self.values
+        for j, slot in enumerate(slots):
+            name = self.layout.every[slot]
+            if name in START_NAMES:
+                part = START_NAMES.index(name)
+                d_start[j, part] = 1.0 if part < CROSS else self._steady_cross_derivative(self.arrays.constants[RATE])
+                drives.append({})
+                continue
+            push, constants = self._input_jacobian(name)
+            drives.append(push)
+            if constants is not None:
+                d_c[j] = constants
+            if hidden:
+                d_start[j, CROSS] = self._initial_state_derivative(d_c[j])
+        return drives, d_c, d_start
+
+    def _core(self, values: Values) -> Core:
+        return combined_core(self.layout.effects, values, self.scales[0])
+
+    def _initial_state_derivative(self, d_c: FloatArray) -> float:
+        """Return the derivative of the initial cross state by the kernel's constants (14,), the rate before the run fixed."""
+        x, before = self.start[CROSS], self.values.get("rate_before", 0.0)
+        return self._steady_cross_derivative(d_c[RATE] * before + d_c[DAMPING] * x + d_c[SQUARE] * x * abs(x))
+
+    def _steady_cross_derivative(self, push: float) -> float:
+        """Return the derivative of the initial cross state by a small input of its equation."""
+        damping = self.arrays.constants[DAMPING]
+        stiff = damping + 2.0 * self.arrays.constants[SQUARE] * abs(self.start[CROSS])
+        return -float(push) / float(stiff) if damping > 0.0 else 0.0
+
+    def _integrate_with_sensitivities(
+        self,
+        part: slice,
+        drives: Sequence[DriveDerivatives],
+        d_c: FloatArray,
+        start: FloatArray,
+        d_start: FloatArray,
+        sens: FloatArray,
+    ) -> FloatArray:
+        """Return motion (m + 1, 3) over the m intervals of a part, and fill sens (P, 2, m + 1)."""
+        a, steps = self.arrays, self.record.steps[part]
+        place, factor = np.zeros((len(drives), DRIVE_COUNT), dtype=np.intp), np.zeros((len(drives), DRIVE_COUNT))
+        columns: dict[int, FloatArray] = {}
+        known = {id(None): 0}
+        for j, own in enumerate(drives):
+            for drive, (by, column) in own.items():
+                if column is not None:
+                    columns[id(column)] = column
+                place[j, drive], factor[j, drive] = known.setdefault(id(column), len(known)), by
+        rows = np.empty((len(known), steps.size))
+        rows[0] = 1.0
+        for row, column in zip(rows[1:], columns.values(), strict=True):
+            row[:] = column[part]
+        out = np.empty((steps.size + 1, 3))
+        integrate.integrate_with_sensitivities(
+            steps, a.drive[part], a.constants, start, a.pieces, rows, place, factor, d_c, d_start, out, sens
+        )
+        return out
+
+    def _input_jacobian(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
+        """Return the derivatives of the drives by a parameter, and of the constants (14,) where there are any."""
+        names = NAMES[self.layout.axis]
+        share, ratio = self.scales
+        exponent = self.values.get("damping_exponent", 1.0)
+        if name == names.damping:
+            return self._damping(share**exponent), None
+        if name == "damping_exponent":
+            return self._damping_exponent(self.base.damping * float(np.log(share)), exponent)
+        if name == names.authority or name.startswith(f"{names.authority}@"):
+            return self._authority(name, ratio**2), None
+        if name == names.stiffness:
+            return {OF_STIFFNESS: UNIT_DRIVE}, None
+        if name == names.trim:
+            return self._trim(), None
+        return self._of_effect(name)
+
+    def _damping_exponent(self, factor: float, exponent: float) -> tuple[DriveDerivatives, FloatArray | None]:
+        """Return the derivatives of the drives, and of the constants (14,), by the exponent of the speed law."""
+        of_damping = self._damping(factor)
+        if all(e.core is None for e in self.layout.effects):
+            return of_damping, None
+        up, down = (self._core(self.values | {"damping_exponent": exponent + s}) for s in (EXPONENT_STEP, -EXPONENT_STEP))
+        by_fin = (up.cross_fin - down.cross_fin) / (2 * EXPONENT_STEP)
+        constants = (constants_of(up) - constants_of(down)) / (2 * EXPONENT_STEP)
+        return {**of_damping, CROSS_INPUT: (by_fin, self.arrays.fin.mean)}, constants
+
+    def _damping(self, factor: float) -> DriveDerivatives:
+        shape = self.arrays.terms.damping_factor
+        return {OF_DAMPING: (factor, None if shape is None else over_intervals(shape))}
+
+    def _trim(self) -> DriveDerivatives:
+        """Return the derivatives of the drives by the trim: a constant moment, or one that scales with the authority."""
+        if not self.layout.groups.trim_of_fin:
+            return {MOMENT[0]: UNIT_DRIVE, MOMENT[1]: UNIT_DRIVE}
+        over, shape = self._over_reference(), self._authority_shape()
+        return {MOMENT[0]: (over, shape[0]), MOMENT[1]: (over, shape[1])}
+
+    def _authority_shape(self) -> tuple[FloatArray | None, FloatArray | None]:
+        """Return the authority factor at both ends of each interval, (n-1,) each, none where it is one."""
+        factor = self.arrays.terms.authority_factor
+        return (None, None) if factor is None else (factor[:-1], factor[1:])
+
+    def _over_reference(self) -> float:
+        return over_reference(self.base.authority, self.values[NAMES[self.layout.axis].authority])
+
+    def _authority(self, name: str, factor: float) -> DriveDerivatives:
+        """Return the derivatives of the drives by an authority: the fin's moment in its group's runs, and a trim of the fin."""
+        lifted, shape = scaled_fin(self.arrays.fin, self.arrays.terms), self._authority_shape()
+        own, moved = name == self.authority, self._trim_derivative(name, factor)
+        if not own:
+            return {place: (moved, trim) for place, trim in zip(MOMENT, shape, strict=True)}
+        if moved == 0.0:
+            return {place: (factor, fin) for place, fin in zip(MOMENT, lifted, strict=True)}
+        both = zip(MOMENT, lifted, shape, strict=True)
+        return {place: (1.0, factor * fin + (moved if trim is None else moved * trim)) for place, fin, trim in both}
+
+    def _trim_derivative(self, name: str, factor: float) -> float:
+        """Return the derivative of the run's trim moment C b / b_reference by an authority."""
+        names = NAMES[self.layout.axis]
+        trim, at_reference = self.values[names.trim], self.values[names.authority]
+        if not self.layout.groups.trim_of_fin or self.authority == names.authority or at_reference == 0.0:
+            return 0.0
+        by_own = trim / at_reference
+        return by_own * factor if name == self.authority else -by_own * self._over_reference()
+
+    def _of_effect(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
+        """Return an effect's own slope where it has one, else the central difference of the kernel inputs."""
+        owner, coefficient = next((e, c) for e in self.layout.effects for c in e.coefficients if c.name == name)
+        if owner.measure is not None:
+            return {}, None
+        if owner.slope is not None:
+            slope = owner.slope(name, self.values, self.record)
+            return {MOMENT[0]: (1.0, slope[:-1]), MOMENT[1]: (1.0, slope[1:])}, None
+        step = coefficient.step
+        high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
+        (above, up), (below, down) = (self._drives_of_effect(owner, self.values | {name: value}) for value in (high, low))
+        width = high - low
+        changes = {place: value - below[place] for place, value in above.items()}
+        drives = {place: (1.0 / width, c) if isinstance(c, np.ndarray) else (c / width, None) for place, c in changes.items()}
+        return drives, None if owner.core is None else (up - down) / width
+
+    def _drives_of_effect(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
+        """Return the drives that an effect changes, by their place, and the kernel's constants (14,), at these values."""
+        effects, record = self.layout.effects, self.record
+        fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
+        terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)
+        core = self.arrays.core if owner.core is None else self._core(values)
+        drives: dict[int, FloatArray | float] = {}
+        if owner.fin is not None or owner.terms is not None or owner.moment is not None:
+            drives[MOMENT[0]], drives[MOMENT[1]] = moments_of(self.base, fin, terms)
+        if owner.terms is not None:
+            drives[OF_DAMPING], drives[CROSS_FACTOR] = damping_of(self.base, terms), cross_factor_of(terms)
+        if owner.fin is not None or owner.core is not None:
+            drives[CROSS_INPUT] = cross_input_of(fin, core)
+        if owner.moment is not None:
+            path = integrate_record(record, self.arrays, self.start)
+            moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)
+            drives[MOMENT[0]] = drives[MOMENT[0]] + moment[:-1]
+            drives[MOMENT[1]] = drives[MOMENT[1]] + moment[1:]
+        return drives, self.arrays.constants if owner.core is None else constants_of(core)
+
+    def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
+        """Return what the sensors show, and carry the sensitivities (P, 2, n) through them in place."""
+        sensors = [e for e in self.layout.effects if e.measure is not None]
+        if not sensors:
+            return motion
+        shown = measured(motion, self.record, sensors, self.values)
+        sens[:] = self._sensor_jvp(motion, shown, sensors, sens)
+        own = {c.name: c for e in sensors for c in e.coefficients}
+        for j, slot in enumerate(slots):
+            name = self.layout.parameters[slot].name
+            if name in own:
+                step = own[name].step
+                ends = (self.values | {name: self.values[name] + s} for s in (step, -step))
+                plus, minus = (measured(motion, self.record, sensors, values) for values in ends)
+                sens[j] = _difference_quotient(plus, minus, 2.0 * step)
+        return shown
+
+    def _sensor_jvp(self, motion: Motion, shown: Motion, sensors: Sequence[Effect], sens: FloatArray) -> FloatArray:
+        """Return the product of the sensors' Jacobian with the sensitivities, by differences where an effect has no derivative.
+
+        A step of 1e-6 rad is so small against the scale of any sensor's law that a one-sided difference is exact to 1e-6.
+        """
+        out = sens.copy()
+        if all(e.sensor_jvp is not None for e in sensors):
+            for effect in sensors:
+                if effect.sensor_jvp is not None:
+                    out = effect.sensor_jvp(out, motion, self.values, self.record)
+                motion = measured(motion, self.record, (effect,), self.values)
+            return out
+        for j, direction in enumerate(sens):
+            size = float(np.max(np.abs(direction)))
+            step = 1e-6 / size if size > 0 else 1.0
+            out[j] = _difference_quotient(
+                measured(_moved(motion, direction, step), self.record, sensors, self.values), shown, step
+            )
+        return out
+
+
+def _difference_quotient(plus: Motion, minus: Motion, step: float) -> FloatArray:
+    """Return the difference quotient of two motions, (2, n)."""
+    return np.stack([plus.angle - minus.angle, plus.rate - minus.rate]) / step
+
+
+def _moved(motion: Motion, direction: FloatArray, step: float) -> Motion:
+    return Motion(motion.angle + step * direction[0], motion.rate + step * direction[1])

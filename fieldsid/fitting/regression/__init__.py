@@ -1,0 +1,1 @@
+"""Regression on the filtered equation of motion, block and recursive."""

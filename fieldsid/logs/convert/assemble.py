@@ -1,0 +1,156 @@
+"""From what a reader found to a Run: units, signs, frames, one clock, unwrapped headings, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from shlex import quote
+
+import numpy as np
+
+from fieldsid.errors import LogError, MappingError
+from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
+from fieldsid.logs.convert.clock import Track, one_clock
+from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
+from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
+from fieldsid.logs.convert.geodetic import north_and_east
+from fieldsid.logs.convert.heading_unwrap import unwrapped_over
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
+from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
+from fieldsid.logs.reader import RawLog, ReadOptions, Series
+from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.numerics.arrays import FloatArray
+
+WHOLE = (-np.inf, np.inf)
+
+
+def assemble(
+    raw: RawLog,
+    mapping: ChannelMap,
+    path: Path | None,
+    options: ReadOptions | None = None,
+    *,
+    part: tuple[float, float] = WHOLE,
+    max_gap_s: float = MAX_GAP_S,
+) -> Run:
+    """Return the Run of a raw log between two times in s.
+
+    Raises LogError or MappingError for what cannot be meant, DataError where the part is empty. What lies outside of it is
+    not judged.
+    """
+    options = options or ReadOptions()
+    if raw.finished:
+        time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
+        run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
+        return run if part == WHOLE else run.between(*part)
+    notes = list(raw.notes)
+    tracks: dict[str, Track] = {}
+    for signal, series in raw.series.items():
+        for name, track in _tracks(signal, series, mapping, notes, options).items():
+            if name in tracks:
+                raise MappingError(
+                    f"two sources give `{name}`", found=f"{tracks[name].label} and {track.label}", hint=f"map `{name}` once"
+                )
+            tracks[name] = track
+    if not tracks:
+        raise MappingError(
+            f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
+        )
+    if "yaw_rad" in tracks:
+        tracks["yaw_rad"], found = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
+        notes += found
+    time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
+    if time.size < 2:
+        counted = f"{time.size} sample{'s' * (time.size != 1)} with a time, at least 2 are needed"
+        raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
+    signals = {s: signals[s] for s in SIGNALS if s in signals}
+    run = Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
+    run = run if part == WHOLE else run.between(*part)
+    refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
+    return run
+
+
+def _inspect(path: Path | None) -> str:
+    return f"`sysid inspect {'LOG' if path is None else quote(str(path))}`"
+
+
+def _on_one_clock(
+    raw: RawLog, tracks: Mapping[str, Track], mapping: ChannelMap
+) -> tuple[FloatArray, dict[str, FloatArray], list[Note]]:
+    if not raw.one_clock:
+        return one_clock(tracks, clock=mapping.clock, gap_factor=mapping.gap_factor)
+    time = next(iter(tracks.values())).time
+    return time, {s: t.values for s, t in tracks.items()}, []
+
+
+def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note], options: ReadOptions) -> dict[str, Track]:
+    """Return one source's signals in SI and our frames, their time in order."""
+    source = mapping.sources[signal]
+    label = series.label.partition(".")[0] if source.topic else "the time column"
+    rows, found = in_order(series.time, label, options)
+    notes += found
+    # An index that takes all rows would still copy them, once for each signal of a long log.
+    is_whole = rows.size == series.time.size
+    picked = series if is_whole else replace(series, time=series.time[rows], values=series.values[rows])
+    refuse_impossible_steps(picked.time, label)
+    with np.errstate(over="ignore", invalid="ignore"):
+        given = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
+        if signal in COUNTED and source.unit == COUNTS:
+            angles, found = turned_from_counts(signal, picked.values, source.centre, source.scale)
+            picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None)
+            notes += found
+        values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}
+    notes += [note for _, found in values.values() for note in found]
+    return {name: Track(picked.time, v, series.label) for name, (v, _) in values.items()}
+
+
+def _scalar(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
+    values = _in_si(signal, series, source, mapping)
+    if source.sign < 0:
+        values = -values
+    frame = source.frame or mapping.frame
+    _check_swap(signal, source, mapping)
+    name, values = to_ned_frd(signal, values, frame, is_height=series.is_height)
+    return {name: values + source.offset if source.offset else values}
+
+
+def _in_si(signal: str, series: Series, source: Source, mapping: ChannelMap) -> FloatArray:
+    unit = source.unit or series.unit
+    if unit is None or (signal in ("thrust", "thrust_ratio") and not source.unit):
+        return series.values
+    if signal == "depth_m" and pick_unit(unit).dimension == "pressure":
+        pascal = scaled(series.values, pick_unit(unit).factor)
+        return depth_of_pressure(pascal, density=mapping.pressure.density, surface_pa=mapping.pressure.surface_pa)
+    return scaled(series.values, factor_to(signal, unit))
+
+
+def _check_swap(signal: str, source: Source, mapping: ChannelMap) -> None:
+    """In ENU, x is east: mapping it alone would give y without saying so."""
+    partner = SWAPPED_BY_WORLD.get(signal)
+    if partner is None or (source.frame or mapping.frame).world == "NED":
+        return
+    other = mapping.sources.get(partner)
+    if other is None or (other.frame or mapping.frame).world == "NED":
+        raise MappingError(
+            f"`{signal}` is in ENU and becomes `{partner}`, which is not mapped beside it",
+            found=source.label,
+            hint=f"map both `x_m` and `y_m` in ENU, or write `frame: NED` at `{signal}`",
+        )
+
+
+def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
+    xyzw = series.values if source.order == "xyzw" else series.values[:, [1, 2, 3, 0]]
+    angles = dict(zip(ANGLES, angles_of_quaternion(xyzw, source.frame or mapping.frame), strict=True))
+    wanted = ANGLES if signal == ATTITUDE else (signal,)
+    if signal != ATTITUDE and signal not in ANGLES:
+        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number")
+    return {n: angles[n] + source.offset if source.offset and n == "yaw_rad" else angles[n] for n in wanted}
+
+
+def _position(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
+    return dict(zip(("x_m", "y_m"), north_and_east(series.values), strict=True))
+
+
+def _distinct(notes: list[Note]) -> tuple[Note, ...]:
+    return tuple({(n.code, n.message): n for n in notes}.values())

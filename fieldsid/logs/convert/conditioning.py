@@ -1,0 +1,156 @@
+"""Repair and refusal before a log becomes a Run: time that repeats or goes back, and long runs of missing samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import LogError
+from fieldsid.logs.convert.time_column import unit_of_step
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import FloatArray
+
+MAX_GAP_S = 2.0
+"""A main signal missing for longer than this inside a run is refused unless the user raises the limit."""
+
+OWN_STEPS = 5.0
+"""Steps of a signal's own that are no gap of it, however long they are."""
+WORTH_TAKING = 10
+"""Samples above which a part without a gap is worth a hint."""
+ROUNDING = 1.01
+"""What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
+
+MAIN = (
+    "yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s",
+    "rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad",
+)  # fmt: skip
+"""Signals that identification stands on."""
+
+
+MAX_PLAUSIBLE_VALUE = 1e9
+"""What is larger in SI was never measured: a damaged cell, or no number of this signal."""
+STEPS_S = (1e-7, 1e5)
+"""Between these a log's steps of time lie, whatever vehicle and logger."""
+
+
+def possible(signal: str, values: FloatArray) -> tuple[FloatArray, list[Note]]:
+    """Return a signal (n,) without what no sensor gives, infinite numbers among them, and a note where there were some."""
+    beyond = ~np.isnan(values) & ~(np.abs(values) <= MAX_PLAUSIBLE_VALUE)
+    if not beyond.any():
+        return values, []
+    message = f"{signal}: numbers beyond {MAX_PLAUSIBLE_VALUE:g}, or infinite, that count as missing: {int(beyond.sum())}"
+    return np.where(beyond, np.nan, values), [Note("infinite", message, {"signal": signal, "count": int(beyond.sum())})]
+
+
+def likely_unit(step_s: float) -> str:
+    """Return the unit of time in which a median step is that of a log, with the words to set it; nothing where there is none."""
+    unit = unit_of_step(step_s)
+    return f"set its unit, probably `unit: {unit}`" if unit else ""
+
+
+def refuse_impossible_steps(time: FloatArray, label: str) -> None:
+    """Raise LogError where the median step of a time (n,) is none of a log."""
+    step = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    if not STEPS_S[0] <= step <= STEPS_S[1]:
+        raise LogError(
+            f"{label} goes on by {step:.3g} s a sample",
+            found=f"{time.size} samples from {time[0]:.6g} to {time[-1]:.6g} s",
+            hint=likely_unit(step) or "check which one it is, and its unit",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Missing samples between two that are there: from `start_s` to `end_s`, `count` of them."""
+
+    start_s: float
+    end_s: float
+    count: int
+
+    @property
+    def length_s(self) -> float:
+        """Time the missing samples would have stood for: between those on both sides, less a step."""
+        return (self.end_s - self.start_s) * self.count / (self.count + 1)
+
+
+def in_order(time: FloatArray, label: str, options: ReadOptions | None = None) -> tuple[npt.NDArray[np.intp], list[Note]]:
+    """Return the rows (m,) with which time increases strictly, and a note where others were left out.
+
+    Rows without a time are left out. Unless it is asked to salvage, raises LogError where time goes back or repeats.
+    """
+    options = options or ReadOptions()
+    rows = np.flatnonzero(np.isfinite(time))
+    stamps = time[rows]
+    if stamps.size == 0 or bool((np.diff(stamps) > 0).all()):
+        return rows, []
+    ahead = np.concatenate([[True], stamps[1:] > np.maximum.accumulate(stamps)[:-1]])
+    if not options.salvage:
+        raise _disorder(stamps, label, options, left=float(ahead.mean()))
+    dropped = int((~ahead).sum())
+    message = f"{label}: {dropped} of {stamps.size} samples were left out, time repeats or goes back there"
+    return rows[ahead], [Note("time_order", message, {"dropped": dropped, "of": int(stamps.size)})]
+
+
+def _disorder(stamps: FloatArray, label: str, options: ReadOptions, *, left: float) -> LogError:
+    steps = np.diff(stamps)
+    back, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
+    hint = options.salvaging("leave such samples out", left) or "check that this is the time, and sort the samples by it"
+    if back.size:
+        i = int(back[0])
+        places = f"the first from {stamps[i]:.10g} to {stamps[i + 1]:.10g} s at sample {i + 2}"
+        return LogError(f"time goes backwards in {label}", found=f"{back.size} of {steps.size} steps, {places}", hint=hint)
+    i = int(repeated[0])
+    return LogError(
+        f"time repeats in {label}",
+        found=f"{repeated.size} of {steps.size} steps, the first at {stamps[i]:.10g} s, samples {i + 1} and {i + 2}",
+        hint=hint,
+    )
+
+
+def gaps_in(time: FloatArray, values: FloatArray) -> list[Gap]:
+    """Return the runs of missing samples inside a signal, those at its two ends left out."""
+    seen = np.flatnonzero(np.isfinite(values))
+    wide = np.flatnonzero(np.diff(seen) > 1)
+    return [Gap(float(time[seen[i]]), float(time[seen[i + 1]]), int(seen[i + 1] - seen[i] - 1)) for i in wide]
+
+
+def gap_limit(time: FloatArray, values: FloatArray, limit_s: float) -> float:
+    """Return the longest gap in s that is allowed in a signal (n,): the limit, and never less than a few of its own steps."""
+    steps = np.diff(time[np.isfinite(values)])
+    return max(limit_s, OWN_STEPS * float(np.median(steps))) if steps.size else limit_s
+
+
+def refuse_long_gaps(
+    time: FloatArray, signals: Mapping[str, FloatArray], options: ReadOptions | None = None, *, limit_s: float = MAX_GAP_S
+) -> None:
+    """Raise LogError naming the longest gap of a main signal above the limit, which a slow signal's own steps raise."""
+    options = options or ReadOptions()
+    limits = {s: gap_limit(time, signals[s], limit_s) for s in MAIN if s in signals}
+    long = [(g, s) for s, limit in limits.items() for g in gaps_in(time, signals[s]) if g.length_s > ROUNDING * limit]
+    if not long:
+        return
+    gap, signal = max(long, key=lambda found: found[0].length_s)
+    length = gap.length_s
+    start, end = _longest_without(time, [g for g, _ in long])
+    hint = f"accept it: {options.with_option(f'--max-gap {length + 0.1:.1f}')}"
+    if np.count_nonzero((time >= start) & (time <= end)) > WORTH_TAKING:
+        hint += f"; or take the longest part without one: {options.with_option(f'--from {start:.2f} --to {end:.2f}')}"
+    raise LogError(
+        f"`{signal}` is missing for {length:.2f} s (limit {limits[signal]:.3g} s)",
+        found=f"{gap.count} samples without a number between {gap.start_s:.2f} and {gap.end_s:.2f} s",
+        hint=hint,
+    )
+
+
+def _longest_without(time: FloatArray, gaps: Sequence[Gap]) -> tuple[float, float]:
+    """Return start and end in s of the longest part of a log that no gap touches."""
+    begin = float(time[0])
+    parts = []
+    for gap in sorted(gaps, key=lambda g: g.start_s):
+        parts.append((begin, gap.start_s))
+        begin = max(begin, gap.end_s)
+    return max([*parts, (begin, float(time[-1]))], key=lambda part: part[1] - part[0])

@@ -1,0 +1,98 @@
+"""World and body frames of logs, converted to north-east-down and forward-starboard-down.
+
+ROS logs are east-north-up and forward-left-up (REP 103). With E -> N, N -> E, U -> -D: yaw_ned = pi/2 - yaw_enu,
+x and y change places, depth = -z. With left -> -starboard, up -> -down: pitch, pitch rate, yaw rate, sway and
+heave change sign. Angles are the z-y-x sequence of Fossen (2011), section 2.2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fieldsid.numerics.arrays import FloatArray
+
+World = Literal["NED", "ENU"]
+Body = Literal["FRD", "FLU"]
+
+TURNED_BY_BODY = frozenset({"pitch_rad", "pitch_rate_rad_s", "yaw_rate_rad_s", "sway_m_s", "heave_m_s"})
+"""Signals that change sign between forward-left-up and forward-starboard-down."""
+
+SHORTEST, LONGEST = 1e-3, 1e3
+"""Lengths between which four numbers are taken for a quaternion that is only not normalised."""
+
+SWAPPED_BY_WORLD = {"x_m": "y_m", "y_m": "x_m"}
+"""Signals that change places between east-north-up and north-east-down."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The frames a log is written in: the world's axes and the body's."""
+
+    world: World = "NED"
+    body: Body = "FRD"
+
+
+def heading_of_enu(yaw_rad: FloatArray) -> FloatArray:
+    """Return the heading (n,) from north, clockwise, of an angle from east, counterclockwise; its own inverse."""
+    return np.asarray(0.5 * math.pi - yaw_rad)
+
+
+def to_ned_frd(signal: str, values: FloatArray, frame: Frame, *, is_height: bool = False) -> tuple[str, FloatArray]:
+    """Return the name and values (n,) of one signal in our frames.
+
+    is_height: the number mapped to `depth_m` is a z coordinate, which points up in ENU.
+    """
+    if signal in TURNED_BY_BODY:
+        return signal, -values if frame.body == "FLU" else values
+    if frame.world == "NED":
+        return signal, values
+    if signal == "yaw_rad":
+        return signal, heading_of_enu(values)
+    if signal == "depth_m" and is_height:
+        return signal, -values
+    return SWAPPED_BY_WORLD.get(signal, signal), values
+
+
+def angles_of_quaternion(xyzw: FloatArray, frame: Frame) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return yaw, pitch and roll (n,) in rad, NED and FRD, of body-to-world quaternions (n, 4) in the log's frame.
+
+    Quaternions are normalised first; one that vanishes (no estimate) or is absurdly long gives NaN.
+    """
+    with np.errstate(over="ignore"):
+        length = np.linalg.norm(xyzw, axis=1)
+    usable = (length > SHORTEST) & (length < LONGEST)
+    x, y, z, w = (np.where(usable[:, None], xyzw, np.nan) / np.where(usable, length, 1.0)[:, None]).T
+    forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
+    side_z = 2 * (y * z + w * x)
+    up_z = 1 - 2 * (x * x + y * y)
+    if frame.world == "ENU":
+        forward = np.stack([forward[1], forward[0], -forward[2]])
+        side_z, up_z = -side_z, -up_z
+    if frame.body == "FLU":
+        side_z, up_z = -side_z, -up_z
+    yaw = np.arctan2(forward[1], forward[0])
+    pitch = np.arctan2(-forward[2], np.hypot(forward[0], forward[1]))
+    return yaw, pitch, np.arctan2(side_z, up_z)
+
+
+def quaternion_of_angles(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArray:
+    """Return body-to-world quaternions (n, 4), x y z w, of z-y-x angles (n,) in rad, both in one pair of frames."""
+    cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
+    cp, sp = np.cos(pitch / 2), np.sin(pitch / 2)
+    cr, sr = np.cos(roll / 2), np.sin(roll / 2)
+    return np.stack(
+        [sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy],
+        axis=-1,
+    )
+
+
+def unwrapped(angle_rad: FloatArray) -> FloatArray:
+    """Return an angle (n,) without jumps of a turn, gaps left as NaN; steps below half a turn stay untouched."""
+    seen = np.isfinite(angle_rad)
+    result = np.array(angle_rad, dtype=np.float64)
+    result[seen] = np.unwrap(result[seen])
+    return result

@@ -1,0 +1,71 @@
+"""Fins and motors logged in a servo's counts: a byte about 128, or the microseconds of a pulse about 1500.
+
+A fin's angle is (count - centre) x scale. The scale is the servo's: its range in rad over its range in counts. Where nobody
+has said it, the full travel of a count is taken for `FULL_RAD`; what is fitted to such a fin is an authority per count, and
+heading, rates, time constants and what follows from them do not depend on it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import FloatArray
+
+COUNTS = "counts"
+FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
+COUNTED = (*FINS, "thrust", "thrust_ratio")
+FULL_RAD = math.radians(30.0)
+"""What the full travel of a servo is taken for where its range is not said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Servo:
+    """A kind of counts: its name, the count at zero, the counts to full travel, and the least and largest there are."""
+
+    says: str
+    centre: float
+    travel: float
+    least: float
+    largest: float
+
+
+SERVOS = (Servo("a byte", 128.0, 127.0, 0.0, 255.0), Servo("pulses in us", 1500.0, 400.0, 800.0, 2200.0))
+
+
+def servo_of(values: FloatArray) -> Servo | None:
+    """Return the kind of counts that numbers (n,) are, by their size; None where they are none.
+
+    Counts are whole, lie to one side of zero, and about the centre of their kind.
+    """
+    seen = values[np.isfinite(values)]
+    if not seen.size or float(np.ptp(seen)) == 0.0 or not bool((seen == np.round(seen)).all()):
+        return None
+    for servo in SERVOS:
+        inside = bool((seen >= servo.least).all() and (seen <= servo.largest).all())
+        reaches = float(seen.max()) > servo.centre > float(seen.min()) or servo.least > 0.0
+        if inside and reaches and abs(float(np.mean(seen)) - servo.centre) < servo.travel:
+            return servo
+    return None
+
+
+def turned_from_counts(
+    signal: str, values: FloatArray, centre: float | None, scale: float | None
+) -> tuple[FloatArray, list[Note]]:
+    """Return the angle (n,) in rad of a fin's counts, or a motor's counts from its centre, and a note on what was taken."""
+    servo = next((s for s in SERVOS if s.centre == centre), None) or servo_of(values)
+    middle = centre if centre is not None else servo.centre if servo is not None else 0.0
+    if signal not in FINS:
+        return (values - middle) * (scale or 1.0), []
+    if scale is not None:
+        return (values - middle) * scale, []
+    travel = servo.travel if servo is not None else max(float(np.nanmax(np.abs(values - middle), initial=0.0)), 1.0)
+    taken = FULL_RAD / travel
+    message = (
+        f"{signal} is in counts about {middle:g}, and what one is worth is not known: taken as {math.degrees(taken):.3g} deg; "
+        "the fin's authority is per count then: set `scale`, in rad a count, from the servo's range"
+    )
+    return (values - middle) * taken, [Note(COUNTS, message, {"signal": signal, "centre": middle, "scale": taken})]

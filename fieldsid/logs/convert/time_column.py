@@ -1,0 +1,226 @@
+"""Time columns as seconds: numbers in any unit, epoch times, ISO 8601 text, clocks, and dates or GPS weeks beside them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import LogError
+from fieldsid.logs.convert.clock_text import (
+    DAY_S,
+    FORMS,
+    HOUR_S,
+    WEEK_S,
+    Clock,
+    clock_of_digits,
+    clock_of_text,
+    days_of,
+    going_on,
+    lost_hours,
+    stamps_of_text,
+)
+from fieldsid.logs.convert.coarse_stamps import rebuilt
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.units import UNITS, pick_unit
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.numerics.arrays import FloatArray
+
+EPOCH_FROM_S = 1e8
+"""A time that starts later than this many seconds (three years) counts from an epoch, not from the start of the run."""
+GPS_EPOCH_S = 315964800.0
+"""6 January 1980, from which GPS weeks count, in seconds since 1970."""
+
+
+def seconds_of(
+    cells: npt.NDArray[Any],
+    unit: str | None,
+    options: ReadOptions | None = None,
+    *,
+    name: str,
+    dates: npt.NDArray[Any] | None = None,
+    weeks: npt.NDArray[Any] | None = None,
+) -> tuple[FloatArray, list[Note]]:
+    """Return a time column (n,) in s, and notes.
+
+    Numbers are in `unit` (seconds when None); text is ISO 8601, taken as UTC, a date and a clock, or a clock, to which `dates`
+    are the days and `unit` may say the form: `hh:mm:ss`, `mm:ss`, `hh:mm`, `hhmmss`. `weeks` are GPS weeks beside the time of
+    the week. A time that counts from an epoch or from midnight starts at zero, and the note `time_origin` keeps its start.
+    Stamps with too few digits are rebuilt, see coarse.py. Cells that are no times become NaN when salvaging. Raises LogError
+    for a cell that is no time, and MappingError for a unit that is not one of time.
+    """
+    options = options or ReadOptions()
+    if cells.size == 0:
+        raise LogError("the table has no rows", found=f"only the header, with column `{name}`", hint=COPY_AGAIN)
+    if unit in FORMS or (dates is not None and cells.dtype.kind == "O"):
+        return _of_clock(cells, unit if unit in FORMS else None, name, options, dates)
+    if cells.dtype.kind == "M":
+        return _of_integers(cells.astype("datetime64[ns]").astype(np.int64), 1e-9, name)
+    if weeks is not None:
+        return _of_weeks(cells, unit, name, options, weeks)
+    if cells.dtype.kind in "iu":
+        return _of_integers(cells.astype(np.int64), _factor(unit), name)
+    if cells.dtype.kind == "f":
+        return _of_floats(cells.astype(np.float64), _factor(unit), name, options)
+    return _of_text(cells, unit, name, options)
+
+
+def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
+    """Return the unit of numbers of time by their size, as an epoch has them, else by their usual step.
+
+    None where the cells are no numbers. A step that shows nothing of a vehicle's motion in seconds, and does in milliseconds or
+    less, is in those.
+    """
+    if cells.dtype.kind not in "iuf" or not cells.size or not np.isfinite(cells[0]):
+        return None
+    size = float(cells[0])
+    epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else ""
+    return epoch or unit_of_step(step) or "s"
+
+
+SLOW_S = 5.0
+"""A step longer than this shows nothing of a vehicle's motion: time is in another unit."""
+
+
+def unit_of_step(step_s: float) -> str:
+    """Return the unit of time in which a step too long in seconds is that of a log; nothing where there is none."""
+    units = [name for name, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if 1e-4 <= step_s * factor <= 2.0]
+    return units[0] if units and step_s > SLOW_S else ""
+
+
+def _factor(unit: str | None) -> float:
+    if unit is None:
+        return 1.0
+    picked = pick_unit(unit)
+    if picked.dimension != "time":
+        fitting = ", ".join([u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS))
+        raise LogError(f"time cannot be in {picked.name!r}", found=f"a unit of {picked.dimension}", hint=f"use one of: {fitting}")
+    return picked.factor
+
+
+def _of_integers(values: npt.NDArray[np.int64], factor: float, name: str) -> tuple[FloatArray, list[Note]]:
+    """Subtract the start before scaling, so that nanoseconds of an epoch keep every digit."""
+    start = int(values[0])
+    time, notes = rebuilt((values - start).astype(np.float64), name)
+    if start * factor <= EPOCH_FROM_S:
+        return _scaled(time + start, factor), notes
+    return _scaled(time, factor), [*notes, _origin(start * factor)]
+
+
+def _of_floats(values: FloatArray, factor: float, name: str, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
+    notes: list[Note] = []
+    missing = np.flatnonzero(~np.isfinite(values))
+    if missing.size:
+        notes.append(_no_times(missing, values, name, options))
+    values, coarse = rebuilt(values, name)
+    seen = values[np.isfinite(values)]
+    start = float(seen[0]) if seen.size else 0.0
+    if start * factor <= EPOCH_FROM_S:
+        return _scaled(values, factor), [*notes, *coarse]
+    return _scaled(values - start, factor), [*notes, *coarse, _origin(start * factor)]
+
+
+def _scaled(values: FloatArray, factor: float) -> FloatArray:
+    """Divide by a whole number where there is one: 50 ms is then 0.05 s to the last bit."""
+    if factor == 1.0:
+        return values
+    return values / round(1.0 / factor) if factor < 1.0 else values * factor
+
+
+def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
+    values, wrong = as_numbers(cells)
+    if wrong.size < cells.size // 2:
+        if wrong.size and not options.salvage:
+            raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)
+        return _of_floats(values, _factor(unit), name, options)
+    stamps = _iso(cells)
+    if np.isnat(stamps).mean() > 0.5:
+        other = stamps_of_text(cells)
+        if other is not None:
+            return _from_start(other, cells, name, options)
+        if clock_of_text(cells) is not None:
+            return _of_clock(cells, None, name, options, None)
+    missing = np.flatnonzero(np.isnat(stamps))
+    notes = [_no_times(missing, cells, name, options)] if missing.size else []
+    nanoseconds = stamps.astype(np.int64)
+    start = int(nanoseconds[~np.isnat(stamps)][0]) if missing.size < cells.size else 0
+    seconds, coarse = rebuilt(np.where(np.isnat(stamps), np.nan, (nanoseconds - start) / 1e9), name)
+    return seconds, [*notes, *coarse, _origin(start / 1e9)]
+
+
+def _of_clock(
+    cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions, dates: npt.NDArray[Any] | None
+) -> tuple[FloatArray, list[Note]]:
+    """Return a clock's time, midnights and full hours passed over; dates count the days where the clock counts all of one."""
+    clock = _clock(cells, form, name, options)
+    days = None if dates is None or clock.period_s != DAY_S else days_of(dates)
+    if days is not None:
+        return _from_start(clock.seconds + DAY_S * days, cells, name, options)
+    seconds, rounds = going_on(clock.seconds, clock.period_s)
+    time, notes = _from_start(seconds, cells, name, options, is_of_day=True)
+    return time, [*notes, lost_hours(name, rounds)] if clock.period_s == HOUR_S else notes
+
+
+def _clock(cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions) -> Clock:
+    if form == "hhmmss":
+        return clock_of_digits(as_numbers(cells)[0])
+    found = clock_of_text(cells, form)
+    if found is None:
+        raise _refused(f"column `{name}` holds cells that are no clock", np.arange(cells.size), cells, options)
+    return found
+
+
+def _from_start(
+    seconds: FloatArray, cells: npt.NDArray[Any], name: str, options: ReadOptions, *, is_of_day: bool = False
+) -> tuple[FloatArray, list[Note]]:
+    """Return seconds (n,) from the first on, and the notes on cells without one and on the start."""
+    missing = np.flatnonzero(~np.isfinite(seconds))
+    notes = [_no_times(missing, cells, name, options)] if missing.size else []
+    seen = seconds[np.isfinite(seconds)]
+    start = float(seen[0]) if seen.size else 0.0
+    # A clock's digits are those of a second's parts: what is subtracted leaves rounding behind the ninth.
+    time, coarse = rebuilt(np.round(seconds - start, 9), name)
+    return time, [*notes, *coarse, _of_midnight(start) if is_of_day else _origin(start)]
+
+
+def _of_weeks(
+    cells: npt.NDArray[Any], unit: str | None, name: str, options: ReadOptions, weeks: npt.NDArray[Any]
+) -> tuple[FloatArray, list[Note]]:
+    """Return the time of GPS weeks and of what has passed of each, in seconds or in milliseconds, by its size."""
+    values, _ = as_numbers(cells)
+    largest = float(np.nanmax(values, initial=0.0))
+    factor = _factor(unit or ("s" if largest <= WEEK_S else "ms"))
+    since = WEEK_S * as_numbers(weeks)[0] + GPS_EPOCH_S
+    return _from_start(_scaled(values, factor) + since, cells, name, options)
+
+
+def _iso(cells: npt.NDArray[Any]) -> npt.NDArray[np.datetime64]:
+    import pandas as pd
+
+    parsed = pd.to_datetime(pd.Series(cells).astype("string").str.strip(), format="ISO8601", utc=True, errors="coerce")
+    return np.asarray(parsed.dt.tz_localize(None).to_numpy(dtype="datetime64[ns]"))
+
+
+def _no_times(missing: npt.NDArray[np.intp], cells: npt.NDArray[Any], name: str, options: ReadOptions) -> Note:
+    if not options.salvage:
+        raise _refused(f"column `{name}` has rows without a time", missing, cells, options)
+    return Note("no_time", f"rows left out because they have no time: {missing.size}", {"count": int(missing.size)})
+
+
+def _refused(what: str, places: npt.NDArray[np.intp], cells: npt.NDArray[Any], options: ReadOptions) -> LogError:
+    found = f"{places.size} of {cells.size}, the first in row {int(places[0]) + 1}: {str(cells[places[0]])[:40]!r}"
+    hint = options.salvaging("mend the column, or leave such rows out", 1.0 - places.size / cells.size)
+    return LogError(what, found=found, hint=hint or "check which column is the time")
+
+
+def _origin(start_s: float) -> Note:
+    return Note("time_origin", f"time 0 is {start_s:.6f} s of the log's clock", {"origin_ns": round(start_s * 1e9)})
+
+
+def _of_midnight(start_s: float) -> Note:
+    return Note(
+        "time_origin", f"time 0 is {start_s:.3f} s of the log's clock, which has no date", {"origin_ns": round(start_s * 1e9)}
+    )

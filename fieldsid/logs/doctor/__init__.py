@@ -1,0 +1,1 @@
+"""The import doctor: what in a log would spoil an identification."""

@@ -1,0 +1,97 @@
+"""The import doctor: what in a log would spoil an identification, each finding with its number, limit and remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fieldsid.logs.convert.conditioning import MAIN, likely_unit
+from fieldsid.logs.convert.time_column import SLOW_S
+from fieldsid.logs.doctor.pair_findings import pair_findings
+from fieldsid.logs.doctor.signal_findings import signal_findings
+from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.run import Note, Run
+
+JITTER_LIMIT = 0.2
+"""Standard deviation of the sampling step over its median."""
+BEYOND_SHARE = 0.05
+"""Share of a run in which a command may be beyond the fin's limit."""
+FIN_ZERO = 0.0175
+"""How far off the zero of a fin may be, in rad: commands about a trim reach so far beyond the limit."""
+GAP_FACTOR = 2.5
+"""A step longer than this many medians is a gap."""
+_FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
+
+
+def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: Stated | None = None) -> tuple[Note, ...]:
+    """Return the findings on a run; `fin_max_rad` gives fin limits by signal, for saturation, `stated` what its mapping says.
+
+    Every note has in its data the `value` measured and its `limit`, where there is one.
+    """
+    # Garbage in a damaged log may be near the largest float; what overflows then is compared as infinity.
+    stated = stated or Stated()
+    with np.errstate(over="ignore", invalid="ignore"):
+        findings = [*_sampling(run, stated), *_fins(run, fin_max_rad or {})]
+        for name in run.signals:
+            findings += signal_findings(run, name, stated)
+        return (*findings, *pair_findings(run, stated))
+
+
+def _sampling(run: Run, stated: Stated) -> list[Note]:
+    if len(run) < 3:
+        return []
+    steps = np.diff(run.time)
+    median = float(np.median(steps))
+    found = []
+    if median > SLOW_S:
+        advice = likely_unit(median) or "log faster"
+        message = f"time goes on by {median:.3g} s a sample (limit {SLOW_S:g} s): {advice}"
+        found.append(Note("time_unit", message, {"value": median, "limit": SLOW_S}))
+    wide = steps > GAP_FACTOR * median
+    if wide.any():
+        at = int(np.argmax(steps))
+        message = (
+            f"{int(wide.sum())} gaps in time, the longest {steps[at]:.3g} s from {run.time[at]:.2f} s on "
+            f"(limit {GAP_FACTOR:g} x the step of {median:.3g} s); leave it out with `--from` and `--to`"
+        )
+        found.append(
+            Note("time_gap", message, {"value": float(steps[at]), "limit": GAP_FACTOR * median, "count": int(wide.sum())})
+        )
+    jitter = float(np.std(steps[~wide])) / median
+    if jitter > JITTER_LIMIT:
+        message = (
+            f"the sampling step varies by {100 * jitter:.0f} % (limit {100 * JITTER_LIMIT:.0f} %){stated.stamps(*run.signals)}"
+        )
+        found.append(Note("jitter", message, {"value": jitter, "limit": JITTER_LIMIT}))
+    return found
+
+
+def _fins(run: Run, limits: Mapping[str, float]) -> list[Note]:
+    found = []
+    if not any(run.has(f) for f in _FINS):
+        message = "no fin signal: nothing can be identified from this run; map `rudder_rad` or `elevator_rad`"
+        found.append(Note("no_fin", message, {"signals": [s for s in run.signals if run.has(s)]}))
+    if not any(run.has(s) for s in MAIN if s not in _FINS):
+        found.append(Note("no_motion", "neither an angle nor a rate of yaw or pitch is in the log; map one of them", {}))
+    for fin, limit in limits.items():
+        if not run.has(fin):
+            continue
+        share = share_beyond(run, fin, limit)
+        if share > BEYOND_SHARE:
+            message = (
+                f"{fin} is beyond its limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
+                f"{100 * BEYOND_SHARE:.0f} %): the fin stopped there, and the log does not show it; log the measured fin"
+            )
+            found.append(Note("saturated", message, {"signal": fin, "value": share, "limit": BEYOND_SHARE}))
+    return found
+
+
+def share_beyond(run: Run, fin: str, limit: float) -> float:
+    """Return the share of a run in which a fin's command is beyond its limit (rad); one that is at it shows where the fin is.
+
+    Nothing is hidden where the fin itself was measured.
+    """
+    if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
+        return 0.0
+    return float(np.mean(np.abs(run[fin][np.isfinite(run[fin])]) > limit + FIN_ZERO))

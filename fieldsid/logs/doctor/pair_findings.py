@@ -1,0 +1,212 @@
+"""Findings on signals that must agree: an angle and its rate, a speed and the way made, a command and its fin.
+
+The change of an angle over a second is set against the rate integrated over the same second: their slope is 1. A
+slope below zero is a sign flip, one near 57.3 or 1/57.3 a degree taken for a radian, a shift a clock offset.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.run import Note, Run
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.shifted_correlation import shifted_correlations
+from fieldsid.numerics.trapezoid import trapezoid_integral
+
+PAIR_WINDOW_S = 1.0
+TRUSTED = 0.8
+"""Correlation from which a slope is believed."""
+STRONG, WEAK = 0.9, 0.5
+"""Correlations with the other axis's rate and with its own that make an angle look swapped."""
+MIN_NOISE_RATIO = 4.0
+"""How many times its noise a change must be to be judged."""
+SLOPE_LIMIT = 0.15
+DEGREES = 180.0 / math.pi
+LAG_S = 1.0
+"""Longest clock offset looked for."""
+
+_PAIRS = (("yaw_rad", "yaw_rate_rad_s"), ("pitch_rad", "pitch_rate_rad_s"), ("roll_rad", "roll_rate_rad_s"))
+_FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measured_rad"))
+
+
+def pair_findings(run: Run, stated: Stated) -> list[Note]:
+    """Return the findings on pairs of signals of a run."""
+    found: list[Note] = []
+    for angle, rate in _PAIRS:
+        if run.has(angle) and run.has(rate):
+            found += _angle_and_rate(run, angle, rate, stated)
+    found += _swapped(run)
+    if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
+        found += _speed_and_way(run)
+    for command, fin in _FINS:
+        if run.has(command) and run.has(fin):
+            found += _command_and_fin(run, command, fin, stated)
+    return found
+
+
+def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
+    changes = _changes(run, angle, rate)
+    if changes is None:
+        return []
+    a, b, step = changes
+    slope, trust = _slope(a, b)
+    if trust < TRUSTED:
+        return []
+    return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
+
+
+def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
+    """Return the changes of an angle and of an integrated rate over the window (n,), and the step.
+
+    None when the log is too short, or neither moves clearly more than its noise.
+    """
+    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
+    if both.sum() < 50:
+        return None
+    time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
+    step = float(np.median(np.diff(time)))
+    width = max(1, round(PAIR_WINDOW_S / step))
+    if time.size <= 3 * width:
+        return None
+    a, b = turned[width:] - turned[:-width], swept[width:] - swept[:-width]
+    floor = MIN_NOISE_RATIO * math.sqrt(2.0) * _noise(turned)
+    drift = MIN_NOISE_RATIO * _noise(run[rate][both]) * math.sqrt(PAIR_WINDOW_S * step)
+    return (a, b, step) if float(np.std(a)) > floor and float(np.std(b)) > drift else None
+
+
+def _noise(values: FloatArray) -> float:
+    """Return the standard deviation of white noise on a smooth signal, from its second differences."""
+    return float(np.median(np.abs(np.diff(values, 2)))) / (0.6745 * math.sqrt(6.0))
+
+
+def _swapped(run: Run) -> list[Note]:
+    """An angle that follows the other axis's rate, and not its own."""
+    found = []
+    for (angle, own), (_, other) in ((_PAIRS[0], _PAIRS[1]), (_PAIRS[1], _PAIRS[0])):
+        if not all(run.has(s) for s in (angle, own, other)):
+            continue
+        trust = {rate: _slope(c[0], c[1])[1] for rate in (own, other) if (c := _changes(run, angle, rate)) is not None}
+        if trust.get(other, 0.0) > STRONG and trust.get(own, 0.0) < WEAK:
+            mine = trust.get(own, 0.0)
+            message = f"{angle} follows {other} (correlation {trust[other]:.2f}), not {own} ({mine:.2f}): two columns are swapped"
+            found.append(Note("swapped", message, {"signal": angle, "value": trust.get(own, 0.0), "limit": WEAK}))
+    return found
+
+
+def _slope(a: FloatArray, b: FloatArray) -> tuple[float, float]:
+    """Return the slope of a on b and the size of their correlation; zeros when one of them does not move."""
+    a, b = _centred(a), _centred(b)
+    power = math.sqrt(float(a @ a) * float(b @ b))
+    if power == 0.0:
+        return 0.0, 0.0
+    correlation = float(a @ b) / power
+    # The geometric mean of both regressions, so that noise in either signal does not pull the slope one way.
+    return math.copysign(math.sqrt(float(a @ a) / float(b @ b)), correlation), abs(correlation)
+
+
+def _of_slope(angle: str, rate: str, slope: float, stated: Stated) -> list[Note]:
+    data = {"signal": rate, "value": slope, "limit": 1.0}
+    found = []
+    if slope < 0.0:
+        message = f"{rate} runs against {angle} (slope {slope:.3g}, should be 1): {stated.flip(angle, rate)}, or set the frame"
+        found.append(Note("rate_sign", message, data))
+    size = abs(slope)
+    if 0.7 < size / DEGREES < 1.4:
+        advice, unit = _in_degrees(angle, "deg", rate, stated)
+        found.append(
+            Note("unit", f"{angle} changes {size:.3g} times as fast as {rate} says: {advice}", {**data, "signal": angle, **unit})
+        )
+    elif 0.7 < size * DEGREES < 1.4:
+        advice, unit = _in_degrees(rate, "deg/s", angle, stated)
+        found.append(Note("unit", f"{rate} is {1 / size:.3g} times the change of {angle}: {advice}", {**data, **unit}))
+    elif abs(size - 1.0) > SLOPE_LIMIT:
+        message = f"{angle} changes {size:.3g} times as fast as {rate} says (limit 1 +/- {SLOPE_LIMIT:g}): check both scales"
+        found.append(Note("rate_scale", message, {**data, "limit": SLOPE_LIMIT}))
+    return found
+
+
+def _in_degrees(large: str, unit: str, small: str, stated: Stated) -> tuple[str, dict[str, str]]:
+    """Return what to do about a signal that is larger than another by the degrees of a radian, and the unit to set if any."""
+    wrong = [] if stated.is_si(small) else [f"{small} is not in `{stated.units[small]}`"]
+    if not stated.is_si(large):
+        return " or ".join(wrong) or f"taken as `{stated.units[large]}` already: check which ones they are", {}
+    said = " or ".join([f"{large} is probably in {unit}: set `unit: {unit}`", *wrong])
+    return said, {} if wrong else {"unit": unit}
+
+
+def _of_lag(angle: str, rate: str, a: FloatArray, b: FloatArray, step: float, stated: Stated) -> list[Note]:
+    lag, gain = _lag(a, b, step)
+    limit = max(1.5 * step, 0.05)
+    if abs(lag) <= limit or gain < 0.002:
+        return []
+    message = (
+        f"{angle} is {lag:+.3f} s late against {rate} (limit {limit:.3g} s): their clocks differ{stated.stamps(angle, rate)}"
+    )
+    return [Note("clock_offset", message, {"signal": angle, "value": lag, "limit": limit})]
+
+
+def _lag(a: FloatArray, b: FloatArray, step: float) -> tuple[float, float]:
+    """Return how late a is against b in s, to a part of a sample, and how much the correlation gains by it."""
+    reach = min(round(LAG_S / step), a.size // 4)
+    if reach < 1:
+        return 0.0, 0.0
+    size = np.abs(shifted_correlations(a, b, reach))
+    best = int(np.argmax(size))
+    gain = float(size[best] - size[reach])
+    shift = 0.0
+    if 0 < best < len(size) - 1:
+        left, middle, right = size[best - 1 : best + 2]
+        bend = left - 2 * middle + right
+        shift = float(0.5 * (left - right) / bend) if bend != 0.0 else 0.0
+    return (best - reach + shift) * step, gain
+
+
+def _centred(values: FloatArray) -> FloatArray:
+    """Return values less their mean, zero where all are alike: what the mean of those is off by is rounding."""
+    return np.zeros_like(values) if float(np.ptp(values)) == 0.0 else values - values.mean()
+
+
+def _speed_and_way(run: Run) -> list[Note]:
+    """The way made over five seconds against the speed; a current may change it, a unit changes it more."""
+    good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
+    if good.sum() < 50:
+        return []
+    time, x, y, surge = run.time[good], run["x_m"][good], run["y_m"][good], run["surge_m_s"][good]
+    width = max(1, round(5.0 / float(np.median(np.diff(time)))))
+    if time.size <= 2 * width:
+        return []
+    made = np.hypot(x[width:] - x[:-width], y[width:] - y[:-width]) / (time[width:] - time[:-width])
+    said = trapezoid_integral(time, surge)
+    said = np.abs(said[width:] - said[:-width]) / (time[width:] - time[:-width])
+    # In a turn the straight way is shorter than the path, so the fastest windows decide.
+    ratio = float(np.percentile(made, 90)) / max(float(np.percentile(said, 90)), 1e-9)
+    if 0.6 < ratio < 1.5 or float(np.percentile(said, 90)) < 0.1:
+        return []
+    message = (
+        f"the way made is {ratio:.3g} times what surge_m_s says (limits 0.6 and 1.5): check the unit of speed, knots are 0.514"
+    )
+    return [Note("speed_unit", message, {"signal": "surge_m_s", "value": ratio, "limit": 1.5})]
+
+
+def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:
+    both = np.isfinite(run[command]) & np.isfinite(run[fin])
+    if both.sum() < 50 or np.ptp(run[command][both]) == 0.0 or np.ptp(run[fin][both]) == 0.0:
+        return []
+    time, a, b = run.time[both], run[fin][both], run[command][both]
+    step = float(np.median(np.diff(time)))
+    slope, trust = _slope(a, b)
+    found = []
+    if trust > TRUSTED and slope < 0.0:
+        message = f"{fin} moves against {command} (slope {slope:.3g}): {stated.flip(command, fin)}"
+        found.append(Note("fin_sign", message, {"signal": fin, "value": slope, "limit": 0.0}))
+    lag, gain = _lag(a, b, step)
+    if lag < -1.5 * step and gain > 0.002:
+        message = (
+            f"{fin} moves {-lag:.3f} s before its command (limit {1.5 * step:.3g} s): their clocks differ"
+            f"{stated.stamps(command, fin)}"
+        )
+        found.append(Note("clock_offset", message, {"signal": fin, "value": lag, "limit": -1.5 * step}))
+    return found

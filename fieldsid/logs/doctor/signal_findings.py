@@ -1,0 +1,122 @@
+"""Findings on one signal at a time: constant, frozen, missing, coarse, spiked, or in a unit that cannot be meant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.logs.doctor.spikes import spikes_of
+from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.numerics.arrays import FloatArray
+
+PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
+MEASURED = frozenset(SIGNALS) - PROPULSION - {"rudder_rad", "elevator_rad"}
+FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
+"""What the free run is fitted to."""
+MISSING_LIMIT = 0.05
+FROZEN_S = 1.0
+COARSE_LIMIT = 0.3
+"""Share of samples equal to the one before, above which a signal is called coarse."""
+
+LARGEST = {
+    "pitch_rad": (1.6, "deg"), "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
+    "roll_rate_rad_s": (8.0, "deg/s"), "rudder_rad": (1.6, "deg"), "elevator_rad": (1.6, "deg"),
+    "rudder_measured_rad": (1.6, "deg"), "elevator_measured_rad": (1.6, "deg"),
+    "surge_m_s": (8.0, "kn"), "depth_m": (11000.0, "mm"),
+}  # fmt: skip
+"""Largest size of a signal that can be meant, and the unit it is probably in when it is larger."""
+
+
+def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
+    """Return the findings on one signal of a run."""
+    values = run[name]
+    seen = np.isfinite(values)
+    if not seen.any():
+        return [Note("empty", f"{name} has no sample", {"signal": name})]
+    found = _missing(name, seen)
+    present = values[seen]
+    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION:
+        message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
+        return [*found, *_size(name, present, stated), Note("constant", message, {"signal": name, "value": float(present[0])})]
+    found += _size(name, present, stated)
+    if name in MEASURED and present.size > 20:
+        found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
+    return found
+
+
+def _missing(name: str, seen: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[Note]:
+    share = 1.0 - float(seen.mean())
+    if share <= MISSING_LIMIT:
+        return []
+    message = f"{name}: {100 * share:.0f} % of the samples are missing (limit {100 * MISSING_LIMIT:.0f} %)"
+    return [Note("missing", message, {"signal": name, "value": share, "limit": MISSING_LIMIT})]
+
+
+def _size(name: str, values: FloatArray, stated: Stated) -> list[Note]:
+    if name not in LARGEST:
+        return []
+    limit, unit = LARGEST[name]
+    largest = float(np.percentile(np.abs(values), 99))
+    found = []
+    if largest > limit:
+        advice = stated.probable(name, unit, largest, limit)
+        message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
+        data = {"signal": name, "value": largest, "limit": limit}
+        found.append(Note("unit", message, data | ({"unit": unit} if f"`unit: {unit}`" in advice else {})))
+    middle = float(np.median(values))
+    if name == "surge_m_s" and middle < -0.1:
+        message = f"surge_m_s is negative, {middle:.3g} m/s in the middle: {stated.flip(name)}, or set the frame"
+        found.append(Note("speed_sign", message, {"signal": name, "value": middle, "limit": -0.1}))
+    return found
+
+
+def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
+    """A sensor that repeats one value for long, among values that otherwise change."""
+    same = np.diff(values) == 0.0
+    if same.mean() > COARSE_LIMIT:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2]
+    if not starts.size:
+        return []
+    lengths = time[ends] - time[starts]
+    k = int(np.argmax(lengths))
+    step = float(np.median(np.diff(time)))
+    limit = max(FROZEN_S, 5 * step)
+    if lengths[k] <= limit:
+        return []
+    message = (
+        f"{name} is frozen at {values[starts[k]]:.6g} from {time[starts[k]]:.2f} to {time[ends[k]]:.2f} s "
+        f"(limit {limit:.3g} s); leave it out with `--from` and `--to`"
+    )
+    return [Note("frozen", message, {"signal": name, "value": float(lengths[k]), "limit": limit})]
+
+
+def _coarse(name: str, values: FloatArray) -> list[Note]:
+    steps = np.abs(np.diff(values))
+    share = float(np.mean(steps == 0.0))
+    moved = steps[steps > 0.0]
+    levels = float(np.ptp(values)) / float(moved.min()) if moved.size else 0.0
+    if share <= COARSE_LIMIT or levels > 1000:
+        return []
+    message = (
+        f"{name} comes in steps of {moved.min():.3g} {SIGNALS[name]} and {100 * share:.0f} % of the samples repeat the last "
+        f"one (limit {100 * COARSE_LIMIT:.0f} %); log it with more digits or at its own rate"
+    )
+    return [Note("coarse", message, {"signal": name, "value": share, "limit": COARSE_LIMIT, "step": float(moved.min())})]
+
+
+def _spikes(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
+    found = spikes_of(values)
+    if not found.places.size:
+        return []
+    worst = int(np.argmax(found.off))
+    largest, limit, at = float(found.off[worst]), found.limit, float(time[found.places[worst]])
+    count = int(found.places.size)
+    left_out = f"; no fit uses {'it' if count == 1 else 'them'}" if name in FITTED else ""
+    message = (
+        f"{name} has {count} spike{'' if count == 1 else 's'}, the largest of {largest:.3g} {SIGNALS[name]} at {at:.2f} s "
+        f"(limit {limit:.3g}){left_out}; check the sensor"
+    )
+    data = {"signal": name, "value": largest, "limit": limit, "count": count}
+    return [Note("spikes", message, data)]

@@ -1,0 +1,52 @@
+"""What a mapping has said of a log already: the doctor advises nothing that is done, and takes back what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from fieldsid.logs.channels import ChannelMap
+from fieldsid.logs.convert.units import factor_to
+from fieldsid.logs.reader import RawLog
+from fieldsid.logs.run import SIGNALS
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """Units by signal, the signals whose sign is turned, and those that are asked to take the stamps of their receipt."""
+
+    units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    turned: frozenset[str] = frozenset()
+    received: frozenset[str] = frozenset()
+
+    def is_si(self, signal: str) -> bool:
+        """Whether a signal's numbers were taken as they are: no unit was stated, or its own."""
+        return self.units.get(signal) in (None, SIGNALS[signal])
+
+    def probable(self, signal: str, unit: str, largest: float, limit: float) -> str:
+        """Return what to do about a signal that is larger than can be meant, and may be in a unit."""
+        if not self.is_si(signal):
+            return f"taken as `{self.units[signal]}` already: check which one it is"
+        if largest * factor_to(signal, unit) <= limit:
+            return f"set its unit, probably `unit: {unit}`"
+        return "check its unit, and which one it is"
+
+    def flip(self, *signals: str) -> str:
+        """Return how the sign of one of some signals is turned."""
+        turned = next((s for s in signals if s in self.turned), None)
+        return f"take `sign: -1` away from {turned}" if turned else f"set `sign: -1` at {' or '.join(signals)}"
+
+    def stamps(self, *signals: str) -> str:
+        """Return the advice to take the stamps of measuring, where those of receipt were asked for; nothing elsewhere."""
+        return "; use `stamp: header` where the log has them" if any(s in self.received for s in signals) else ""
+
+
+def stated_by(mapping: ChannelMap, raw: RawLog) -> Stated:
+    """Return what a mapping, and the log itself, state of the signals of a log."""
+    units = {s: v.unit for s, v in raw.series.items() if v.unit} | {s: c.unit for s, c in mapping.sources.items() if c.unit}
+    return Stated(
+        MappingProxyType({s: u for s, u in units.items() if s in SIGNALS}),
+        frozenset(s for s, c in mapping.sources.items() if c.sign < 0),
+        frozenset(s for s, c in mapping.sources.items() if (c.stamp or mapping.stamp) == "receive"),
+    )

@@ -1,0 +1,261 @@
+"""mapping.yaml: which column or topic of a log is which signal; validated, unknown keys refused with the near match."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from fieldsid.errors import FieldsidError, MappingError
+from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
+from fieldsid.logs.convert.clock_text import FORMS
+from fieldsid.logs.convert.frames import Body, Frame, World
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS
+from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
+from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.run import SIGNALS
+from fieldsid.registry import near
+from fieldsid.strict import StrictModel, read_model, validated
+
+SCHEMA = "fieldsid/mapping/1"
+Column = Annotated[int, Field(ge=0)] | str
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Source(StrictModel):
+    column: Column | None = None
+    columns: list[Column] | None = None
+    order: Literal["xyzw", "wxyz"] = "xyzw"
+    topic: str | None = None
+    field: str = ""
+    unit: str | None = None
+    sign: Literal[1, -1] = 1
+    offset: Finite = 0.0
+    frame: str | None = None
+    stamp: Literal["header", "receive"] | None = None
+    centre: Finite | None = None
+    scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+
+
+class _Time(StrictModel):
+    column: Column
+    unit: str | None = None
+    date: Column | None = None
+    week: Column | None = None
+
+
+class _Pressure(StrictModel):
+    density: Annotated[float, Field(gt=0.0)] = 1025.0
+    surface_pa: Annotated[float, Field(ge=0.0)] = 101325.0
+
+
+class _Table(StrictModel):
+    separator: str | None = None
+    header: bool | None = None
+    skip: Annotated[int, Field(ge=0)] | None = None
+    encoding: str | None = None
+    decimal: Literal[".", ","] | None = None
+
+
+class _File(StrictModel):
+    schema_: Literal["fieldsid/mapping/1"] = Field(default="fieldsid/mapping/1", alias="schema")
+    frame: str | None = None
+    stamp: Literal["header", "receive"] | None = None
+    clock: str | None = None
+    gap_factor: Annotated[float, Field(ge=1.0, le=1000.0)] = 2.5
+    time: _Time | None = None
+    pressure: _Pressure = _Pressure()
+    table: _Table = _Table()
+    signals: dict[str, _Source | str | int]
+
+
+def load_mapping(path: Path) -> ChannelMap:
+    """Read a mapping.yaml.
+
+    Raises ArtifactError when it is no YAML, MappingError for an unknown key or signal (with the near match), a wrong
+    type, a unit that does not fit, or a source that names neither a column nor a topic.
+    """
+    return _channel_map(read_model(_File, path, error=MappingError), f"`{path}`", path)
+
+
+def mapping_of(body: Mapping[str, Any], *, place: str = "the mapping") -> ChannelMap:
+    """Return a mapping given as the keys of mapping.yaml; raises MappingError."""
+    return _channel_map(validated(_File, body, place=place, error=MappingError), place, None)
+
+
+def frame_of(text: str | None, place: str) -> Frame | None:
+    """Return the frames a text names: `ENU/FLU`, `NED`, `FLU`; raises MappingError."""
+    if text is None:
+        return None
+    world: World = "NED"
+    body: Body = "FRD"
+    for part in text.upper().replace("-", "/").replace(",", "/").split("/"):
+        match part.strip():
+            case "NED" | "ENU" as named_world:
+                world = named_world
+            case "FRD" | "FLU" as named_body:
+                body = named_body
+            case _:
+                raise MappingError(
+                    f"{place}: there is no frame {part!r}",
+                    found=repr(text),
+                    hint="write the world's and the body's: `NED/FRD` or `ENU/FLU`",
+                )
+    return Frame(world, body)
+
+
+def channel_of(text: str) -> tuple[str, Source]:
+    """Return the signal and source of `signal=column:unit`, or `signal=/topic.field:unit`; raises MappingError.
+
+    A column of digits is an index, counted from 0. `time` names the time column.
+    """
+    signal, equals, rest = text.partition("=")
+    signal = TIME if signal.strip() == "time" else signal.strip()
+    if not equals or not rest:
+        raise MappingError(f"`--channel {text}` is no channel", found=repr(text), hint="write `--channel yaw_rad=heading:deg`")
+    known = (TIME, *COMBINED, *SIGNALS)
+    if signal not in known:
+        raise MappingError(f"`--channel` names an unknown signal `{signal}`", found=repr(text), hint=near(signal, known))
+    form = next((f for f in FORMS if signal == TIME and rest.endswith(f":{f}")), "")
+    where, colon, unit = (rest.removesuffix(f":{form}"), ":", form) if form else rest.rpartition(":")
+    if not colon:
+        where, unit = rest, ""
+    if unit and signal != TIME:
+        _check_unit(signal, unit, "`--channel`")
+    if where.startswith("/"):
+        topic, _, path = where.partition(".")
+        return signal, Source(topic=topic, path=path, unit=unit or None)
+    return signal, Source(column=int(where) if where.isdigit() else where, unit=unit or None)
+
+
+def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
+    frame = frame_of(file.frame, place)
+    sources = {signal: _source(signal, item, place) for signal, item in file.signals.items()}
+    if not sources:
+        raise MappingError(f"{place} maps no signal", found="an empty `signals`", hint=_write_hint(origin))
+    if file.clock is not None and file.clock not in sources:
+        raise MappingError(
+            f"{place}: `clock` names a signal that is not mapped", found=file.clock, hint=near(file.clock, list(sources))
+        )
+    return ChannelMap(
+        sources,
+        time=_time(file.time, place) if file.time else None,
+        frame=frame or Frame(),
+        stamp=file.stamp,
+        clock=file.clock,
+        gap_factor=file.gap_factor,
+        pressure=Pressure(file.pressure.density, file.pressure.surface_pa),
+        table=TableForm(**file.table.model_dump()),
+        origin=origin,
+    )
+
+
+def _time(time: _Time, place: str) -> Source:
+    """The unit of a time is one of time, or says how a clock is written."""
+    if time.unit is not None and time.unit not in FORMS:
+        found = find_unit(time.unit)
+        if found is None or found.dimension != "time":
+            known = [u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS)
+            raise MappingError(
+                f"{place}: time cannot be in {time.unit!r}", found=time.unit, hint=f"use one of: {', '.join(known)}"
+            )
+    return Source(column=time.column, unit=time.unit, date=time.date, week=time.week)
+
+
+def _write_hint(origin: Path | None) -> str:
+    return f"let a first one be written: `sysid inspect LOG --write-mapping {origin or 'mapping.yaml'} --force`"
+
+
+def _source(signal: str, item: _Source | str | int, place: str) -> Source:
+    known = (*COMBINED, *SIGNALS)
+    if signal not in known:
+        raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
+    if not isinstance(item, _Source):
+        return Source(column=item)
+    _check_place(signal, item, place)
+    if item.unit is not None:
+        _check_unit(signal, item.unit, place)
+    if (signal in COMBINED or item.columns) and (item.sign != 1 or item.unit):
+        raise MappingError(
+            f"{place}: a {'position' if signal == POSITION else 'quaternion'} has no sign and no unit",
+            found=f"at `{signal}`",
+            hint="set `frame` instead",
+        )
+    return Source(
+        column=item.column,
+        columns=tuple(item.columns or ()),
+        order=item.order,
+        topic=item.topic,
+        path=item.field,
+        unit=item.unit,
+        sign=item.sign,
+        offset=item.offset,
+        frame=frame_of(item.frame, f"{place}, `{signal}`"),
+        stamp=item.stamp,
+        centre=item.centre,
+        scale=item.scale,
+    )
+
+
+def _check_place(signal: str, item: _Source, place: str) -> None:
+    """Exactly one of column, columns, topic says where a signal is."""
+    named = [n for n, v in (("column", item.column), ("columns", item.columns or None), ("topic", item.topic)) if v is not None]
+    if len(named) != 1:
+        raise MappingError(
+            f"{place}: `{signal}` needs one of `column`, `columns`, `topic`",
+            found=" and ".join(named) or "none of them",
+            hint="write `column: NAME`, or `topic: NAME` where the log is a bag",
+        )
+    if item.field and item.topic is None:
+        raise MappingError(
+            f"{place}: `{signal}` has a `field` without a `topic`", found=f"field: {item.field}", hint="name the `topic` too"
+        )
+    _check_columns(signal, item, place)
+    _check_counts(signal, item, place)
+
+
+def _check_columns(signal: str, item: _Source, place: str) -> None:
+    if signal == POSITION:
+        if item.topic is None and len(item.columns or ()) != 2:
+            raise MappingError(
+                f"{place}: `{POSITION}` needs two columns",
+                found=str(item.columns or item.column),
+                hint="write `columns: [LAT, LON]`",
+            )
+    elif item.columns and (len(item.columns) != 4 or signal not in (ATTITUDE, *ANGLES)):
+        raise MappingError(
+            f"{place}: `columns` is for the four numbers of a quaternion",
+            found=f"{len(item.columns)} columns at `{signal}`",
+            hint="use `column`",
+        )
+
+
+def _check_counts(signal: str, item: _Source, place: str) -> None:
+    """A centre and a scale are those of counts, and counts those of a servo or a motor."""
+    extra = [n for n, v in (("centre", item.centre), ("scale", item.scale)) if v is not None]
+    if extra and item.unit != COUNTS:
+        hint = f"write `unit: {COUNTS}` beside it"
+        raise MappingError(f"{place}: `{signal}` has a `{extra[0]}` without counts", found=f"unit: {item.unit}", hint=hint)
+    if item.unit == COUNTS and signal not in COUNTED:
+        raise MappingError(
+            f"{place}: `{signal}` cannot be in {COUNTS!r}", found=f"{COUNTS} are those of a servo or a motor", hint="set its unit"
+        )
+
+
+def _check_unit(signal: str, unit: str, place: str) -> None:
+    """The unit is one, and of the signal's dimension; a depth may be a pressure."""
+    dimension = dimension_of(signal) if signal not in COMBINED else None
+    if dimension is None or unit == COUNTS:
+        return
+    try:
+        picked = pick_unit(unit)
+    except FieldsidError as error:
+        raise MappingError(f"{place}: `{signal}`: {error.what}", found=error.found, hint=error.hint) from error
+    if picked.dimension != dimension and not (signal == "depth_m" and picked.dimension == "pressure"):
+        raise MappingError(
+            f"{place}: `{signal}` cannot be in {unit!r}",
+            found=f"a unit of {picked.dimension}",
+            hint=f"use a unit of {dimension}, such as `{SIGNALS[signal]}`",
+        )

@@ -1,0 +1,233 @@
+"""A first mapping for a log nobody has mapped yet, from names, message types and what the numbers say, tried on the log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import FieldsidError, LogError
+from fieldsid.logs.channels import ATTITUDE, POSITION, ChannelMap
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
+from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic
+from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
+from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
+from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.numerics.arrays import FloatArray
+
+REP103 = "ENU/FLU"
+_DEGREES = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s": 4.0, "pitch_rate_rad_s": 4.0,
+            "roll_rate_rad_s": 8.0,
+            "rudder_rad": 1.6, "elevator_rad": 1.6, "rudder_measured_rad": 1.6, "elevator_measured_rad": 1.6}  # fmt: skip
+"""Angles and rates larger than this are taken for degrees."""
+TRIES = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A mapping's body, the Run it gives, or why it gives none, and what speaks for it or for others."""
+
+    body: dict[str, Any]
+    run: Run | None = None
+    problem: FieldsidError | None = None
+    notes: tuple[Note, ...] = ()
+
+
+def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Proposal:
+    """Return a mapping that `load_mapping` takes as soon as it names a signal, tried on the log itself.
+
+    A signal that the log does not give after all is left out, and the reason said: a mapping that is proposed can be imported.
+    """
+    body, notes = _body(inventory)
+    for _ in range(TRIES):
+        if not body["signals"]:
+            break
+        try:
+            done = _tried(inventory, reader, options, body)
+        except FieldsidError as error:
+            signal = _at_fault(error, body)
+            if signal is None:
+                return Proposal(body, problem=error, notes=tuple(notes))
+            left = body["signals"].pop(signal)
+            notes.append(Note("left_out", f"{signal} is not proposed from {_label(left)}: {error.what}", {"signal": signal}))
+        else:
+            return replace(done, notes=tuple(notes))
+    return Proposal(body, notes=tuple(notes))
+
+
+def _at_fault(error: FieldsidError, body: dict[str, Any]) -> str | None:
+    """Return the signal whose cells an error is about, None where it is about all of them."""
+    if not isinstance(error, LogError) or len(body["signals"]) < 2:
+        return None
+    return next((s for s in body["signals"] if f"for `{s}`" in error.what), None)
+
+
+def _label(item: dict[str, Any]) -> str:
+    return f"topic `{item['topic']}`" if "topic" in item else f"column `{item.get('column', item.get('columns'))}`"
+
+
+def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
+    if inventory.by_topic:
+        return _of_topics(inventory)
+    guesses: list[Guess] = []
+    names = [c.name for c in inventory.channels]
+    for i, channel in enumerate(inventory.channels):
+        # A name that several columns have, or none, says nothing of which one is meant.
+        is_named = inventory.table is None or inventory.table.header
+        guesses += of_column(channel, channel.name if names.count(channel.name) == 1 and is_named else i) if is_named else ()
+    best, notes = _best(guesses)
+    _plane_pose(best)
+    body: dict[str, Any] = {"schema": "fieldsid/mapping/1"}
+    samples = inventory.samples
+    source = None if samples is None else samples.source
+    if source is not None:
+        keys = {"column": _place(inventory, source.column), "unit": source.unit, "date": source.date, "week": source.week}
+        body["time"] = {k: v for k, v in keys.items() if v is not None}
+    elif inventory.table is not None and not inventory.table.header:
+        body["time"] = {"column": 0, "unit": "s"}
+    position = [best.pop(s, None) for s in (LATITUDE, LONGITUDE)]
+    signals = {signal: guess.item for signal, guess in best.items()}
+    if all(position) and not {"x_m", "y_m"} & signals.keys():
+        signals[POSITION] = {"columns": [g.item["column"] for g in position if g is not None]}
+    if samples is not None:
+        notes += _by_numbers(samples, signals, inventory)
+        _as_counts(samples, signals)
+    body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
+    return body, notes
+
+
+def _place(inventory: Inventory, column: str | int | None) -> str | int | None:
+    """Return a column as a mapping names it: without a header by its place."""
+    return int(column) if isinstance(column, str) and inventory.table and not inventory.table.header else column
+
+
+def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
+    best, notes = _best(g for c in inventory.channels for g in of_topic(c))
+    if ATTITUDE in best:
+        for angle in ("yaw_rad", "pitch_rad", "roll_rad"):
+            best.pop(angle, None)
+    named = " ".join(c.name + c.kind for c in inventory.channels).lower()
+    frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
+    signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
+    return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes
+
+
+def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
+    """Return the surest guess for each signal, and a note where others are as near."""
+    by_signal: dict[str, list[Guess]] = {}
+    for guess in guesses:
+        by_signal.setdefault(guess.signal, []).append(guess)
+    best, notes = {}, []
+    for signal, several in by_signal.items():
+        ordered = sorted(several, key=lambda g: (-g.sure, -g.count))
+        best[signal] = ordered[0]
+        others = [_label(g.item) for g in ordered[1:4] if g.sure > 0.5 * ordered[0].sure]
+        if others and signal in SIGNALS:
+            message = f"{signal} is taken from {_label(ordered[0].item)}; it may also be {', '.join(others)}"
+            notes.append(Note("alternatives", message, {"signal": signal, "others": others}))
+    return best, notes
+
+
+def _plane_pose(best: dict[str, Guess]) -> None:
+    """In a pose of x, y and theta the one angle is the heading."""
+    pitch = best.get("pitch_rad")
+    if pitch is None or "yaw_rad" in best or not {"x_m", "y_m"} <= best.keys():
+        return
+    if "theta" in words_of(str(pitch.item["column"])):
+        best["yaw_rad"] = replace(best.pop("pitch_rad"), signal="yaw_rad")
+
+
+def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory) -> list[Note]:
+    """Add what the numbers of columns without a known name say, and return the reasons."""
+    columns = samples.columns
+    known = {s: i["column"] for s, i in signals.items() if "column" in i}
+    known = {s: c if c in columns else str(c) for s, c in known.items()}
+    used = {*known.values(), samples.source.column, *(c for i in signals.values() for c in i.get("columns", ()))}
+    named = inventory.table is None or inventory.table.header
+    free = [c for c in columns if c not in used and not (named and _is_named(c))]
+    if all(known.get(s) in columns for s in ("yaw_rad", "x_m", "y_m")):
+        unit = unit_of_heading(samples, known["yaw_rad"], (known["x_m"], known["y_m"]))
+        if unit is not None:
+            signals["yaw_rad"].setdefault("unit", unit)
+    notes = []
+    for found in recognised(samples, {s: c for s, c in known.items() if c in columns}, free):
+        place = found.column if named else int(found.column)
+        signals[found.signal] = {"column": place, **found.item}
+        data = {"signal": found.signal, "column": place}
+        notes.append(Note("evidence", f"{found.signal} is column {found.column}: {found.why}", data))
+    return notes
+
+
+def _is_named(column: str | int) -> bool:
+    from fieldsid.logs.mapping.word_meaning import meaning_of
+
+    return isinstance(column, str) and meaning_of(column) is not None
+
+
+def _as_counts(samples: Samples, signals: dict[str, Any]) -> None:
+    """Write the centre of fins and motors that are logged in a servo's counts."""
+    taken = [samples.columns.get(signals[s].get("column", "")) for s in FINS if s in signals and "unit" not in signals[s]]
+    servos = [servo for values in taken if values is not None and (servo := servo_of(values)) is not None]
+    for signal in COUNTED:
+        item = signals.get(signal, {})
+        values = samples.columns.get(item.get("column", ""))
+        servo = None if values is None or "unit" in item else servo_of(values) or _as_others(values, servos)
+        if servo is not None:
+            item["unit"], item["centre"] = COUNTS, servo.centre
+
+
+def _as_others(values: FloatArray, servos: list[Servo]) -> Servo | None:
+    """Return the kind of counts of the other fins where numbers (n,) fit it: one that never moves far tells none itself."""
+    seen = values[np.isfinite(values)]
+    whole = bool(seen.size) and bool((seen == np.round(seen)).all())
+    return next((s for s in servos if whole and s.least <= seen.min() and seen.max() <= s.largest), None)
+
+
+def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dict[str, Any]) -> Proposal:
+    """Read the log with the proposal, and set degrees where the numbers say so."""
+    from fieldsid.logs.convert.assemble import assemble
+    from fieldsid.logs.doctor.examine import examine
+    from fieldsid.logs.doctor.stated import stated_by
+    from fieldsid.logs.mapping.mapping_file import mapping_of
+
+    lenient = ReadOptions(options.msg_path, salvage=True)
+    raw = reader.read(inventory.path, mapping_of(body), lenient)
+    for signal, series in raw.series.items():
+        item = body["signals"].get(signal, {})
+        if _is_in_degrees(signal, series, item):
+            item["unit"] = "deg/s" if signal.endswith("_s") else "deg"
+    _as_the_heading(raw, body["signals"])
+    for _ in range(2):
+        mapping: ChannelMap = mapping_of(body)
+        run = assemble(raw, mapping, inventory.path, lenient, max_gap_s=float("inf"))
+        notes = examine(run, stated=stated_by(mapping, raw))
+        if not _mended(body, raw, notes):
+            break
+    return Proposal(body, Run(run.name, run.time, run.signals, inventory.path, (*run.notes, *notes)))
+
+
+def _as_the_heading(raw: RawLog, signals: dict[str, Any]) -> None:
+    """Take pitch and roll without a unit for degrees where the heading is in them: one logger wrote the three."""
+    if "deg" not in {signals.get("yaw_rad", {}).get("unit"), raw.series["yaw_rad"].unit if "yaw_rad" in raw.series else None}:
+        return
+    for angle in ("pitch_rad", "roll_rad"):
+        if angle in signals and raw.series[angle].unit is None and "field" not in signals[angle]:
+            signals[angle].setdefault("unit", "deg")
+
+
+def _is_in_degrees(signal: str, series: Series, item: dict[str, Any]) -> bool:
+    if signal not in _DEGREES or series.values.ndim != 1 or "unit" in item or series.unit is not None:
+        return False
+    return float(np.max(np.abs(series.values[np.isfinite(series.values)]), initial=0.0)) > _DEGREES[signal]
+
+
+def _mended(body: dict[str, Any], raw: RawLog, notes: Iterable[Note]) -> bool:
+    """Set what findings say of units that nobody stated; return whether there was one."""
+    likely = {n.data["signal"]: n.data["unit"] for n in notes if n.code == "unit" and "unit" in n.data}
+    wrong = [s for s in likely if "unit" not in body["signals"].get(s, {"unit": 0})]
+    for signal in wrong:
+        body["signals"][signal]["unit"] = likely[signal]
+    return bool(wrong)

@@ -1,0 +1,95 @@
+"""A pandas table becomes a Run, by the same names, units and findings as a file with these columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.errors import FieldsidError, LogError, MappingError
+from fieldsid.logs.channels import ChannelMap, Source
+from fieldsid.logs.convert.assemble import assemble
+from fieldsid.logs.convert.conditioning import MAX_GAP_S
+from fieldsid.logs.load import chosen_map
+from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.reader import ReadOptions
+from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
+from fieldsid.logs.run import Run
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+    from pandas import DataFrame, Series
+
+NAME = "table"
+_HINT = (
+    'name the columns `time_s`, `yaw_rad`, `rudder_rad` and so on, or map them: `channel=["yaw_rad=heading:deg"]`; '
+    "`salvage=True` leaves damaged cells and rows out"
+)
+
+
+def run_of_frame(
+    frame: DataFrame,
+    name: str = "",
+    mapping: ChannelMap | Path | None = None,
+    *,
+    channels: Mapping[str, Source] | None = None,
+    salvage: bool = False,
+    max_gap_s: float = MAX_GAP_S,
+    fin_max_rad: Mapping[str, float] | None = None,
+) -> Run:
+    """Return the Run of a table with one row per sample; arguments as those of `load_run`.
+
+    The time is a column or the index: numbers, date and time, or a time difference. name: that of the run, without one what
+    `Run.to_frame` called it, else "table". Raises MappingError and LogError.
+    """
+    called = name or str(frame.attrs.get("name", "")) or NAME
+    table, place = _with_time(frame), Path(called)
+    names = tuple(map(str, table.columns))
+    try:
+        chosen = _map(called, names, mapping, channels or {})
+        columns = Columns(place, names, len(names), lambda i: _cells(table.iloc[:, i]))
+        options = ReadOptions(None, salvage)
+        raw = series_of(place, columns, chosen, (), options)
+        run = assemble(raw, chosen, place, options, max_gap_s=max_gap_s)
+    except (LogError, MappingError) as error:
+        raise _of_table(error) from error
+    from fieldsid.logs.doctor.examine import examine
+    from fieldsid.logs.doctor.stated import stated_by
+
+    return Run(called, run.time, run.signals, None, (*run.notes, *examine(run, fin_max_rad or {}, stated_by(chosen, raw))))
+
+
+def _map(called: str, names: tuple[str, ...], mapping: ChannelMap | Path | None, channels: Mapping[str, Source]) -> ChannelMap:
+    chosen = chosen_map(mapping, own_map_of(names), channels)
+    if chosen is None:
+        raise MappingError(
+            f"`{called}` has no time and signal that are known by their names", found=", ".join(names) or "no columns"
+        )
+    return chosen
+
+
+def _of_table(error: FieldsidError) -> FieldsidError:
+    """Return an error with a hint for who holds a table: the readers' own name commands that take files."""
+    return type(error)(error.what, found=error.found, hint=_HINT)
+
+
+def _with_time(frame: DataFrame) -> DataFrame:
+    """Return a table whose index, where it has a name or counts time, is a column of it."""
+    if frame.index.name is None and frame.index.dtype.kind not in "Mm":
+        return frame
+    name = TIME if frame.index.name is None else str(frame.index.name)
+    return frame.rename_axis(name).reset_index() if name not in frame.columns else frame
+
+
+def _cells(column: Series[Any]) -> npt.NDArray[Any]:
+    """Return the cells (n,) of a column as a file's would be: numbers, stamps in UTC, or words."""
+    if column.dtype.kind == "m":
+        seconds: npt.NDArray[np.float64] = column.dt.total_seconds().to_numpy()
+        return seconds
+    if column.dtype.kind == "M":
+        stamps = column if column.dt.tz is None else column.dt.tz_convert(None)
+        return stamps.to_numpy()
+    if column.dtype.kind in "iufb" and column.hasnans:
+        return column.to_numpy(dtype="float64", na_value=float("nan"))
+    return column.to_numpy()

@@ -1,0 +1,185 @@
+"""Definitions of message types: from the bag, from a folder of .msg files, those that ROS 2 ships, or from beside the bag."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+
+from fieldsid.errors import LogError
+from fieldsid.logs.readers.bags.messages.by_rosbags import ObjectDecoder
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder, types_in
+from fieldsid.logs.readers.bags.packets import CDR, Connection, UnknownFormError
+from fieldsid.logs.run import Note
+
+AnyDecoder = Decoder | ObjectDecoder
+Fields = dict[str, list[tuple[str, Any]]]
+_IDL_RULE = "=" * 80 + "\n"
+DEEPEST = 4
+"""Folders below the bag's that .msg files are looked for in, as in `workspace/src/package/msg`."""
+MOST_FOLDERS = 2000
+"""Folders beside a bag that are looked into: a bag in a home folder must not start a search of it all."""
+
+
+class AmbiguousDefinitionError(LogError):
+    """Several definitions of one type beside a bag, of which none is the more likely one."""
+
+
+@dataclass(frozen=True, slots=True)
+class DefinitionSearch:
+    """Where definitions may stand that a bag lacks: beside the log, and in the folder that was asked for."""
+
+    log: Path
+    msg_path: Path | None = None
+
+    def roots(self) -> list[Path]:
+        """Return the folders beside the bag, nearest first."""
+        folder = (self.log if self.log.is_dir() else self.log.parent).resolve()
+        return [folder, folder.parent]
+
+
+def decoder_of(connection: Connection, payload: bytes, search: DefinitionSearch) -> tuple[AnyDecoder, Note | None]:
+    """Return the decoder whose definitions fit a message of the connection, and a note where they are not the bag's.
+
+    The bag's own definitions count most, then the folder's that was asked for, then those of ROS 2 (Humble), then files
+    beside the bag. What cannot be laid out is left to rosbags. Raises LogError when none fits, none can be parsed, two
+    files beside the bag differ, or the folder holds none.
+    """
+    first: LogError | None = None
+    for origin, fields in _sources(connection, search):
+        try:
+            decoder = _fitting(fields(), connection, payload)
+        except AmbiguousDefinitionError:
+            raise
+        except LogError as error:
+            first = first or error
+            continue
+        return decoder, None if first is None else _replaced(connection, first, origin)
+    first = first or LogError(f"no definition of `{connection.type_name}`")
+    file = f"{connection.type_name.rpartition('/')[2]}.msg"
+    raise LogError(
+        first.what, found=first.found, hint=f"give the folder of `{file}`: `sysid inspect {search.log} --msg-path DIR`"
+    )
+
+
+def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple[str, Any]]:
+    """Yield the definitions to try, as functions, with words for where they are from."""
+    folder = _of_folder(search.msg_path, connection)
+
+    def own() -> Fields:
+        return _parsed(connection.definition, connection.type_name, connection.language) if connection.definition else {}
+
+    yield "the bag", lambda: {**_shipped(), **folder, **own()}
+    if folder:
+        yield f"`--msg-path {search.msg_path}`", lambda: {**_shipped(), **folder}
+    yield "ROS 2", _shipped
+    for root in search.roots():
+        file = _file_of(connection.type_name, _msg_files(root))
+        if file is not None:
+            yield f"`{file}`", lambda r=root: {**_shipped(), **_beside(r, connection, search)}
+
+
+def _fitting(known: Fields, connection: Connection, payload: bytes) -> AnyDecoder:
+    """Return the decoder that can read a message by these definitions; raises the reason of the first that cannot."""
+    is_cdr = connection.serialization == CDR
+    decoder = Decoder(known, connection.type_name, cdr=is_cdr)
+    try:
+        decoder.layout(payload)
+    except UnknownFormError as unknown:
+        slower = ObjectDecoder(known, connection.type_name, cdr=is_cdr)
+        try:
+            slower.layout(payload)
+        except LogError as error:
+            raise LogError(unknown.what, found=f"{unknown.found}; rosbags: {error.found}", hint=unknown.hint) from error
+        return slower
+    return decoder
+
+
+def _replaced(connection: Connection, error: LogError, origin: str) -> Note:
+    message = f"{connection.topic}: {error.what}; the one of {origin} fits and is used"
+    return Note("definition", message, {"topic": connection.topic, "found": error.found, "origin": origin})
+
+
+@cache
+def _shipped() -> Fields:
+    return {name: list(fields) for name, (_, fields) in get_typestore(Stores.ROS2_HUMBLE).fielddefs.items()}
+
+
+def _of_folder(folder: Path | None, connection: Connection) -> Fields:
+    if folder is None:
+        return {}
+    files = sorted(folder.rglob("*.msg")) if folder.is_dir() else []
+    if not files:
+        raise LogError(
+            f"`--msg-path {folder}` holds no .msg files", found="none below it", hint="give the folder above `pkg/msg/*.msg`"
+        )
+    return _of_files(files, connection)
+
+
+def _of_files(files: Sequence[Path], connection: Connection) -> Fields:
+    """Return the definitions of the connection's type and of what it is made of, as far as there are files for them."""
+    found: Fields = {}
+    ahead = [connection.type_name]
+    while ahead:
+        name = ahead.pop()
+        file = None if name in found else _file_of(name, files)
+        if file is not None:
+            found.update(_parsed(file.read_text(encoding="utf-8", errors="replace"), name, "msg"))
+            ahead += types_in(found[name])
+    return found
+
+
+def _file_of(name: str, files: Sequence[Path]) -> Path | None:
+    """Return the file of a type: that of its package, else one of its short name."""
+    package, _, short = name.partition("/msg/")
+    named = [f for f in files if f.stem == short]
+    return next((f for f in named if package in (f.parent.name, f.parent.parent.name)), named[0] if named else None)
+
+
+@cache
+def _msg_files(root: Path) -> tuple[Path, ...]:
+    """Return the .msg files in a folder and the folders below it, as far as they are looked into."""
+    found: list[Path] = []
+    for count, (folder, folders, names) in enumerate(os.walk(root)):
+        if count >= MOST_FOLDERS:
+            break
+        below = len(Path(folder).relative_to(root).parts)
+        folders[:] = sorted(f for f in folders if not f.startswith(".")) if below < DEEPEST else []
+        found += [Path(folder) / name for name in sorted(names) if name.endswith(".msg")]
+    return tuple(found)
+
+
+def _beside(root: Path, connection: Connection, search: DefinitionSearch) -> Fields:
+    """Return the definitions of files below a folder; raises AmbiguousDefinitionError where two of the type itself differ."""
+    files = _msg_files(root)
+    own = [f for f in files if f.stem == connection.type_name.rpartition("/")[2]]
+    if len({f.read_text(encoding="utf-8", errors="replace") for f in own}) > 1:
+        raise AmbiguousDefinitionError(
+            f"`{connection.type_name}` has {len(own)} definitions beside the bag that differ",
+            found=", ".join(map(str, own)),
+            hint=f"choose one: `sysid inspect {search.log} --msg-path {own[0].parent}`",
+        )
+    return _of_files(files, connection)
+
+
+def _parsed(text: str, name: str, language: str) -> Fields:
+    try:
+        if language == "idl":
+            types: dict[str, Any] = {}
+            for part in text.split(_IDL_RULE):
+                types.update(
+                    get_types_from_idl(part.partition("\n")[2] if part.startswith("IDL: ") else part) if part.strip() else {}
+                )
+        else:
+            types = dict(get_types_from_msg(text, name))
+    except TypesysError as error:
+        first = str(error).splitlines()[0][:120]
+        raise LogError(
+            f"the definition of `{name}` cannot be parsed", found=first, hint="give a clean one: `--msg-path DIR`"
+        ) from error
+    return {key: list(fields) for key, (_, fields) in types.items()}

@@ -1,0 +1,325 @@
+"""Where the fields of a serialized message lie, and many messages decoded at once.
+
+Over rosbags: chosen numbers 10 times as fast (tests/benchmarks/bag_reading.py), and a damaged message among others is left out.
+Types and encodings that are not known here are left to rosbags, see `by_rosbags.ObjectDecoder`.
+
+A message is walked once; whatever in it decides the layout (lengths of strings and sequences) is kept as a guard.
+All messages with the same size and the same guards share the layout, so their fields are columns of one block.
+Encodings: ROS 1 (packed, little endian) and CDR (OMG CORBA 3.0, 15.3: a number of k bytes stands at a multiple of k).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import LogError, MappingError
+from fieldsid.logs.readers.bags.packets import UnknownFormError
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.registry import near
+
+BASE, NAME, ARRAY = 1, 2, 3
+"""Kinds of a field in a definition; 4 is a sequence."""
+
+DTYPES = {
+    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
+    "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+PADDING = "structure_needs_at_least_one_member"
+"""The name of the member that an empty structure is given."""
+QUATERNION = ("x", "y", "z", "w")
+ROWS_APART = 32
+"""Layouts tried on whole blocks before messages are taken one by one."""
+
+Columns = tuple[list[npt.NDArray[Any]], npt.NDArray[np.bool_]]
+"""For each path the numbers of all messages (n, 1) or (n, 4), NaN where one lacks the element, and (n,) which were decoded."""
+
+Definitions = Mapping[str, Sequence[tuple[str, Any]]]
+"""Fields of each message type: name and description, as rosbags parses them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A number, or `count` equal numbers in a row, at a byte offset."""
+
+    offset: int
+    dtype: np.dtype[Any]
+    count: int | None = None
+
+
+@dataclass(slots=True)
+class Layout:
+    """What one walk found: numbers and texts by path, and the byte ranges that fix the layout."""
+
+    leaves: dict[str, Leaf] = field(default_factory=dict)
+    texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
+    guards: list[tuple[int, int]] = field(default_factory=list)
+    end: int = 0
+
+
+class Walker:
+    """Walks one message from its first byte to its last."""
+
+    def __init__(self, definitions: Definitions, raw: bytes, *, cdr: bool) -> None:
+        self.definitions = definitions
+        self.raw = raw
+        self.cdr = cdr
+        self.start = 4 if cdr else 0
+        self.order = ">" if cdr and raw[1:2] == b"\x00" else "<"
+        self.layout = Layout()
+        self.pos = self.start
+        if cdr and raw[:2] not in {b"\x00\x00", b"\x00\x01"}:
+            raise UnknownFormError(
+                "a message is in an encoding that is not plain CDR",
+                found=f"encapsulation {raw[:2].hex()}",
+                hint="re-record with the default RMW",
+            )
+
+    def walk(self, type_name: str) -> Layout:
+        """Return the layout; raises LogError where the definition does not fit the bytes."""
+        if self.cdr:
+            self.layout.guards.append((0, 2))
+        try:
+            self._message(type_name, "")
+        except (IndexError, ValueError, OverflowError) as error:
+            raise _misfit(type_name, self.pos, len(self.raw)) from error
+        left = len(self.raw) - self.pos
+        if left < 0 or left > (3 if self.cdr else 0):
+            raise _misfit(type_name, self.pos, len(self.raw))
+        self.layout.end = self.pos
+        return self.layout
+
+    def _message(self, type_name: str, path: str) -> None:
+        if type_name not in self.definitions:
+            raise LogError(
+                f"no definition of message type `{type_name}`", found="none in the bag", hint="give its folder: `--msg-path DIR`"
+            )
+        fields = [f for f in self.definitions[type_name] if f[0] != PADDING]
+        if not fields and self.cdr:
+            self._advance(1)  # IDL has no structure without members: ROS 2 gives it one of a byte
+        for name, description in fields:
+            self._field(description, f"{path}.{name}" if path else name)
+
+    def _field(self, description: Any, path: str) -> None:
+        kind, what = description
+        if kind == BASE:
+            self._base(what[0], path)
+        elif kind == NAME:
+            self._message(what, path)
+        else:
+            inner, length = what
+            self._row(inner, length if kind == ARRAY else self._length(), path)
+
+    def _base(self, base: str, path: str) -> None:
+        if base == "string":
+            self.layout.texts[path] = (self._text(),)
+            return
+        dtype = self._dtype(base)
+        self._align(dtype.itemsize)
+        self.layout.leaves[path] = Leaf(self.pos, dtype)
+        self._advance(dtype.itemsize)
+
+    def _row(self, inner: Any, count: int, path: str) -> None:
+        kind, what = inner
+        if kind == NAME or what[0] == "string":
+            if count > len(self.raw):
+                raise IndexError(count)
+            begin = self.pos
+            if kind == NAME:
+                for i in range(count):
+                    self._message(what, f"{path}[{i}]")
+            else:
+                self.layout.texts[path] = tuple(self._text() for _ in range(count))
+            self.layout.ranges[path] = (begin, self.pos)
+            return
+        dtype = self._dtype(what[0])
+        if count:
+            self._align(dtype.itemsize)
+        self.layout.leaves[path] = Leaf(self.pos, dtype, count)
+        self._advance(count * dtype.itemsize)
+
+    def _text(self) -> str:
+        length = self._length()
+        begin = self.pos
+        self._advance(length)
+        return self.raw[begin : self.pos].rstrip(b"\x00").decode("utf-8", errors="replace")
+
+    def _length(self) -> int:
+        self._align(4)
+        begin = self.pos
+        self._advance(4)
+        self.layout.guards.append((begin, self.pos))
+        return int.from_bytes(self.raw[begin : self.pos], "big" if self.order == ">" else "little")
+
+    def _align(self, size: int) -> None:
+        if self.cdr:
+            self.pos += -(self.pos - self.start) % size
+
+    def _advance(self, size: int) -> None:
+        self.pos += size
+        if self.pos > len(self.raw):
+            raise IndexError(self.pos)
+
+    def _dtype(self, base: str) -> np.dtype[Any]:
+        if base not in DTYPES:
+            raise UnknownFormError(f"fields of type `{base}` are not read", found=base, hint="map another topic")
+        return np.dtype(self.order + DTYPES[base])
+
+
+_STEP = re.compile(r"^(?P<base>.*)\[(?P<key>[^\[\]]+)\]$")
+
+
+def numbers_at(layout: Layout, path: str) -> list[tuple[int, np.dtype[Any]]]:
+    """Return offsets and types of the number at a path, or of the four of a quaternion.
+
+    `a.b[2]` is an element, `position[rudder]` the one whose name is in the `name` beside it. An element beyond the
+    end gives an empty list. Raises MappingError with the near paths where there is no such field.
+    """
+    leaf = layout.leaves.get(path)
+    if leaf is not None and leaf.count is None:
+        return [(leaf.offset, leaf.dtype)]
+    four = [layout.leaves.get(f"{path}.{part}" if path else part) for part in QUATERNION]
+    if all(four):
+        return [(q.offset, q.dtype) for q in four if q is not None]
+    match = _STEP.match(path)
+    if match is None or match["base"] not in layout.leaves:
+        raise _no_field(layout, path)
+    row = layout.leaves[match["base"]]
+    index = _index(layout, match["base"], match["key"])
+    if row.count is None or index >= row.count:
+        return []
+    return [(row.offset + index * row.dtype.itemsize, row.dtype)]
+
+
+def _index(layout: Layout, base: str, key: str) -> int:
+    if key.isdigit():
+        return int(key)
+    parent = base.rpartition(".")[0]
+    beside = [f"{parent}.{n}" if parent else n for n in ("name", "names")]
+    path = next((b for b in beside if b in layout.texts), None)
+    names = layout.texts[path] if path else ()
+    if path is None or key not in names:
+        raise MappingError(
+            f"`{base}` has no element named {key!r}", found=", ".join(names) or "no names beside it", hint=near(key, names)
+        )
+    layout.guards.append(layout.ranges[path])
+    return names.index(key)
+
+
+def _no_field(layout: Layout, path: str) -> MappingError:
+    known = [p if leaf.count is None else f"{p}[0]" for p, leaf in layout.leaves.items()]
+    return MappingError(f"the message has no number at `{path}`", found=", ".join(known[:12]), hint=near(path, known))
+
+
+def types_in(fields: Sequence[tuple[str, Any]]) -> list[str]:
+    """Return the message types that the fields of a type are made of."""
+    return [
+        what if kind == NAME else what[0][1] for _, (kind, what) in fields if kind == NAME or (kind > NAME and what[0][0] == NAME)
+    ]
+
+
+class Decoder:
+    """Decodes chosen fields of many messages of one type."""
+
+    def __init__(self, definitions: Definitions, type_name: str, *, cdr: bool) -> None:
+        self.definitions = definitions
+        self.type_name = type_name
+        self.cdr = cdr
+
+    def layout(self, raw: bytes) -> Layout:
+        """Return the layout of one message; raises LogError where the definition does not fit."""
+        return Walker(self.definitions, raw, cdr=self.cdr).walk(self.type_name)
+
+    def first_values(self, raw: bytes) -> dict[str, Any]:
+        """Return every number of one message by path; rows of numbers up to eight elements."""
+        return first_values(self.layout(raw), raw)
+
+    def decode(self, payloads: Sequence[bytes], paths: Sequence[str]) -> Columns:
+        """Return for each path the numbers of all messages, and which messages the definition fits."""
+        lengths = np.fromiter(map(len, payloads), dtype=np.int64, count=len(payloads))
+        good = np.ones(len(payloads), dtype=np.bool_)
+        out = [np.full((len(payloads), 1), np.nan) for _ in paths]
+        for length in np.unique(lengths):
+            rows = np.flatnonzero(lengths == length)
+            block = np.frombuffer(b"".join([payloads[i] for i in rows.tolist()]), dtype=np.uint8).reshape(rows.size, int(length))
+            self._decode_block(block, rows, paths, out, good)
+        return out, good
+
+    def _decode_block(
+        self,
+        block: npt.NDArray[np.uint8],
+        rows: npt.NDArray[np.intp],
+        paths: Sequence[str],
+        out: list[npt.NDArray[Any]],
+        good: npt.NDArray[np.bool_],
+    ) -> None:
+        tried = 0
+        while rows.size:
+            try:
+                layout = self.layout(block[0].tobytes())
+            except LogError:
+                good[rows[0]] = False
+                block, rows = block[1:], rows[1:]
+                continue
+            places = [numbers_at(layout, p) for p in paths]
+            same = np.zeros(rows.size, dtype=bool)
+            same[0] = True
+            if tried < ROWS_APART:
+                same = np.ones(rows.size, dtype=bool)
+                for begin, end in layout.guards:
+                    same &= (block[:, begin:end] == block[0, begin:end]).all(axis=1)
+            _take(block[same], rows[same], places, out)
+            block, rows = (block[~same], rows[~same]) if tried < ROWS_APART else (block[1:], rows[1:])
+            tried += 1
+
+
+def _take(
+    block: npt.NDArray[np.uint8],
+    rows: npt.NDArray[np.intp],
+    places: Sequence[Sequence[tuple[int, np.dtype[Any]]]],
+    out: list[npt.NDArray[Any]],
+) -> None:
+    for k, place in enumerate(places):
+        if len(place) > out[k].shape[1]:
+            out[k] = np.repeat(out[k], len(place), axis=1)
+        for j, (offset, dtype) in enumerate(place):
+            column = np.ascontiguousarray(block[:, offset : offset + dtype.itemsize]).view(dtype)[:, 0]
+            out[k][rows, j] = column
+
+
+def first_values(layout: Layout, raw: bytes) -> dict[str, Any]:
+    """Return every number of one message by path; rows of numbers up to eight elements."""
+    found: dict[str, Any] = {}
+    for path, leaf in layout.leaves.items():
+        if leaf.count is None:
+            found[path] = np.frombuffer(raw, leaf.dtype, 1, leaf.offset)[0].item()
+            continue
+        names = _names_beside(layout, path)
+        for i, value in enumerate(np.frombuffer(raw, leaf.dtype, leaf.count, leaf.offset)[:8]):
+            found[f"{path}[{names[i] if i < len(names) else i}]"] = value.item()
+    return found
+
+
+def _names_beside(layout: Layout, path: str) -> tuple[str, ...]:
+    parent = path.rpartition(".")[0]
+    return layout.texts.get(f"{parent}.name" if parent else "name", ())
+
+
+def as_floats(values: npt.NDArray[Any]) -> FloatArray:
+    """Return (n, 1) as (n,), (n, 4) as it is, as float64."""
+    floats = np.asarray(values, dtype=np.float64)
+    return floats[:, 0] if floats.shape[1] == 1 else floats
+
+
+def _misfit(type_name: str, needed: int, found: int) -> UnknownFormError:
+    return UnknownFormError(
+        f"the definition of `{type_name}` does not fit its messages",
+        found=f"a message of {found} bytes where the definition ends at {needed}",
+        hint="give the definitions the vehicle was built with: `--msg-path DIR`",
+    )

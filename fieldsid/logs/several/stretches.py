@@ -1,0 +1,127 @@
+"""The stretches of a log in which the vehicle is under way: what lies between is on deck, adrift, at the surface or idle.
+
+Left out is where for some time the motor is off and no speed is made, the vehicle floats at the surface of a log that dives,
+or no angle, rate or fin changes any more at an end; and where the log has nothing at all. A motor that is off on a vehicle
+that still moves is a way of flying.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.logs.convert.conditioning import MAIN
+from fieldsid.logs.run import Note, Run
+from fieldsid.numerics.arrays import BoolArray, FloatArray
+
+OFF_S = 10.0
+"""Shorter than this nothing is left out."""
+LEAST_S = 20.0
+"""A stretch shorter than this is none."""
+IDLE = 0.15
+"""Share of the usual speed below which no way is made."""
+LEAST_SPEED = 0.1
+"""Usual speed in m/s below which a log tells nothing by it."""
+DIVES_M, DIVES = 1.0, 0.2
+"""Depth in m, and share of the log below it, from which on a log is one of dives."""
+SURFACE_M = 0.3
+GAP_STEPS = 5.0
+_MOTORS = ("thrust", "thrust_ratio", "propeller_rpm")
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of a log in s."""
+
+    start_s: float
+    end_s: float
+
+    @property
+    def part(self) -> tuple[float, float]:
+        """Its times in s, as `load_run` takes them."""
+        return self.start_s, self.end_s
+
+
+def stretches_of(run: Run) -> tuple[tuple[Stretch, ...], tuple[Note, ...]]:
+    """Return the stretches of a run under way, and notes on what lies outside of them; the whole run where there is none else."""
+    whole = (Stretch(float(run.time[0]), float(run.time[-1])),)
+    reasons = {
+        "no way is made": _idle(run),
+        "at the surface": _at_surface(run),
+        "nothing changes": _tails(run),
+    }
+    off = {why: _long(run.time, mask) for why, mask in reasons.items()}
+    away = np.any(np.stack(list(off.values())), axis=0)
+    breaks = np.flatnonzero((np.diff(run.time) > max(OFF_S, GAP_STEPS * float(np.median(np.diff(run.time))))) | np.diff(away)) + 1
+    parts = [p for p in np.split(np.arange(run.time.size), breaks) if not away[p[0]]]
+    kept = tuple(s for p in parts if (s := Stretch(float(run.time[p[0]]), float(run.time[p[-1]]))).end_s - s.start_s >= LEAST_S)
+    if not kept or kept == whole:
+        return whole, ()
+    return kept, (_note(run, kept, off),)
+
+
+def _note(run: Run, kept: tuple[Stretch, ...], off: dict[str, BoolArray]) -> Note:
+    whys = [f"{why} ({_seconds(run.time, mask):.0f} s)" for why, mask in off.items() if mask.any()]
+    shown = ", ".join(f"{s.start_s:.2f} .. {s.end_s:.2f} s" for s in kept[:6]) + (", ..." if len(kept) > 6 else "")
+    left = float(run.time[-1] - run.time[0]) - sum(s.end_s - s.start_s for s in kept)
+    reasons = "; ".join(whys) or "gaps of the log"
+    message = f"under way {shown}; {left:.0f} s are left out: {reasons}; `--whole` keeps them"
+    data = {"stretches": [list(s.part) for s in kept], "left_out_s": left}
+    return Note("stretches", message, data)
+
+
+def _seconds(time: FloatArray, mask: BoolArray) -> float:
+    return float(np.diff(time)[mask[1:]].sum())
+
+
+def _idle(run: Run) -> BoolArray:
+    """Where no way is made and the motor, if it is in the log, is off."""
+    speed = _speed(run)
+    motor = next((run[m] for m in _MOTORS if run.has(m)), None)
+    off = np.zeros(run.time.size, dtype=np.bool_)
+    if motor is not None:
+        full = float(np.nanpercentile(np.abs(motor), 95))
+        off = np.abs(motor) <= 0.02 * full if full > 0.0 else off
+        off &= np.isfinite(motor)
+    usual = float(np.nanpercentile(speed, 75)) if speed is not None else 0.0
+    if speed is None or usual < LEAST_SPEED:
+        return off
+    still = np.isfinite(speed) & (speed < IDLE * usual)
+    return still & off if motor is not None and off.any() else still
+
+
+def _speed(run: Run) -> FloatArray | None:
+    return np.abs(run["surge_m_s"]) if run.has("surge_m_s") else None
+
+
+def _at_surface(run: Run) -> BoolArray:
+    if not run.has("depth_m"):
+        return np.zeros(run.time.size, dtype=np.bool_)
+    depth = run["depth_m"]
+    dives = float(np.nanmean(depth > DIVES_M)) > DIVES
+    return np.isfinite(depth) & (depth < SURFACE_M) if dives else np.zeros(run.time.size, dtype=np.bool_)
+
+
+def _tails(run: Run) -> BoolArray:
+    """Before the first and after the last change of an angle, a rate or a fin; a logger that holds the last value writes such."""
+    mask = np.zeros(run.time.size, dtype=np.bool_)
+    main = [run[s] for s in MAIN if run.has(s)]
+    if not main:
+        return mask
+    changes = np.any([np.abs(np.diff(np.nan_to_num(v))) > 0.0 for v in main], axis=0)
+    places = np.flatnonzero(changes)
+    if places.size:
+        mask[: places[0]] = True
+        mask[places[-1] + 2 :] = True
+    return mask
+
+
+def _long(time: FloatArray, mask: BoolArray) -> BoolArray:
+    """Return only those runs of a mask (n,) that last."""
+    kept = mask.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if time[end - 1] - time[begin] < OFF_S:
+            kept[begin:end] = False
+    return kept

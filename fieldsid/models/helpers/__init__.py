@@ -1,0 +1,1 @@
+"""Measured helper signals (surge, depth, cross-flow speed) without their noise."""

@@ -1,0 +1,1 @@
+"""The noise model: its Kalman filter, likelihood, Fisher scoring, and robust covariance."""

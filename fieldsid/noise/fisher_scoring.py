@@ -1,0 +1,129 @@
+"""Score and Fisher information of the noise parameters, from forward differences through the Kalman filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.models.record import Record
+from fieldsid.noise.kalman.dispatch import kalman_filter
+from fieldsid.noise.kalman.full_batched import LANES, full_filter_batched
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
+from fieldsid.runtime.evaluation_counter import count_evaluation
+
+LOG_STEP = 3e-4
+"""Relative change of a noise's number whose effect is taken for a derivative."""
+STEP_FACTOR, PER_STEP = float(np.exp(LOG_STEP)), 1.0 / LOG_STEP
+IS_STANDARD_DEVIATION = np.array([True, True, True, False, True, True, False])
+"""Places in a noise's vector of its standard deviations, the others being correlation times."""
+
+
+@dataclass(frozen=True, slots=True)
+class Innovations:
+    """The innovations of a residual under a noise: standardised, and their standard deviations, (2 n,) each; the log likelihood.
+
+    `moved` are both, (P, 2, n) each, with each noise parameter increased by LOG_STEP, where they were computed together.
+    """
+
+    standardised: FloatArray
+    innovation_std: FloatArray
+    likelihood: float
+    moved: tuple[FloatArray, FloatArray] | None = None
+
+
+def innovations_of(
+    record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
+) -> Innovations:
+    """Return the innovations of a residual (2, n) under a noise vector (7,) that acts on a base of damping a and stiffness k.
+
+    Where disturbance and sensor colour are both present, the innovations with each parameter at `place` (P,) increased come with
+    them.
+    """
+    if place.size < noise.size:
+        standardised, innovation_std = np.empty((1, *residual.shape)), np.empty(residual.shape)
+        logs = kalman_filter(
+            record.nominal_steps, record.ok, a, k, noise, np.ascontiguousarray(residual[None]), standardised, innovation_std
+        )
+        return _innovations(standardised[0], innovation_std, logs)
+    standardised, innovation_std = np.empty((LANES, *residual.shape)), np.empty((LANES, *residual.shape))
+    noises = np.tile(noise, (LANES, 1))
+    noises[np.arange(1, place.size), place[1:]] *= STEP_FACTOR
+    full_filter_batched(record.nominal_steps, record.ok, a, k, noises, residual, standardised, innovation_std)
+    # copies: the first rows become those of the first number moved
+    d_log_std = innovation_std[0].copy()
+    return _innovations(
+        standardised[0].copy(),
+        d_log_std,
+        2.0 * float(np.log(d_log_std).sum()),
+        (standardised[: place.size], innovation_std[: place.size]),
+    )
+
+
+def _innovations(
+    standardised: FloatArray, innovation_std: FloatArray, logs: float, moved: tuple[FloatArray, FloatArray] | None = None
+) -> Innovations:
+    e = standardised.ravel()
+    return Innovations(e, innovation_std.ravel(), -0.5 * (logs + float(e @ e)), moved)
+
+
+def information(
+    record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray, here: Innovations
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Return the score (P,) and the Fisher information (P, P) of a noise about what a residual (2, n) comes to `here`.
+
+    Both are by the logarithms x of the noise's numbers at `place` (P,), all those that are not zero or held among them, a
+    standard deviation first, from forward differences of the innovations e and the logarithms of their spreads s:
+        dl/dx = -sum(ds + e de),  F = sum(2 ds ds' + (de + e ds) (de' + e ds'))
+    Standard deviations that grow together leave the filter's gains as they are: over all of them the ds of a sample add up
+    to one and the de to -e, which gives those of the first. What has moved in `here` is used up.
+    Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
+    """
+    count_evaluation()
+    standardised, innovation_std = here.moved or _moved(record, a, k, noise, place, residual)
+    d_innovations, d_log_std = standardised.reshape(place.size, -1), innovation_std.reshape(place.size, -1)
+    score = score_of_innovations(
+        record.ok.ravel(), here.standardised, 1.0 / here.innovation_std, IS_STANDARD_DEVIATION[place], d_innovations, d_log_std
+    )
+    return score, 2.0 * d_log_std @ d_log_std.T + d_innovations @ d_innovations.T
+
+
+def _moved(
+    record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return innovations and their spreads (P, 2, n) with each of the noise's numbers moved but the first."""
+    series = np.ascontiguousarray(residual[None])
+    standardised, innovation_std = np.empty((place.size, 1, *residual.shape)), np.empty((place.size, *residual.shape))
+    for row, p in enumerate(place[1:], 1):
+        moved = noise.copy()
+        moved[p] *= STEP_FACTOR
+        kalman_filter(record.nominal_steps, record.ok, a, k, moved, series, standardised[row], innovation_std[row])
+    return standardised[:, 0], innovation_std
+
+
+@jit
+def score_of_innovations(
+    seen: npt.NDArray[np.bool_], e: FloatArray, over: FloatArray, is_size: npt.NDArray[np.bool_],
+    d_innovations: FloatArray, d_log_std: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Return the score (P,); turn errors and spreads with each number moved, (P, m), into de + e ds and ds. over is 1 / s."""
+    score = np.zeros(d_innovations.shape[0])
+    for l in range(e.size):
+        d_log_std[0, l], d_innovations[0, l] = 1.0 * seen[l], -e[l]
+    for row in range(1, d_innovations.shape[0]):
+        total, share = 0.0, 1.0 * is_size[row]
+        for l in range(e.size):
+            ds, de = (d_log_std[row, l] * over[l] - 1.0) * PER_STEP, (d_innovations[row, l] - e[l]) * PER_STEP
+            d_log_std[row, l], d_innovations[row, l] = ds, de + e[l] * ds
+            d_log_std[0, l] -= share * ds
+            d_innovations[0, l] -= share * de
+            total += ds + e[l] * de
+        score[row] = -total
+    total = 0.0
+    for l in range(e.size):
+        total += d_log_std[0, l] + e[l] * d_innovations[0, l]
+        d_innovations[0, l] += e[l] * d_log_std[0, l]
+    score[0] = -total
+    return score

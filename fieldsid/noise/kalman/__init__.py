@@ -1,0 +1,1 @@
+"""The compiled Kalman filters, one for each structure of the noise."""

@@ -1,0 +1,221 @@
+"""The noise model by maximum likelihood, with Fisher scoring on the logarithms of its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.noise.fisher_scoring import information, innovations_of
+from fieldsid.noise.kalman.dispatch import innovations
+from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
+from fieldsid.noise.whiten import NOISE_FIELDS
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.bounded_lm_step import bounded_step
+
+MIN_NOISE_SIGNAL_SHARE = 1e-4
+MAX_SCORING_ITERATIONS, MIN_DAMPING, MIN_DAMPING_AFTER_REFUSAL = 30, 1e-3, 0.1
+"""Rounds at most, least damping of a step, and what it is at least raised from where one was refused."""
+MAX_LOG_STEP = 1.5
+"""Longest step of a logarithm: the Fisher information holds only locally."""
+MIN_WHITE_SHARE = 0.1
+"""Share of what the differences show that the white noise is at least: an AR(1) noise of many samples, which has no white
+part, shows half its own increments in them."""
+BELOW_ANY_BOUND = 1e-12
+"""Less than any bound."""
+MIN_SCORING_GAIN = 0.02
+"""Log likelihood below which another iteration is not worth its cost."""
+GRADIENT_STEP = 1e-4
+
+
+NOISE_KINDS: dict[str, tuple[str, ...]] = {
+    "white": ("angle", "rate"),
+    "disturbance": ("angle", "rate", "disturbance", "disturbance_time"),
+    "coloured": ("angle", "rate", "coloured_angle", "coloured_rate", "coloured_time"),
+    "both": NOISE_FIELDS,
+}
+LOWER_BOUNDS = {
+    "angle": MIN_ANGLE_NOISE_RAD, "rate": MIN_RATE_NOISE_RAD_S, "disturbance": 1e-7, "disturbance_time": 0.1,
+    "coloured_angle": 1e-7, "coloured_rate": 1e-7, "coloured_time": 0.05,
+}  # fmt: skip
+UPPER_BOUNDS = {
+    "angle": 1.0, "rate": 1.0, "disturbance": 10.0, "disturbance_time": 30.0,
+    "coloured_angle": 1.0, "coloured_rate": 1.0, "coloured_time": 30.0,
+}  # fmt: skip
+
+
+def log_likelihood(
+    records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: FloatArray
+) -> float:
+    """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise vector (7,).
+
+    Minus infinity where one of them is that of a motion without bound.
+    """
+    if not all(np.isfinite(e).all() for e in residuals):
+        return -np.inf
+    total = 0.0
+    for record, (a, k), e in zip(records, dynamics, residuals, strict=True):
+        out = np.empty((1, *e.shape))
+        logs = innovations(record.nominal_steps, record.ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
+        total -= 0.5 * (logs + float(np.vdot(out, out)))
+    return total
+
+
+def estimate_noise(
+    records: Sequence[Record],
+    dynamics: Sequence[tuple[float, float]],
+    residuals: Sequence[FloatArray],
+    noise_kind: str,
+    start: Noise,
+    likelihood: Callable[[FloatArray], float] | None = None,
+    floor: Noise | None = None,
+    *,
+    reinitialise: bool = True,
+) -> tuple[Noise, float]:
+    """Return the noise of a family with the highest likelihood, and that log likelihood.
+
+    dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
+    noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
+    default what the signals show of it; wake: whether what the start has next to none of is tried anew. Fisher scoring
+    on the logarithms of the noise's numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the
+    residuals' the information. Residuals of a motion without bound have none: the start is returned, and minus infinity.
+    """
+    if not all(np.isfinite(e).all() for e in residuals):
+        return start, -np.inf
+    names = NOISE_KINDS[noise_kind]
+    floor = floor or white_noise_floor(records)
+    rough = _rough_start(records, dynamics, residuals, floor, start) if reinitialise else {n: getattr(start, n) for n in names}
+    off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
+    low, high = _bounds(names, floor, _resolution(records))
+    place = np.array([NOISE_FIELDS.index(n) for n in names])
+    known = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
+    slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, likelihood)
+    x = np.clip(np.log([max(rough[n], BELOW_ANY_BOUND) for n in names]), low, high)
+    value, score, fisher = slope.at(x)
+    damping = MIN_DAMPING
+    for _ in range(MAX_SCORING_ITERATIONS):
+        # each within its own leap, the others making the best of that: one on its way to nothing would hold them all back
+        moved = bounded_step(fisher, score, damping, x, np.maximum(low, x - MAX_LOG_STEP), np.minimum(high, x + MAX_LOG_STEP))
+        if float(score @ moved) < MIN_SCORING_GAIN:
+            break
+        trial = x + moved
+        new = slope.at(trial, value)
+        if new[0] > value:
+            gained, expected, x = new[0] - value, float(score @ moved - 0.5 * moved @ fisher @ moved), trial
+            value, score, fisher = new
+            damping = max(damping * _next_damping(gained / expected), MIN_DAMPING)
+            if gained < MIN_SCORING_GAIN:
+                break
+        else:
+            damping = max(damping, MIN_DAMPING_AFTER_REFUSAL) * 6.0
+    return Noise(*slope.vector(x).tolist()), value
+
+
+def _next_damping(kept: float) -> float:
+    """Return the damping after a step that gained this share of the predicted gain."""
+    return 0.1 if kept > 0.5 else 1.0 if kept > 0.25 else 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class _LogNoiseLikelihood:
+    """The likelihood of residuals as a function of the logarithms of some of the noise's numbers."""
+
+    records: Sequence[Record]
+    dynamics: Sequence[tuple[float, float]]
+    residuals: Sequence[FloatArray]
+    known: FloatArray
+    place: npt.NDArray[np.int64]
+    likelihood: Callable[[FloatArray], float] | None
+
+    def vector(self, x: FloatArray) -> FloatArray:
+        """Return the noise vector (7,) of logarithms x (P,)."""
+        noise = self.known.copy()
+        noise[self.place] = np.exp(x)
+        return noise
+
+    def at(self, x: FloatArray, least: float = -np.inf) -> tuple[float, FloatArray, FloatArray]:
+        """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number.
+
+        Where the likelihood is not above the least one asked for nothing else is worked out.
+        """
+        count, noise = x.size, self.vector(x)
+        runs = [
+            (r, max(a, 1e-3), max(k, 0.0), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)
+        ]
+        here = [innovations_of(r, a, k, noise, self.place, e) for r, a, k, e in runs]
+        total = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
+        if not (np.isfinite(total) and total > least):
+            return -np.inf, np.zeros(count), np.eye(count)
+        parts = [information(r, a, k, noise, self.place, e, h) for (r, a, k, e), h in zip(runs, here, strict=True)]
+        score, fisher = np.sum([s for s, _ in parts], axis=0), np.sum([f for _, f in parts], axis=0)
+        if self.likelihood is not None:
+            score = np.array(
+                [(self.likelihood(self.vector(x + d)) - total) / GRADIENT_STEP for d in GRADIENT_STEP * np.eye(count)]
+            )
+        known = np.isfinite(score).all() and np.isfinite(fisher).all()
+        return (total, score, fisher) if known else (-np.inf, np.zeros(count), np.eye(count))
+
+
+def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return log bounds; white sensor noise stays near what the differences of the signal show of it.
+
+    Where they show less than `least` it stays above that.
+    """
+    shown = (
+        MIN_WHITE_SHARE * seen if seen > bound else bound for seen, bound in zip((floor.angle, floor.rate), least, strict=True)
+    )
+    low = LOWER_BOUNDS | dict(zip(("angle", "rate"), shown, strict=True))
+    high = {**UPPER_BOUNDS, "angle": max(2.0 * floor.angle, 2.5 * least[0]), "rate": max(2.0 * floor.rate, 2.5 * least[1])}
+    return np.log([low[n] for n in names]), np.log([high[n] for n in names])
+
+
+def _resolution(records: Sequence[Record]) -> tuple[float, float]:
+    """Return a share of each channel's own size, below which no model of the motion can be right.
+
+    A signal that was filtered before it was logged shows no white noise at all.
+    """
+    angle = _rms([r.angle[r.angle_ok] - r.angle[r.angle_ok].mean() for r in records if r.angle_ok.any()])
+    rate = _rms([r.rate[r.rate_ok] - r.rate[r.rate_ok].mean() for r in records if r.rate_ok.any()])
+    return max(MIN_NOISE_SIGNAL_SHARE * angle, MIN_ANGLE_NOISE_RAD), max(MIN_NOISE_SIGNAL_SHARE * rate, MIN_RATE_NOISE_RAD_S)
+
+
+REINITIALISED_SHARE, NEGLIGIBLE_COLOUR_SHARE = 0.5, 0.1
+"""Share of its rough size at which a component starts where the given start has almost none (at zero its slope vanishes); and the
+coloured sensor noise, over the white one, that counts as almost none."""
+
+
+def _rough_start(
+    records: Sequence[Record],
+    dynamics: Sequence[tuple[float, float]],
+    residuals: Sequence[FloatArray],
+    floor: Noise,
+    start: Noise,
+) -> dict[str, float]:
+    rms_angle = _rms([e[0][r.angle_ok] for e, r in zip(residuals, records, strict=True)])
+    rms_rate = _rms([e[1][r.rate_ok] for e, r in zip(residuals, records, strict=True)])
+    extra = max(float(np.sqrt(max(rms_rate**2 - floor.rate**2, 0.0))), 0.1 * floor.rate)
+    a = max(float(np.mean([max(d[0], 0.1) for d in dynamics])), 0.1)
+    spare = max(float(np.sqrt(max(rms_angle**2 - floor.angle**2, 0.0))), 0.1 * floor.angle)
+    known = start.disturbance > 0.0 or start.coloured_angle > 0.0 or start.coloured_rate > 0.0
+    return {
+        "angle": start.angle if known else floor.angle,
+        "rate": start.rate if known else floor.rate,
+        "disturbance": max(start.disturbance, REINITIALISED_SHARE * (a * extra + 1e-6)),
+        "disturbance_time": start.disturbance_time,
+        "coloured_angle": start.coloured_angle
+        if start.coloured_angle > NEGLIGIBLE_COLOUR_SHARE * floor.angle
+        else REINITIALISED_SHARE * spare,
+        "coloured_rate": start.coloured_rate
+        if start.coloured_rate > NEGLIGIBLE_COLOUR_SHARE * floor.rate
+        else REINITIALISED_SHARE * extra,
+        "coloured_time": start.coloured_time,
+    }
+
+
+def _rms(parts: list[FloatArray]) -> float:
+    values = np.concatenate(parts) if parts else np.zeros(0)
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -1,0 +1,16 @@
+"""Types of arrays, as every file annotates them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+IntArray = npt.NDArray[np.intp]
+
+
+ComplexArray = npt.NDArray[np.complex128]

@@ -1,0 +1,52 @@
+"""One Levenberg-Marquardt step within bounds, for whoever climbs or descends with normal equations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.errors import DivergenceError
+from fieldsid.numerics.arrays import FloatArray
+
+
+def bounded_step(
+    normal: FloatArray, gradient: FloatArray, damping: float, x: FloatArray, low: FloatArray, high: FloatArray
+) -> FloatArray:
+    """Return the step (F,) from a normal matrix (F, F) and the gradient (F,) that points where to go.
+
+    damping is relative to the normal matrix's diagonal. What is at its bound and would leave it, or carries no
+    information, stays; what would cross its bound goes just there, and the rest makes the best of that.
+    Raises DivergenceError where the equations hold what is no number: there is nowhere to go.
+    Source: Marquardt 1963, SIAM J. 11(2).
+    """
+    diagonal = normal.diagonal()
+    scale = np.sqrt(np.maximum(diagonal, 1e-30))
+    free = ~(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)) | (diagonal < 1e-24))
+    scaled = normal / scale / scale[:, None]
+    scaled.ravel()[:: x.size + 1] += damping
+    step = np.zeros_like(x)
+    while free.any():
+        if free.all():
+            step = _solved(scaled, gradient / scale) / scale
+        else:
+            wish = (gradient[free] - normal[free][:, ~free] @ step[~free]) / scale[free]
+            step[free] = _solved(scaled[free][:, free], wish) / scale[free]
+        end = x + step
+        if not np.isfinite(end).all():
+            raise DivergenceError(
+                "a fit came to a step that is no number",
+                found=f"{int((~np.isfinite(end)).sum())} of {end.size} numbers that are fitted have none to go to",
+                hint="look at the logs with `sysid inspect LOG`: a sign or a unit that is wrong makes a vehicle that runs away",
+            )
+        beyond = np.maximum(end - high, low - end) * scale * free
+        worst = int(np.argmax(beyond))
+        if beyond[worst] <= 0.0:
+            break
+        step[worst], free[worst] = min(max(end[worst], low[worst]), high[worst]) - x[worst], False
+    return step
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])

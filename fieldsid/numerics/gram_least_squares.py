@@ -1,0 +1,25 @@
+"""Least squares of many rows and few columns, from the columns' products: a hundredth of a decomposition's time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.numerics.arrays import FloatArray
+
+SINGULAR_EIGENVALUE_SHARE = 1e-12
+"""Share of the largest product's eigenvalue below which a combination of columns is not told from none."""
+
+
+def gram_least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the least-squares coefficients (k,) of rows `columns` (k, m) for a target (m,), the smallest where many do.
+
+    Half of the digits are lost: enough where the answer is only a step or a score.
+    """
+    return solve_normal_equations(columns @ columns.T, columns @ target)
+
+
+def solve_normal_equations(gram: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solution (k,) of normal equations, products of the columns (k, k) and of columns and target (k,)."""
+    size = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(gram / size / size[:, None], right / size, rcond=SINGULAR_EIGENVALUE_SHARE)[0] / size)

@@ -1,0 +1,32 @@
+"""Are series white? The Ljung-Box statistic, pooled over runs, and its chi-square tail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.tail_probabilities import chi_square_tail
+
+LJUNG_BOX_LAGS = 20
+FEWEST_SAMPLES = 4 * LJUNG_BOX_LAGS
+"""Samples below which a series says nothing."""
+MIN_WHITENESS_P = 0.01
+
+
+def ljung_box(e: FloatArray) -> float:
+    """Return the Ljung-Box statistic of a series over LAGS lags (chi-square with LAGS degrees when white)."""
+    n = e.size
+    centred = e - e.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return 0.0
+    lags = np.array([float(centred[lag:] @ centred[:-lag]) / power for lag in range(1, LJUNG_BOX_LAGS + 1)])
+    return float(n * (n + 2) * np.sum(lags**2 / (n - np.arange(1, LJUNG_BOX_LAGS + 1))))
+
+
+def ljung_box_p(series: Iterable[FloatArray]) -> float:
+    """Return the p-value of several series being white, their statistics summed; one where all are too short to say."""
+    told = [ljung_box(e) for e in series if e.size >= FEWEST_SAMPLES]
+    return chi_square_tail(sum(told), LJUNG_BOX_LAGS * len(told)) if told else 1.0

@@ -1,0 +1,53 @@
+"""The correlation of two signals at many shifts at once.
+
+Block by block through the Fourier transform: n log n operations for all shifts, and memory for one block.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.numerics.arrays import FloatArray
+
+BLOCK_SAMPLES = 1 << 15
+ROUNDING_SHARE = 1e-12
+"""Share of a signal's power below which what is left of it at a shift is not told from the rounding of its sums."""
+
+
+def shifted_correlations(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:
+    """Return the correlation (2 reach + 1,) of a[i + k] with b[i] for k = -reach .. reach, of the samples both have.
+
+    a, b: (n,) without gaps, n > reach. 0 where one of them is constant.
+    """
+    if float(np.ptp(a)) == 0.0 or float(np.ptp(b)) == 0.0:  # the mean of equal numbers is off by rounding
+        return np.zeros(2 * reach + 1)
+    a, b = a - a.mean(), b - b.mean()
+    shifts = np.arange(-reach, reach + 1, dtype=np.int64)
+    count = a.size - np.abs(shifts)
+    sum_a, sum_b = _sums(a, shifts), _sums(b, -shifts)
+    power_a, power_b = _sums(a * a, shifts), _sums(b * b, -shifts)
+    left_a, left_b = power_a - sum_a**2 / count, power_b - sum_b**2 / count
+    varies = (left_a > ROUNDING_SHARE * (a @ a)) & (left_b > ROUNDING_SHARE * (b @ b))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(varies, (_products(a, b, reach) - sum_a * sum_b / count) / np.sqrt(left_a * left_b), 0.0)
+
+
+def _sums(values: FloatArray, shifts: npt.NDArray[np.int64]) -> FloatArray:
+    """Return the sum of the samples that are left at each shift: without the first k, or without the last -k."""
+    reach = int(np.abs(shifts).max())
+    first = np.concatenate([[0.0], np.cumsum(values[:reach])])
+    last = np.concatenate([[0.0], np.cumsum(values[::-1][:reach])])
+    return np.asarray(values.sum() - np.where(shifts > 0, first[np.abs(shifts)], last[np.abs(shifts)]))
+
+
+def _products(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:
+    """Return the sum of a[i + k] b[i] for each shift k."""
+    total = np.zeros(2 * reach + 1)
+    padded = np.concatenate([np.zeros(reach), a, np.zeros(reach)])
+    size = BLOCK_SAMPLES + 2 * reach
+    for start in range(0, b.size, BLOCK_SAMPLES):
+        block = b[start : start + BLOCK_SAMPLES]
+        spectrum = np.fft.rfft(padded[start : start + block.size + 2 * reach], size) * np.conj(np.fft.rfft(block, size))
+        total += np.fft.irfft(spectrum, size)[: 2 * reach + 1]
+    return total

@@ -1,0 +1,143 @@
+"""The prior model before a dive: parameters with their covariance, from a file or a template, and draws from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from fieldsid.dynamics.assemble import Base
+from fieldsid.dynamics.free_run import base_at, effects_of
+from fieldsid.errors import ModelError, UsageError
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.belief.prior_file import load_prior
+from fieldsid.registry import near
+from fieldsid.templates import template_names, template_path
+
+FOLDER = "plan/priors"
+HELD_BY = ("quadratic", "crossflow")
+"""Core terms whose damping grows with the rate: they hold a hull that is unstable at small angles."""
+WIDEST = 3.0
+"""Draws stay within this many standard deviations."""
+
+
+def prior_names() -> tuple[str, ...]:
+    """Return the names of the priors among the templates, such as `torpedo`."""
+    stems = [Path(n).stem for n in template_names() if n.startswith(f"{FOLDER}/")]
+    return tuple(sorted({s.rsplit("_", 1)[0] for s in stems}))
+
+
+def named_prior(name: str, axis: Axis) -> Model:
+    """Return a prior from the templates; raises UsageError naming the near matches."""
+    known = prior_names()
+    if name not in known:
+        raise UsageError(f"there is no prior named {name!r}", found=", ".join(known) or "none", hint=near(name, known))
+    return load_prior(template_path(f"{FOLDER}/{name}_{axis.value}.yaml"))
+
+
+def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
+    """Return the model if it can be flown on the axis at the speeds.
+
+    Raises UsageError for the wrong axis, ModelError when the motion about straight and level grows by itself.
+    """
+    if model.axis is not axis:
+        raise UsageError(
+            f"the prior is of the {model.axis.value} axis, the plan of {axis.value}",
+            found=f"axis: {model.axis.value}",
+            hint=f"plan that axis: `--axis {model.axis.value}`",
+        )
+    held = _held(model)
+    for speed in speeds:
+        growth = growth_of(base_at(model, speed))
+        if growth > 0 and not held:
+            names = NAMES[axis]
+            raise ModelError(
+                f"the prior is unstable at {speed:g} m/s: a disturbance doubles every {np.log(2) / growth:.2g} s",
+                found=", ".join(f"{n} = {model.values[n]:g}" for n in names.base if n != names.trim),
+                hint="identify it with `--effects quadratic_damping`, or start from `--prior torpedo`",
+            )
+    return model
+
+
+def growth_of(base: Base) -> float:
+    """Return the growth rate (1/s) of the least stable motion; a free heading counts as neither stable nor unstable."""
+    roots = np.roots([1.0, base.damping, base.stiffness])
+    worst = float(np.max(roots.real))
+    return worst if worst > 1e-6 else 0.0
+
+
+def _held(model: Model) -> bool:
+    core = [e.core(model.values, 1.0) for e in effects_of(model) if e.core is not None]
+    return any(getattr(c, field) > 0 for c in core for field in HELD_BY)
+
+
+def draws_of(model: Model, count: int, seed: int) -> tuple[Model, ...]:
+    """Return models drawn from the prior: damping and authority keep their sign, coefficients their bounds."""
+    if not model.free or not np.isfinite(model.covariance).all():
+        return (model,) * count
+    rng = np.random.default_rng(seed)
+    values, vectors = np.linalg.eigh(model.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    steps = np.clip(rng.standard_normal((count, len(model.free))), -WIDEST, WIDEST) @ root.T
+    return tuple(_moved(model, dict(zip(model.free, step.tolist(), strict=True))) for step in steps)
+
+
+def corner(model: Model, sigmas: Mapping[str, float]) -> Model:
+    """Return the model with some free values moved by a number of their standard errors."""
+    return _moved(model, {n: s * model.std_error(n) for n, s in sigmas.items() if n in model.free})
+
+
+def _moved(model: Model, moves: Mapping[str, float]) -> Model:
+    names = NAMES[model.axis]
+    bounds = {c.name: (c.low, c.high) for e in effects_of(model) for c in e.coefficients}
+    values = dict(model.values)
+    for name, move in moves.items():
+        value = values[name]
+        if name in (names.damping, names.authority) and value != 0.0:
+            # A relative error taken in the logarithm: a gain or a damping never changes its sign.
+            values[name] = value * float(np.exp(move / value))
+        elif name in bounds:
+            values[name] = float(np.clip(value + move, *bounds[name]))
+        else:
+            values[name] = value + move
+    if names.stiffness is not None and model.values[names.stiffness] > 0:
+        values[names.stiffness] = max(values[names.stiffness], 0.0)
+    law = model.law
+    if law.points:
+        factor = values[names.authority] / model.values[names.authority]
+        law = replace(law, points=tuple((u, b * factor) for u, b in law.points))
+    return replace(model, values=values, law=law)
+
+
+def scales_of(model: Model, base: Base, fin: float) -> dict[str, float]:
+    """Return what an error of each parameter is measured against.
+
+    The value itself; where the prior does not even know its sign, the prior's standard error; for the trim, the
+    moment of full fin (rad/s^2).
+    """
+    names = NAMES[model.axis]
+    at_speed = {names.damping: base.damping, names.authority: base.authority, names.trim: base.authority * fin}
+    out: dict[str, float] = {}
+    for name in (*names.base, *(c.name for e in effects_of(model) for c in e.shared)):
+        value = abs(at_speed.get(name, model.values.get(name, 0.0)))
+        error = model.std_error(name) if name in model.free and name != names.trim else 0.0
+        out[name] = max(value, error, 1e-9)
+    return out
+
+
+def disturbances(model: Model, draws: int, count: int, step: float, rng: np.random.Generator) -> FloatArray:
+    """Return draws of the prior's disturbance moment, (draws, count) rad/s^2, samples `step` s apart."""
+    sigma = model.noise.disturbance
+    if sigma <= 0:
+        return np.zeros((draws, count))
+    keep = float(np.exp(-step / model.noise.disturbance_time))
+    push = sigma * rng.standard_normal((draws, count))
+    push[:, 1:] *= np.sqrt(1.0 - keep**2)
+    # x[i] - keep x[i-1] = push[i] as a banded system: scipy.signal's filter takes a second to import
+    bands = np.stack([np.ones(count), np.full(count, -keep)])
+    return np.asarray(solve_banded((1, 0), bands, push.T).T)

@@ -1,0 +1,1 @@
+"""The optimal maneuver: Fisher information, objective, search, legs, plan."""

@@ -1,0 +1,215 @@
+"""Build one leg: search the best maneuver at a speed, keep it inside the envelope, say what it buys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import Schedule, pick_maneuver
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.belief.prior_model import draws_of, scales_of
+from fieldsid.planning.design.information import information_of
+from fieldsid.planning.design.leg import Expected, Leg, turn_back_s
+from fieldsid.planning.design.objective import Objective, make_objective
+from fieldsid.planning.design.optimise import Scored, SearchEffort, as_switched, catalogue, largest_paying, switching
+from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown
+from fieldsid.planning.flight.operating_point import operating_point
+from fieldsid.planning.flight.rule_flight import fly_operating_points
+from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.safety.monte_carlo import Ensemble, draw_ensemble, fly_ensemble, fly_list
+
+DESIGN_PROBABILITY_SHARE, CHANCE_PROBABILITY_SHARE = 0.7, 0.75
+"""A plan aims at these parts of the accepted probability, so that other draws of the prior keep to it as well."""
+COARSE_DRAWS, DRAWS, ERROR_DRAWS = 200, 500, 12
+FINALISTS = 3
+SMALLEST = 0.02
+EFFORT = SearchEffort(20, 12, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What all legs of a plan share; `open_loop` leaves out maneuvers that follow the motion."""
+
+    model: Model
+    envelope: Envelope
+    window: Window
+    want: Mapping[str, float]
+    run_up_s: float = 10.0
+    seed: int = 1
+    open_loop: bool = False
+    effort: SearchEffort = EFFORT
+
+
+def best_leg(setting: Setting, speed: float, known: Sequence[Excitation] = ()) -> Leg:
+    """Return the leg of one speed; `known` are maneuvers that were best at other speeds.
+
+    A maneuver that follows the motion is taken only where a list of its expected fins can be sent to a vehicle. Raises
+    UsageError when nothing stays inside the envelope.
+    """
+    judge = make_objective(setting.model, speed, setting.envelope, setting.window, setting.want, setting.run_up_s)
+    scored = _known_again(judge, known) if known else catalogue(judge, setting.effort)
+    scored = [s for s in scored if s.candidate.record.rule is None or not setting.open_loop]
+    seeds = [s for s in (as_switched(judge, c.candidate) for c in scored) if s is not None]
+    scored.append(switching(judge, seeds, setting.effort, setting.seed))
+    scored.sort(key=lambda s: s.cost)
+    crowd = ensemble_at(judge, setting)
+    leg = _best_of(judge, setting, crowd, scored)
+    if not leg.flown_from_list_in(setting.envelope):
+        leg = _best_of(judge, setting, crowd, [s for s in scored if s.candidate.record.rule is None])
+    costs = {s.candidate.spec: float(np.exp(s.cost)) for s in scored[:6]}
+    return replace(leg, alternatives=costs)
+
+
+def _best_of(judge: Objective, setting: Setting, crowd: Ensemble, scored: Sequence[Scored]) -> Leg:
+    """Return the leg of the best of some maneuvers, best first, at the angles at which it stays inside; raises UsageError."""
+    kept = (enforce_envelope(judge, setting, crowd, s.candidate) for s in scored)
+    finalists = islice((c for c in kept if c is not None), FINALISTS)
+    inside = [Scored(c, judge.cost(c, margin=10.0)) for c in finalists]
+    if not inside:
+        raise UsageError(
+            f"no maneuver stays inside the envelope at {judge.scene.speed:g} m/s with a probability of "
+            f"{1 - setting.envelope.share:.0%}",
+            found=", ".join(f"{k} {v:.3g}" for k, v in setting.envelope.rooms().items()),
+            hint="widen the envelope, or narrow the prior with a first model: `--model MODEL`",
+        )
+    best = enforce_chance_constraint(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate)
+    return leg_of(judge, setting, best, crowd)
+
+
+def ensemble_at(judge: Objective, setting: Setting) -> Ensemble:
+    """Return the draws of the prior that the legs at an objective's speed are simulated with."""
+    return draw_ensemble(setting.model, judge.scene.speed, judge.window, DRAWS, setting.seed + 1)
+
+
+def risk_of(judge: Objective, crowd: Ensemble, candidate: Excitation) -> tuple[float, dict[str, float]]:
+    """Return the share of draws that leave the envelope, and each excursion's 95 % quantile."""
+    flights = fly_ensemble(crowd, candidate, judge.envelope, judge.autopilot, judge.run_up)
+    return float(np.mean(flights.outside(judge.envelope))), flights.quantiles(0.95)
+
+
+def leg_of(
+    judge: Objective, setting: Setting, candidate: Excitation, crowd: Ensemble | None = None, purpose: str = "parameters"
+) -> Leg:
+    """Return an excitation as a leg: expected errors, with those of the paper's pulses for comparison, excursions, risk."""
+    scene, crowd = judge.scene, crowd or ensemble_at(judge, setting)
+    risk, excursions = risk_of(judge, crowd, candidate)
+    nominal = _nominal(judge, candidate)
+    blind = float("nan")
+    if nominal.size:
+        blind = float(np.mean(fly_list(crowd, nominal, judge.envelope, judge.autopilot, judge.run_up).outside(judge.envelope)))
+    turn = turn_back_s(scene.base.damping, scene.base.authority, judge.envelope.fin)
+    return Leg(
+        speed=scene.speed,
+        candidate=candidate,
+        window=judge.window,
+        run_up_s=setting.run_up_s,
+        turn_s=turn,
+        autopilot=judge.autopilot,
+        expected=expected_errors(judge, setting, candidate),
+        excursions=excursions,
+        break_probability=risk,
+        purpose=purpose,
+        nominal=nominal,
+        replay_risk=blind,
+    )
+
+
+def _nominal(judge: Objective, candidate: Excitation) -> FloatArray:
+    """Return the fin about trim a rule is expected to ask for on the prior's mean, NaN where the autopilot steers, (n,)."""
+    if candidate.record.rule is None:
+        return np.zeros(0)
+    window = judge.window
+    flight = fly_operating_points(
+        [judge.scene], candidate.record, candidate.parameters, limits=judge.envelope.limits, autopilot=judge.autopilot,
+        schedule=Schedule(window.rate_hz, window.lead, window.recover),
+    )  # fmt: skip
+    return np.where(flight.recovering[:, 0], np.nan, flight.fin[:, 0])[: window.time.size]
+
+
+def expected_errors(judge: Objective, setting: Setting, candidate: Excitation) -> dict[str, Expected]:
+    """Return what one pass of a candidate tells about every parameter, with the spread over draws of the prior."""
+    speed = judge.scene.speed
+    mean = judge.expected(candidate)
+    spread = []
+    for drawn in draws_of(setting.model, ERROR_DRAWS, setting.seed + 2):
+        scene = operating_point(drawn, speed)
+        response = flown(scene, candidate, judge.window, judge.envelope.limits, judge.autopilot)
+        spread.append(information_of(scene, response).std_errors())
+    base = pulses(judge)
+    before = {} if base is None else judge.expected(base).std_errors()
+    scales = scales_of(setting.model, judge.scene.base, judge.envelope.fin)
+    values = values_at(judge)
+    high = {n: _high([e[n] for e in spread]) for n in mean.names}
+    errors = mean.std_errors()
+    return {n: Expected(values[n], e, high[n], e / scales[n], before.get(n, float("nan"))) for n, e in errors.items()}
+
+
+def _high(errors: list[float]) -> float:
+    """Return the 5/6 quantile of errors, one of them where some are infinite: nothing lies between those."""
+    return float(np.quantile(errors, 5 / 6, method="linear" if np.isfinite(errors).all() else "higher"))
+
+
+def pulses(judge: Objective) -> Excitation | None:
+    """Return the paper's pulses in a window, shortened to fit, within the fin limit; None where there is no room."""
+    maneuver = pick_maneuver("square_pulses")
+    fin = judge.envelope.fin
+    spare = judge.window.excitation - 4.0 * maneuver.defaults["width"]
+    if spare < 0:
+        return None
+    values = {"amplitude": min(0.26, fin), "second": min(0.15, fin), "recovery": min(maneuver.defaults["recovery"], spare)}
+    return Excitation(maneuver.name, maneuver.checked(values))
+
+
+def values_at(judge: Objective) -> dict[str, float]:
+    """Return every shared parameter's value at the objective's speed."""
+    return {**judge.scene.model.values, **judge.scene.model.at_speed(judge.scene.speed)}
+
+
+def _known_again(judge: Objective, known: Sequence[Excitation]) -> list[Scored]:
+    """Return maneuvers that were best elsewhere, each at the angle that pays here, best first."""
+    return sorted((largest_paying(judge, c) for c in known if fits(c, judge.window)), key=lambda s: s.cost)
+
+
+def enforce_envelope(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation | None:
+    """Return the candidate with its angles lowered until the envelope is kept often enough, None where none is."""
+    share, high = 1.0, setting.envelope.share * DESIGN_PROBABILITY_SHARE
+    low_share, high_share, few = 0.0, 1.0, crowd.first(COARSE_DRAWS)
+    trial: Excitation | None = candidate
+    for step in range(7):
+        trial = lowered(candidate, share)
+        if trial is None:
+            break
+        risk, _ = risk_of(judge, few, trial)
+        if risk <= high:
+            low_share = share
+            if share == 1.0:
+                break
+        else:
+            high_share = share
+        share = 0.5 * (low_share + high_share) if low_share > 0 or step > 2 else share * 0.7
+    return lowered(candidate, low_share) if low_share > 0 else None
+
+
+def enforce_chance_constraint(judge: Objective, setting: Setting, crowd: Ensemble, candidate: Excitation) -> Excitation:
+    """Return the candidate lowered in small steps until many more draws of the prior agree."""
+    for _ in range(8):
+        risk, _ = risk_of(judge, crowd, candidate)
+        smaller = lowered(candidate, 0.94)
+        if risk <= CHANCE_PROBABILITY_SHARE * setting.envelope.share or smaller is None:
+            break
+        candidate = smaller
+    return candidate
+
+
+def lowered(candidate: Excitation, share: float) -> Excitation | None:
+    """Return a candidate with every angle it may choose times `share`; None below its bounds."""
+    changes = {p.name: candidate.parameters[p.name] * share for p in candidate.record.parameters if p.unit == "rad" and p.tuned}
+    bounds = {p.name: p.low for p in candidate.record.parameters}
+    if share < SMALLEST or any(v < bounds[n] for n, v in changes.items()):
+        return None
+    return candidate.with_(**changes)

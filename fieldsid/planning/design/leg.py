@@ -1,0 +1,135 @@
+"""A leg of a plan: one maneuver at one speed, what it buys, what it takes, and how it is ended early."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.display import Brief
+from fieldsid.maneuvers import Autopilot
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
+from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.rounding import number
+
+CIRCLE = "turn radius"
+"""The purpose of a leg that is a circle."""
+TURN_LAG = 2.31
+"""Time constants a turn needs to settle: ln 10 (the paper's u-turn)."""
+
+
+LARGEST_SHARE = 0.5
+"""Share of a value that its standard error may be before the value may as well be zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What a parameter will be known to: value, standard error, and the error 5 of 6 draws of the prior stay below.
+
+    `relative` is the error over what it is measured against: the value or, where that may be zero, another scale (prior.py).
+    """
+
+    value: float
+    std_error: float
+    std_error_high: float
+    relative: float
+    baseline: float = float("nan")
+
+    def over(self, passes: int) -> Expected:
+        """Return the expectation after several passes."""
+        root = float(np.sqrt(passes))
+        return Expected(self.value, self.std_error / root, self.std_error_high / root, self.relative / root, self.baseline)
+
+
+def error_in_words(value: float, std_error: float, relative: float) -> str:
+    """Return a standard error in per cent of the value it is measured against, else, and where that may be zero, as it is."""
+    of_value = np.isclose(relative * abs(value), std_error, rtol=1e-6, atol=0.0)
+    return f"{100.0 * relative:.1f} %" if of_value and relative < LARGEST_SHARE else f"+/- {number(std_error, 2)}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Leg(Brief):
+    """One maneuver at one speed (m/s), flown `passes` times: run-up, window, turn back.
+
+    `expected` is for all passes together. `excursions` are 95 % quantiles over the prior (rad, m). `nominal` (n,) is the fin
+    about trim in rad that a rule is expected to command, NaN where the autopilot steers. `replay_risk` is the probability that
+    these commands, flown open loop, leave the envelope. `heading` (rad) is a limit of its own, in place of the plan's.
+    """
+
+    speed: float
+    candidate: Excitation
+    window: Window
+    run_up_s: float
+    turn_s: float
+    autopilot: Autopilot
+    expected: Mapping[str, Expected]
+    excursions: Mapping[str, float]
+    break_probability: float
+    passes: int = 1
+    purpose: str = "parameters"
+    heading: float | None = None
+    replay_risk: float = float("nan")
+    nominal: FloatArray = field(default_factory=lambda: np.zeros(0))
+    alternatives: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def pass_s(self) -> float:
+        """Seconds of one pass: run-up, window and the turn to the next."""
+        return self.run_up_s + self.window.length + self.turn_s
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds of all passes."""
+        return self.passes * self.pass_s
+
+    @property
+    def distance_m(self) -> float:
+        """Metres through the water of all passes."""
+        return self.duration_s * self.speed
+
+    def envelope_in(self, envelope: Envelope) -> Envelope:
+        """Return the limits that hold on this leg of a plan with an envelope."""
+        return envelope if self.heading is None else replace(envelope, heading=self.heading)
+
+    def flown_from_list_in(self, envelope: Envelope) -> bool:
+        """Whether a list of fins may be sent for it: it is one, or that of its rule keeps inside as often as is asked."""
+        return self.open_loop or self.replay_risk <= envelope.share
+
+    @property
+    def open_loop(self) -> bool:
+        """Whether the command is known before the flight."""
+        return self.candidate.record.rule is None
+
+
+def commands_of(leg: Leg, envelope: Envelope) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return time (n,) s, fin about trim (n,) rad and 1 where the autopilot steers (n,), never outside the limits.
+
+    Where a rule flies, the fin is the one expected on the prior's mean. Whatever a plan holds, the fin is moved
+    into the envelope's angle and rate limits here.
+    """
+    time = leg.window.time
+    limits = envelope.limits
+    if leg.open_loop:
+        asked = asked_of(leg.candidate, leg.window)
+    else:
+        asked = np.full(time.size, np.nan)
+        n = min(time.size, leg.nominal.size)
+        asked[:n] = leg.nominal[:n]
+    steered = np.isnan(asked)
+    wanted = np.where(steered, 0.0, asked)
+    fin = np.empty(time.size)
+    last = np.zeros(1)
+    for i in range(time.size):
+        last = limits.apply(wanted[i : i + 1], last, 1.0 / leg.window.rate_hz)
+        fin[i] = last[0]
+    return time, fin, steered.astype(np.float64)
+
+
+def turn_back_s(damping: float, authority: float, fin: float) -> float:
+    """Return the seconds of a u-turn at a fin angle: pi a / (b d) + 2.31 / a (the paper's formula), at most 120."""
+    if damping <= 0.02:
+        return 120.0
+    return float(min(np.pi * damping / (abs(authority) * fin) + TURN_LAG / damping, 120.0))

@@ -1,0 +1,206 @@
+"""A plan: legs over speeds that buy the accuracy that is wanted, inside the envelope, in the fewest minutes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.display import Brief
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import parse_spec
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import Model
+from fieldsid.planning.belief.prior_model import checked_prior
+from fieldsid.planning.design.best_leg import Setting, best_leg
+from fieldsid.planning.design.circle_legs import circle_legs
+from fieldsid.planning.design.leg import Leg
+from fieldsid.planning.flight.excitation import Excitation, Window
+from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
+from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
+
+SHORTEST_WINDOW_S = 15.0
+MOST_PASSES = 40
+WINDOW = Window()
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """The request for a plan: speeds (m/s), envelope, accuracy goals (relative standard errors), budget in minutes or None."""
+
+    axis: Axis
+    speeds: tuple[float, ...]
+    envelope: Envelope
+    want: Mapping[str, float]
+    minutes: float | None = None
+    window: Window = WINDOW
+    run_up_s: float = 10.0
+    radius: bool = False
+    open_loop: bool = False
+    seed: int = 1
+    vehicle: str = "vehicle"
+    slowest: float | None = None
+    fastest: float | None = None
+    course: float | None = None
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Plan(Brief):
+    """Legs in the order they are flown, and all that is needed to fly them within the limits again."""
+
+    axis: Axis
+    vehicle: str
+    prior: str
+    envelope: Envelope
+    legs: tuple[Leg, ...]
+    want: Mapping[str, float]
+    seed: int = 1
+    course: float | None = None
+    """Compass course of the first pass of every leg in rad, None where nobody has said."""
+
+    @property
+    def minutes(self) -> float:
+        """Minutes of all legs."""
+        return sum(leg.duration_s for leg in self.legs) / 60.0
+
+    @property
+    def metres(self) -> float:
+        """Metres through the water of all legs."""
+        return sum(leg.distance_m for leg in self.legs)
+
+    @property
+    def break_probability(self) -> float:
+        """Probability that a pass leaves the envelope, the largest of the legs'."""
+        return max((leg.break_probability for leg in self.legs), default=0.0)
+
+
+def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda: None) -> Plan:
+    """Return the plan for a prior; `step` is called as each leg is found.
+
+    Raises UsageError for speeds, limits or accuracy goals that cannot be met, with what would be possible; ModelError for a prior
+    that is unstable.
+    """
+    check_speeds(request.speeds, request.slowest, request.fastest)
+    check_budget(request)
+    check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
+    checked_prior(model, request.axis, request.speeds)
+    legs = _legs(model, request, step)
+    legs = [_repeated(leg, request.want) for leg in legs]
+    if request.radius:
+        legs += circle_legs(setting_at(model, request, max(request.speeds)), request.speeds)
+    check_minutes(legs, request)
+    name = str(model.info.get("name", "")) or model.method or "model"
+    return Plan(
+        request.axis, request.vehicle, name, request.envelope, tuple(legs), dict(request.want), request.seed, request.course
+    )
+
+
+def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]:
+    """Return one leg per speed: the middle speed is searched from nothing, the others from what was best there.
+
+    What takes t s at one speed takes t times the ratio of the dampings at another: it is tried both ways.
+    """
+    order = sorted(range(len(request.speeds)), key=lambda i: abs(request.speeds[i] - float(np.median(request.speeds))))
+    damping = {u: model.at_speed(u)[NAMES[model.axis].damping] for u in request.speeds}
+    made: dict[int, Leg] = {}
+    best: list[Excitation] = []
+    for i in order:
+        speed = request.speeds[i]
+        factor = damping[request.speeds[order[0]]] / damping[speed]
+        known = [*best, *(c.stretched(factor) for c in best if factor > 0)]
+        made[i] = best_leg(setting_at(model, request, speed), speed, known)
+        step()
+        best = best or _finalists(made[i])
+    return [made[i] for i in range(len(request.speeds))]
+
+
+def _finalists(leg: Leg) -> list[Excitation]:
+    parsed = [parse_spec(spec) for spec in leg.alternatives]
+    return [leg.candidate, *(Excitation(m.name, p) for m, p in parsed[:4])]
+
+
+def setting_at(model: Model, request: Request, speed: float) -> Setting:
+    """Return the setting at a speed, its window shortened where the area is."""
+    window = request.window
+    if request.envelope.area_length is not None:
+        room = request.envelope.area_length / speed - request.run_up_s
+        window = replace(window, length=min(window.length, np.floor(room * window.rate_hz) / window.rate_hz))
+    return Setting(model, request.envelope, window, request.want, request.run_up_s, request.seed, request.open_loop)
+
+
+def _repeated(leg: Leg, want: Mapping[str, float]) -> Leg:
+    """Return the leg with as many passes as the accuracy goals need; raises UsageError beyond a day's work."""
+    lacking = [n for n in want if not np.isfinite(leg.expected[n].relative)]
+    need = max((leg.expected[n].relative / want[n] for n in want if n not in lacking), default=1.0) ** 2
+    passes = int(np.ceil(need - 1e-9))
+    if lacking or passes > MOST_PASSES:
+        possible = {n: leg.expected[n].relative / np.sqrt(MOST_PASSES) for n in want if n not in lacking}
+        raise UsageError(
+            f"the wish {accuracy_goals_text(want)} cannot be met at {leg.speed:g} m/s inside the envelope",
+            found=f"{', '.join(lacking)} does not show" if lacking else f"it would take {passes} passes of {leg.pass_s:.0f} s",
+            hint=f"possible in {MOST_PASSES} passes: `--want {accuracy_goals_text(possible)}`"
+            if possible
+            else "widen the envelope",
+        )
+    return with_passes(leg, max(passes, 1))
+
+
+def with_passes(leg: Leg, passes: int) -> Leg:
+    """Return a leg of one pass flown several times."""
+    return replace(leg, passes=passes, expected={n: e.over(passes) for n, e in leg.expected.items()})
+
+
+def check_budget(request: Request) -> None:
+    """Raise UsageError for a budget that cannot be meant, or circles in pitch."""
+    if request.minutes is not None and not 0 < request.minutes <= 1440:
+        raise UsageError(
+            f"a budget of {request.minutes:g} minutes cannot be meant",
+            found=f"--minutes {request.minutes:g}",
+            hint="for example `--minutes 20`",
+        )
+    if request.radius and request.axis is not Axis.YAW:
+        raise UsageError(
+            "a turn radius belongs to the yaw axis", found=f"--axis {request.axis.value}", hint="use `--axis yaw --radius`"
+        )
+
+
+def check_minutes(legs: list[Leg], request: Request) -> None:
+    """Raise UsageError when the legs take longer than the budget, with the accuracy goals that the budget allows."""
+    total = sum(leg.duration_s for leg in legs) / 60.0
+    if request.minutes is None or total <= request.minutes:
+        return
+    once = sum(leg.pass_s for leg in legs) / 60.0
+    hint = f"give `--minutes {np.ceil(total):.0f}`"
+    if once <= request.minutes and request.want:
+        possible = _possible(legs, request)
+        hint += f", or be content with `--want {accuracy_goals_text(possible)}`"
+    elif once > request.minutes:
+        hint += f", or fly {max(1, int(len(request.speeds) * request.minutes / once))} of the {len(request.speeds)} speeds"
+    raise UsageError(
+        f"the plan takes {total:.1f} minutes, more than the {request.minutes:g} there are"
+        + (f", for the wish {accuracy_goals_text(request.want)}" if request.want else ""),
+        found=f"{len(legs)} legs, {sum(leg.passes for leg in legs)} passes, {once:.1f} minutes if each is flown once",
+        hint=hint,
+    )
+
+
+def _possible(legs: list[Leg], request: Request) -> dict[str, float]:
+    """Return the errors that the budget buys, the extra passes shared out to the leg that lacks most."""
+    budget = (request.minutes or 0.0) * 60.0 - sum(leg.duration_s for leg in legs if leg.purpose != "parameters")
+    legs = [leg for leg in legs if leg.purpose == "parameters"]
+    passes = [1] * len(legs)
+
+    def lack(i: int) -> float:
+        leg = legs[i]
+        grown = np.sqrt(leg.passes / passes[i])
+        return float(max((leg.expected[n].relative * grown / w for n, w in request.want.items()), default=0.0))
+
+    while True:
+        used_s = sum(p * leg.pass_s for p, leg in zip(passes, legs, strict=True))
+        worst = max(range(len(legs)), key=lack)
+        if passes[worst] >= legs[worst].passes or used_s + legs[worst].pass_s > budget:
+            break
+        passes[worst] += 1
+    grown = max(lack(i) for i in range(len(legs)))
+    return {n: w * max(grown, 1.0) for n, w in request.want.items()}

@@ -1,0 +1,1 @@
+"""Maneuvers that tell rival models apart."""

@@ -1,0 +1,270 @@
+"""The maneuver that decides between rival models: the one whose refitted predictions stay furthest apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import pick_maneuver
+from fieldsid.models.model import Model
+from fieldsid.planning.design.optimise import moves_of
+from fieldsid.planning.discriminate.t_optimality import MAX_REFIT_ITERATIONS, Rival, log_odds, rival_of
+from fieldsid.planning.flight.closed_loop import Response
+from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_all
+from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
+from fieldsid.planning.safety.envelope import Envelope, excursion_of, used
+
+DEFAULT_WINDOW_S = 60.0
+MOST_LOG_ODDS = 300.0
+CANDIDATES_TUNED = 3
+FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
+DECISIVE_LOG_ODDS = float(np.log(20.0))
+"""Log odds above which a pair counts as discriminated."""
+
+
+@dataclass(frozen=True, slots=True)
+class Separation:
+    """The maneuver that decides: its parameters, speed (m/s), the log odds it is expected to give for the right one.
+
+    `expected_log_odds` is that of the pair and direction it separates least; `pairs` holds all, keyed "right>wrong".
+    """
+
+    maneuver: str
+    parameters: Mapping[str, float]
+    speed: float
+    expected_log_odds: float
+    pairs: Mapping[str, float]
+    window: Window
+    alternatives: Mapping[str, float]
+
+    @property
+    def candidate(self) -> Excitation:
+        """The maneuver as a candidate of a plan."""
+        return Excitation(self.maneuver, self.parameters)
+
+    @property
+    def decides(self) -> bool:
+        """Whether every pair is expected to be discriminated at odds of 20 to 1 or better."""
+        return self.expected_log_odds >= DECISIVE_LOG_ODDS
+
+    def plain(self) -> dict[str, Any]:
+        """Return the separation as a mapping for JSON and YAML."""
+        return {
+            "maneuver": self.maneuver,
+            "spec": self.candidate.spec,
+            "parameters": dict(self.parameters),
+            "speed_m_s": self.speed,
+            "duration_s": self.window.length,
+            "expected_log_odds": self.expected_log_odds,
+            "expected_odds": float(np.exp(min(self.expected_log_odds, MOST_LOG_ODDS))),
+            "pairs": dict(self.pairs),
+            "decides": self.decides,
+            "alternatives": dict(self.alternatives),
+        }
+
+    def says(self) -> list[str]:
+        """Return what is expected, in sentences."""
+        lines = [f"`{self.candidate.spec}` at {self.speed:g} m/s tells them apart:"]
+        for key, value in self.pairs.items():
+            right, _, wrong = key.partition(">")
+            lines.append(f"  if it is {right}: odds {_odds(value)} against {wrong}")
+        if not self.decides:
+            lines.append("one pass is not enough for odds of 20 to 1: repeat it, or widen the envelope")
+        return lines
+
+
+@dataclass(frozen=True, slots=True)
+class _RivalFlights:
+    rivals: tuple[Rival, ...]
+    envelope: Envelope
+    window: Window
+    rounds: int
+    run_up: float
+
+    @property
+    def speed(self) -> float:
+        return self.rivals[0].scene.speed
+
+    def responses(self, candidate: Excitation) -> list[Response] | None:
+        """Return every rival's flight, None where one leaves the envelope."""
+        limits = self.envelope.limits
+        pilot = autopilot_of(self.rivals[0].scene.base, limits)
+        flights: list[Response] = []
+        for rival in self.rivals:
+            flights += flown_all([rival.scene], candidate, self.window, limits, pilot)
+        for rival, flight in zip(self.rivals, flights, strict=True):
+            far = excursion_of(rival.scene.axis, flight, self.speed, run_up=self.run_up).over(self.envelope)
+            if not np.isfinite(flight.angle).all() or used(far) > 1.0:
+                return None
+        return flights
+
+    def pairs(self, candidate: Excitation) -> dict[str, float]:
+        """Return the expected log odds of every ordered pair, empty where the envelope is left.
+
+        A model that is part of another cannot be shown to be the right one by fit alone: such pairs are left out.
+        """
+        flights = self.responses(candidate)
+        if flights is None:
+            return {}
+        found = {}
+        for (right, flight), (wrong, _) in permutations(zip(self.rivals, flights, strict=True), 2):
+            if not set(right.scene.model.effects) <= set(wrong.scene.model.effects):
+                found[f"{right.name}>{wrong.name}"] = log_odds(right, wrong, flight, self.rounds)
+        return found
+
+
+def separate(
+    models: Sequence[Model],
+    envelope: Envelope,
+    *,
+    speeds: Sequence[float],
+    rate_hz: float = 20.0,
+    window_s: float = DEFAULT_WINDOW_S,
+    run_up_s: float = 0.0,
+    candidates: Sequence[Excitation] | None = None,
+    fast: bool = False,
+) -> Separation:
+    """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
+
+    `fast`: at most 10 Hz, the maneuvers that the rivals' effects declare to be excited by, no tuning; the first that decides
+    clearly is taken. `candidates`: what to choose among, in place of the catalogue. Raises UsageError for fewer than two rivals,
+    rivals of different axes, or when no maneuver stays inside the envelope.
+    """
+    _check(models)
+    if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
+        raise UsageError("the two rivals are the same model", found="+".join(models[0].effects), hint="name two different ones")
+    best: Separation | None = None
+    for speed in speeds:
+        rivals = tuple(rival_of(operating_point(m, speed)) for m in models)
+        rate = min(rate_hz, FAST_HZ) if fast else rate_hz
+        rounds = FAST_ROUNDS if fast else MAX_REFIT_ITERATIONS
+        arena = _RivalFlights(rivals, envelope, Window(window_s, rate_hz=rate), rounds, run_up_s * speed)
+        found = _at_speed(arena, candidates, fast=fast)
+        if found is not None and fast:
+            found = replace(found, window=replace(found.window, rate_hz=rate_hz))
+        if found is not None and (best is None or found.expected_log_odds > best.expected_log_odds):
+            best = found
+    if best is None:
+        raise UsageError(
+            "no maneuver of the catalogue stays inside the envelope for every rival",
+            found=f"at {', '.join(f'{u:g}' for u in speeds)} m/s; "
+            + (", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()) or "no room"),
+            hint="widen the envelope" + (": `--max-heading none` lets circles in" if envelope.heading is not None else ""),
+        )
+    return best
+
+
+def as_flown(
+    found: Separation, models: Sequence[Model], envelope: Envelope, candidate: Excitation, run_up_s: float
+) -> Separation:
+    """Return what a separation is expected to show with another candidate, the one that is flown."""
+    rivals = tuple(rival_of(operating_point(m, found.speed)) for m in models)
+    arena = _RivalFlights(rivals, envelope, found.window, MAX_REFIT_ITERATIONS, run_up_s * found.speed)
+    pairs = arena.pairs(candidate)
+    return replace(
+        found, maneuver=candidate.maneuver, parameters=candidate.parameters, pairs=pairs,
+        expected_log_odds=min(pairs.values(), default=0.0),
+    )  # fmt: skip
+
+
+def _check(models: Sequence[Model]) -> None:
+    if len(models) < 2:
+        raise UsageError("one model has no rival", found=f"{len(models)} model", hint="name two: `--separate delay,servo_lag`")
+    if len({m.axis for m in models}) > 1:
+        raise UsageError("the rivals are of different axes", found=", ".join(m.axis.value for m in models), hint="plan one axis")
+
+
+def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, *, fast: bool) -> Separation | None:
+    scored = _scored(arena, candidate_maneuvers(arena.window, arena.envelope) if candidates is None else candidates, fast=fast)
+    if not scored:
+        return None
+    scored.sort(key=lambda s: -worth(s[1]))
+    tuned = scored if fast else [_tuned(arena, *s) for s in scored[:CANDIDATES_TUNED]]
+    candidate, pairs = max(tuned, key=lambda s: worth(s[1]))
+    window = _shortened(arena.window, arena.responses(candidate))
+    return Separation(
+        candidate.maneuver, candidate.parameters, arena.speed, min(pairs.values()), pairs, window,
+        {c.spec: min(p.values()) for c, p in scored[:5]},
+    )  # fmt: skip
+
+
+def _scored(
+    arena: _RivalFlights, candidates: Sequence[Excitation], *, fast: bool
+) -> list[tuple[Excitation, Mapping[str, float]]]:
+    """Return the candidates that stay inside the envelope, with the log odds of their pairs."""
+    named = {m for r in arena.rivals for e in r.scene.effects for m in e.excited_by}
+    scored: list[tuple[Excitation, Mapping[str, float]]] = []
+    for candidate in candidates:
+        if fast and named and candidate.maneuver not in named:
+            continue
+        if pairs := arena.pairs(candidate):
+            scored.append((candidate, pairs))
+            if fast and min(pairs.values()) > BEYOND_DOUBT:
+                break
+    return scored
+
+
+def worth(pairs: Mapping[str, float]) -> float:
+    """Return the utility of a maneuver: each pair counts until it is clearly discriminated, a little more after that.
+
+    A rival whose effect was fitted to almost zero equals the plain model, and no maneuver discriminates the two: such a pair must
+    not hide the others.
+    """
+    values = np.maximum(np.array(list(pairs.values())), 0.0)
+    more = np.log1p(values)
+    return float(np.mean(1.0 - np.exp(-values / DECISIVE_LOG_ODDS)) + 1e-3 * more.min() + 1e-5 * more.mean())
+
+
+def candidate_maneuvers(window: Window, envelope: Envelope) -> list[Excitation]:
+    """Return the maneuvers that are tried: the catalogue small, large, slow and fast, as far as the window allows."""
+    fin, room = envelope.fin, window.excitation
+    wanted: list[tuple[str, dict[str, float]]] = [
+        ("stairs", {"amplitude": fin, "lowest": 0.12 * fin, "steps": 5, "hold": room / 10.5}),
+        ("stairs", {"amplitude": 0.5 * fin, "lowest": 0.06 * fin, "steps": 6, "hold": room / 12.5}),
+        ("square_pulses", {"amplitude": fin, "second": 0.3 * fin, "width": room / 7.0, "recovery": room / 3.5}),
+        ("square_pulses", {"amplitude": fin, "second": 0.5 * fin, "width": 2.0, "recovery": min(13.0, room / 3)}),
+        ("three_two_one_one", {"amplitude": fin, "unit": room / 14.5, "repeats": 2}),
+        ("prbs", {"amplitude": fin, "bit": 0.5, "order": 7, "duration": room}),
+        ("prbs", {"amplitude": 0.3 * fin, "bit": 0.8, "order": 6, "duration": room}),
+        ("chirp", {"amplitude": fin, "low_hz": 0.05, "high_hz": 1.5, "duration": room}),
+        ("multisine", {"amplitude": fin, "low_hz": 0.05, "high_hz": 1.0, "period": room}),
+        ("zigzag", {"amplitude": fin, "turn": 0.35, "reversals": 6, "duration": room}),
+        ("zigzag", {"amplitude": fin, "turn": 1.2, "reversals": 4, "duration": room}),
+        ("turning_circle", {"amplitude": fin, "turn": 4 * np.pi, "pull_out": 5.0, "duration": room}),
+        ("turning_circle", {"amplitude": 0.5 * fin, "turn": 4 * np.pi, "pull_out": 5.0, "duration": room}),
+    ]
+    made = [Excitation(name, pick_maneuver(name).checked(values)) for name, values in wanted]
+    return [c for c in made if fits(c, window)]
+
+
+def _tuned(arena: _RivalFlights, candidate: Excitation, pairs: Mapping[str, float]) -> tuple[Excitation, Mapping[str, float]]:
+    """Return the candidate improved along each of its parameters in turn."""
+    for parameter in candidate.record.parameters:
+        if not parameter.tuned:
+            continue
+        for value in moves_of(parameter, candidate.parameters[parameter.name], arena.envelope.fin):
+            trial = candidate.with_(**{parameter.name: value})
+            found = arena.pairs(trial) if fits(trial, arena.window) else {}
+            if found and worth(found) > worth(pairs):
+                candidate, pairs = trial, found
+                break
+    return candidate, pairs
+
+
+def _shortened(window: Window, flights: Sequence[Response] | None) -> Window:
+    """Return the window cut to the longest flight: a rule may be over before its time."""
+    if not flights:
+        return window
+    longest = max(float(f.time[-1]) for f in flights)
+    return replace(window, length=max(min(window.length, longest), window.lead + window.recover + 2.0))
+
+
+def _odds(log: float) -> str:
+    if log >= np.log(1e6):
+        return "over a million to 1"
+    return f"{np.exp(log):.3g} to 1"

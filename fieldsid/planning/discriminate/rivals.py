@@ -1,0 +1,121 @@
+"""The rivals of a separation: effects by name on a prior, or the leading candidates of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid.artifacts import load_record
+from fieldsid.effects import pick_effect, refuse_clash
+from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.logs.wrong_file import unless_log
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Coefficient, definitions_of, effect_held
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+
+KIND = "fieldsid/diagnosis"
+PLAIN = "none"
+LEAST_PROBABILITY, MOST_RIVALS = 0.02, 4
+
+
+def rivals_named(model: Model, names: Sequence[str]) -> tuple[Model, ...]:
+    """Return the model with each rival added: effects joined by `+`, or `none` for the model as it is.
+
+    Coefficients not in the model take a typical value. Raises UsageError for an unknown effect, one that is not of
+    the axis, or fewer than two rivals.
+    """
+    distinct = tuple(dict.fromkeys(names))
+    if len(distinct) < 2:
+        raise UsageError(
+            "two rivals are needed", found=", ".join(names) or "none", hint="name them: `--separate delay,servo_lag`"
+        )
+    return tuple(_with(model, _effects(name)) for name in distinct)
+
+
+def typical(coefficient: Coefficient) -> float:
+    """Return a coefficient's typical value: the middle one of its scan (the upper of two), else its start."""
+    return sorted(coefficient.scan)[len(coefficient.scan) // 2] if coefficient.scan else coefficient.start
+
+
+def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
+    """Return the rivals of a diagnosis file: those named, else its leading candidates.
+
+    Raises ArtifactError when the file is not a complete diagnosis, UsageError when fewer than two rivals are left.
+    """
+    with unless_log(path, "a diagnosis"):
+        body = load_record(path, KIND)
+    try:
+        axis = Axis(body["axis"])
+        candidates = sorted(body["candidates"], key=lambda c: -float(c["probability"]))
+        wanted = [c for c in candidates if c["effect"] in names] if names else _leading(candidates)
+        models = tuple(_of_candidate(axis, c, body) for c in wanted)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ArtifactError(
+            f"`{path}` is not a complete diagnosis", found=f"{type(error).__name__}: {error}", hint="diagnose again, with `-o`"
+        ) from error
+    if len(models) < 2:
+        known = ", ".join(str(c["effect"]) for c in candidates)
+        hint = "name two of them with `--separate A,B`"
+        raise UsageError("the diagnosis leaves no rivals to tell apart", found=known, hint=hint)
+    return models
+
+
+def _leading(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    likely = [c for c in candidates if float(c["probability"]) >= LEAST_PROBABILITY]
+    return (likely if len(likely) >= 2 else list(candidates[:2]))[:MOST_RIVALS]
+
+
+def _of_candidate(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, Any]) -> Model:
+    effects = (*map(str, body.get("known", ())), *_effects(str(candidate["effect"])))
+    given = {str(k): _value(v) for k, v in candidate["parameters"].items()}
+    floor = body["noise_floor"]
+    law = body.get("speed_law", {})
+    coefficients = {c.name: typical(c) for e in effects for c in pick_effect(e).shared}
+    names = NAMES[axis]
+    missing = [n for n in names.base if n not in given]
+    if missing:
+        raise KeyError(f"{candidate['effect']}: {missing[0]}")
+    return Model(
+        axis=axis,
+        effects=effects,
+        values=coefficients | given,
+        units={},
+        free=(),
+        covariance=np.zeros((0, 0)),
+        law=SpeedLaw(float(law.get("reference_m_s") or body.get("speed_m_s") or np.nan), trim_of_fin=TRIM_OF_FIN[axis]),
+        noise=Noise(float(floor["angle_rad"]), float(floor["rate_rad_s"])),
+        method="diagnosis",
+    )
+
+
+def _value(item: Any) -> float:
+    return float(item["value"]) if isinstance(item, Mapping) else float(item)
+
+
+def _effects(name: str) -> tuple[str, ...]:
+    return () if name == PLAIN else tuple(part.strip() for part in name.split("+"))
+
+
+def _with(model: Model, effects: tuple[str, ...]) -> Model:
+    held = {name: effect_held(name, model.own) for name in model.effects}
+    added = {name: pick_effect(name) for name in effects if name not in held}
+    for name, effect in added.items():
+        refuse_clash(effect, held.values())
+        if model.axis not in effect.axes:
+            raise UsageError(
+                f"effect `{name}` does not act on the {model.axis.value} axis",
+                found=", ".join(a.value for a in effect.axes),
+                hint=f"use `--axis {effect.axes[0].value}`",
+            )
+    values = {c.name: typical(c) for e in added.values() for c in e.shared}
+    return replace(
+        model,
+        effects=(*model.effects, *added),
+        values={**values, **model.values},
+        own={**model.own, **definitions_of(added.values())},
+    )

@@ -1,0 +1,97 @@
+"""A plan of the maneuvers that tell rivals apart, one at every speed, laid into run-up and window like any other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import parse_spec
+from fieldsid.models.model import Model
+from fieldsid.planning.belief.prior_model import checked_prior
+from fieldsid.planning.design.best_leg import Setting, enforce_chance_constraint, enforce_envelope, ensemble_at, leg_of
+from fieldsid.planning.design.circle_legs import circle_legs
+from fieldsid.planning.design.leg import Leg
+from fieldsid.planning.design.objective import make_objective
+from fieldsid.planning.design.plan import SHORTEST_WINDOW_S, Plan, Request, check_budget, check_minutes, setting_at
+from fieldsid.planning.discriminate.discriminate import FAST_HZ, Separation, as_flown, candidate_maneuvers, separate, worth
+from fieldsid.planning.flight.excitation import Excitation
+from fieldsid.planning.safety.envelope import check_room, check_speeds
+
+COARSE_DRAWS = 60
+"""Draws of the prior that each maneuver of the catalogue is first lowered by; the one that is flown is kept inside by many."""
+LONGEST_WINDOW_S = 60.0
+"""Length of the window unless another is requested: slow differences discriminate rivals as well."""
+
+
+def separating_plan(
+    rivals: Sequence[Model], request: Request, step: Callable[[], None] = lambda: None
+) -> tuple[Plan, tuple[Separation, ...]]:
+    """Return the plan that tells rivals apart, one leg at every speed, and what each is expected to show.
+
+    `step` is called as each leg is found; with `request.radius` circles follow. Raises UsageError when nothing stays inside
+    the envelope or the legs take longer than there is time, ModelError for a rival that is unstable.
+    """
+    check_speeds(request.speeds, request.slowest, request.fastest)
+    check_budget(request)
+    check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
+    for rival in rivals:
+        checked_prior(rival, rivals[0].axis, request.speeds)
+    legs, found = [], []
+    for speed in request.speeds:
+        leg, separation = _leg_at(rivals, request, speed)
+        legs.append(leg)
+        found.append(separation)
+        step()
+    if request.radius:
+        legs += circle_legs(setting_at(rivals[0], request, max(request.speeds)), request.speeds)
+    check_minutes(legs, request)
+    plan = Plan(
+        rivals[0].axis, request.vehicle, rivals[0].method, request.envelope, tuple(legs), {}, request.seed, request.course
+    )  # fmt: skip
+    return plan, tuple(found)
+
+
+def _leg_at(rivals: Sequence[Model], request: Request, speed: float) -> tuple[Leg, Separation]:
+    """Return the leg of one speed: the maneuver that tells most at the angles at which draws of the prior keep inside."""
+    envelope, setting = request.envelope, setting_at(rivals[0], request, speed)
+    roughly = _EnvelopeCache(
+        replace(setting, window=replace(setting.window, rate_hz=min(setting.window.rate_hz, FAST_HZ))), speed
+    )
+    few = roughly.crowd.first(COARSE_DRAWS)
+    tried = [c for c in candidate_maneuvers(setting.window, envelope) if c.record.rule is None or not request.open_loop]
+    inside = [enforce_envelope(roughly.judge, roughly.setting, few, c) for c in tried]
+    found = separate(
+        rivals, envelope, speeds=(speed,), rate_hz=setting.window.rate_hz, window_s=setting.window.length,
+        run_up_s=request.run_up_s, candidates=[c for c in inside if c is not None],
+    )  # fmt: skip
+    known = _EnvelopeCache(replace(setting, window=found.window), speed)
+    first = [Excitation(m.name, p) for m, p in (parse_spec(spec) for spec in list(found.alternatives)[:1])]
+    flyable = [c for c in map(known.inside, (found.candidate, *first)) if c is not None]
+    ways = [as_flown(found, rivals, envelope, c, request.run_up_s) for c in flyable]
+    best = max((w for w in ways if w.pairs), key=lambda w: worth(w.pairs), default=found)
+    names = ", ".join("+".join(r.effects) or "none" for r in rivals)
+    leg = leg_of(known.judge, known.setting, best.candidate, known.crowd, purpose=f"separate {names}")
+    if leg.break_probability > envelope.share:
+        raise UsageError(
+            f"`{best.candidate.spec}` would leave the envelope {leg.break_probability:.0%} of the time at {speed:g} m/s",
+            found=", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()),
+            hint=f"accept it with `--risk {leg.break_probability:.2g}`, or widen the envelope",
+        )
+    if not leg.flown_from_list_in(envelope):
+        return _leg_at(rivals, replace(request, open_loop=True), speed)
+    return leg, best
+
+
+class _EnvelopeCache:
+    """The envelope check of excitations at one speed, over many draws of the prior."""
+
+    def __init__(self, setting: Setting, speed: float) -> None:
+        self.setting = setting
+        self.judge = make_objective(setting.model, speed, setting.envelope, setting.window, {}, setting.run_up_s)
+        self.crowd = ensemble_at(self.judge, setting)
+
+    def inside(self, candidate: Excitation) -> Excitation | None:
+        """Return a candidate at the angles at which it is kept inside, None where there are none."""
+        lowered = enforce_envelope(self.judge, self.setting, self.crowd, candidate)
+        return None if lowered is None else enforce_chance_constraint(self.judge, self.setting, self.crowd, lowered)

@@ -1,0 +1,1 @@
+"""Simulated flights: operating point, closed loop, maneuvers by rule."""

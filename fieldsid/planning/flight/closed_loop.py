@@ -1,0 +1,139 @@
+"""Closed-loop flight of a model: the exact core stepped sample by sample, the autopilot where the command is NaN."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
+from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
+from fieldsid.maneuvers import Autopilot, Limits
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
+from fieldsid.planning.flight.operating_point import OperatingPoint
+
+ACTUATOR_ROUNDS = 4
+"""Times the fin's own path is put back into the loop; each round removes what the one before left of its error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """One flight about straight and level: time (n,) s, fin command about trim rad, angle rad, rate rad/s (n,)."""
+
+    time: FloatArray
+    command: FloatArray
+    angle: FloatArray
+    rate: FloatArray
+
+
+@jit
+def closed_loop(
+    steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, asked: FloatArray, off: FloatArray,
+    push: FloatArray, gains: FloatArray, limits: FloatArray, command: FloatArray, out: FloatArray,
+) -> None:  # fmt: skip
+    """Fill command (n,) and out (n, 3): angle, rate, cross state from rest.
+
+    asked (n,): fin about trim, NaN where the autopilot steers. off (n-1, 2): fin angle minus command at both ends of each
+    interval. push (n-1, 3): moment per rad at start and end, input of the cross state per rad. gains (3,): angle, rate, fin limit
+    of the autopilot. limits (4,): low, high, rate, trim fin.
+    """
+    n = asked.shape[0]
+    state = np.zeros(3)
+    pair = np.zeros((2, 3))
+    last = 0.0
+    out[0, 0], out[0, 1], out[0, 2] = 0.0, 0.0, 0.0
+    for i in range(n):
+        fin = asked[i]
+        if np.isnan(fin):
+            short = (state[0] + np.pi) % (2.0 * np.pi) - np.pi
+            fin = -(gains[0] * short + gains[1] * state[1])
+            fin = min(max(fin, -gains[2]), gains[2])
+        reach = limits[2] * steps[min(i, n - 2)]
+        fin = min(max(fin, last - reach), last + reach)
+        fin = min(max(fin, limits[0]), limits[1])
+        command[i] = fin
+        last = fin
+        if i == n - 1:
+            break
+        start, end = limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1]
+        drive[i, 2] += push[i, 0] * start
+        drive[i, 3] += push[i, 1] * end
+        drive[i, 5] += push[i, 2] * 0.5 * (start + end)
+        nonlinear_motion(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
+        # Number by number: an array put into another compiles its own error message, two seconds of it.
+        for l in range(3):
+            state[l] = pair[1, l]
+            out[i + 1, l] = pair[1, l]
+
+
+def respond(
+    scene: OperatingPoint,
+    asked: FloatArray,
+    rate_hz: float,
+    limits: Limits,
+    autopilot: Autopilot,
+    moment: FloatArray | None = None,
+) -> Response:
+    """Return the flight of a scene under a command about trim, (n,) rad with NaN where the autopilot steers.
+
+    moment (n,) rad/s^2 is a disturbance. Actuator effects act on the whole command path, so their part is put
+    back by a few rounds of correction.
+    """
+    ready = prepared(scene, asked.size, rate_hz)
+    n = asked.size
+    moving = any(e.fin is not None for e in scene.effects)
+    off = np.zeros((n - 1, 2))
+    command, out = np.zeros(n), np.zeros((n, 3))
+    gains = np.array([autopilot.angle_gain, autopilot.rate_gain, autopilot.fin])
+    trim = scene.trim_fin
+    bounds = np.array([min(-limits.fin - trim, 0.0), max(limits.fin - trim, 0.0), limits.fin_rate, trim])
+    clean = ready.drive.copy()
+    if moment is not None:
+        clean[:, 2] += moment[:-1]
+        clean[:, 3] += moment[1:]
+    for _ in range(ACTUATOR_ROUNDS if moving else 1):
+        drive = clean.copy() if moving else clean
+        closed_loop(ready.steps, drive, ready.constants, ready.pieces, asked, off, ready.push, gains, bounds, command, out)
+        if moving:
+            off = fin_offset(scene, ready.time, command)
+    return Response(ready.time, command, out[:, 0], out[:, 1])
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """What the loop needs of a scene and never changes: the core's arrays without fin, and the fin's push."""
+
+    time: FloatArray
+    steps: FloatArray
+    drive: FloatArray
+    constants: FloatArray
+    pieces: int
+    push: FloatArray
+
+
+@lru_cache(maxsize=16)
+def prepared(scene: OperatingPoint, count: int, rate_hz: float) -> Prepared:
+    """Return the arrays of a scene over `count` samples."""
+    time = np.arange(count) / rate_hz
+    idle = scene.record(time, np.zeros(count))
+    arrays = assemble(idle, scene.effects, replace(scene.base, authority=0.0), scene.values, scene.scale)
+    arrays.drive[:, 5] = 0.0
+    return Prepared(time, idle.steps, arrays.drive, arrays.constants, arrays.pieces, fin_push(scene, arrays))
+
+
+def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
+    """Return what a rad of fin adds to the drives: moments at both ends of an interval, and the cross push, (n-1, 3)."""
+    n = arrays.drive.shape[0] + 1
+    factor = np.ones(n) if arrays.terms.authority_factor is None else arrays.terms.authority_factor
+    cross = sum(e.core(scene.values, scene.scale).cross_fin for e in scene.effects if e.core is not None)
+    b = scene.base.authority
+    return np.column_stack([b * factor[:-1], b * factor[1:], np.full(n - 1, cross)])
+
+
+def fin_offset(scene: OperatingPoint, time: FloatArray, command: FloatArray) -> FloatArray:
+    """Return the fin's angle less its command (n,) about trim at both ends of every interval, (n-1, 2)."""
+    held = command[:-1] + scene.trim_fin
+    real = fin_path(scene.record(time, command + scene.trim_fin), scene.effects, scene.values)
+    return np.column_stack([real.start - held, real.end - held])

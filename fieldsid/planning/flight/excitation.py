@@ -1,0 +1,123 @@
+"""A candidate: a maneuver with its parameters, and how it is laid into a window of run-up, excitation and recovery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import Autopilot, Limits, Maneuver, Schedule, pick_maneuver, spec_of
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.flight.closed_loop import Response, respond
+from fieldsid.planning.flight.operating_point import OperatingPoint
+from fieldsid.planning.flight.rule_flight import fly_operating_points
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """The part of a leg that is identified on: `lead` s steady, the excitation, at least `recover` s; `length` s in all."""
+
+    length: float = 33.0
+    lead: float = 2.0
+    recover: float = 5.0
+    rate_hz: float = 20.0
+
+    @property
+    def excitation(self) -> float:
+        """Seconds there are for the excitation."""
+        return self.length - self.lead - self.recover
+
+    @property
+    def time(self) -> FloatArray:
+        """Sample times (n,) in s from the window's start."""
+        return np.arange(round(self.length * self.rate_hz) + 1) / self.rate_hz
+
+    def __post_init__(self) -> None:
+        if not (0.1 <= self.rate_hz <= 1000.0):
+            raise UsageError(
+                f"a command rate of {self.rate_hz:g} Hz cannot be right",
+                found=f"--rate {self.rate_hz:g}",
+                hint="for example `--rate 20`",
+            )
+        if self.excitation < 2.0:
+            raise UsageError(
+                f"a window of {self.length:g} s leaves {max(self.excitation, 0.0):g} s for the excitation",
+                found=f"{self.lead:g} s before it and {self.recover:g} s after it",
+                hint=f"give `--window {self.lead + self.recover + 10:g}` or more",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """A maneuver by name with all its parameters."""
+
+    maneuver: str
+    parameters: Mapping[str, float]
+
+    @property
+    def record(self) -> Maneuver:
+        """The maneuver's own record."""
+        return pick_maneuver(self.maneuver)
+
+    @property
+    def spec(self) -> str:
+        """The text that `maneuvers.parse_spec` reads back."""
+        return spec_of(self.record, self.parameters)
+
+    @property
+    def duration(self) -> float:
+        """Seconds of excitation, for a rule at most."""
+        return self.record.duration(self.parameters)
+
+    def with_(self, **changes: float) -> Excitation:
+        """Return the candidate with some parameters changed; raises UsageError when they are out of bounds."""
+        return replace(self, parameters=self.record.checked({**self.parameters, **changes}))
+
+    def stretched(self, factor: float) -> Excitation:
+        """Return the candidate with every time it may choose multiplied by a factor, frequencies divided, inside their bounds."""
+        powers = {"s": factor, "Hz": 1.0 / factor}
+        moved = {
+            p.name: float(np.clip(self.parameters[p.name] * powers[p.unit], p.low, p.high))
+            for p in self.record.parameters
+            if p.tuned and p.unit in powers
+        }
+        return self.with_(**moved)
+
+
+def asked_of(candidate: Excitation, window: Window) -> FloatArray:
+    """Return the command an open-loop candidate asks for over a window, (n,) rad about trim, NaN for the autopilot."""
+    time = window.time
+    command = candidate.record.command
+    if command is None:
+        raise UsageError(f"maneuver `{candidate.maneuver}` follows the motion: it has no command of its own")
+    asked = command(candidate.parameters, time - window.lead)
+    steered = (time < window.lead - 1e-9) | (time >= window.length - window.recover - 1e-9)
+    return np.where(steered, np.nan, asked)
+
+
+def flown(scene: OperatingPoint, candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot) -> Response:
+    """Return a candidate flown on one scene over a window."""
+    return flown_all([scene], candidate, window, limits, autopilot)[0]
+
+
+def flown_all(
+    scenes: Sequence[OperatingPoint], candidate: Excitation, window: Window, limits: Limits, autopilot: Autopilot
+) -> list[Response]:
+    """Return a candidate flown on several scenes, one response each."""
+    if candidate.record.rule is None:
+        asked = asked_of(candidate, window)
+        return [respond(s, asked, window.rate_hz, limits, autopilot) for s in scenes]
+    schedule = Schedule(window.rate_hz, window.lead, window.recover)
+    flight = fly_operating_points(
+        scenes, candidate.record, candidate.parameters, limits=limits, autopilot=autopilot, schedule=schedule
+    )
+    n = min(flight.time.size, window.time.size)
+    columns = [flight.fin, flight.angle, flight.rate]
+    return [Response(flight.time[:n], *(c[:n, i].copy() for c in columns)) for i in range(len(scenes))]
+
+
+def fits(candidate: Excitation, window: Window) -> bool:
+    """Whether an open-loop candidate ends before the recovery begins, or may be cut there without harm."""
+    return candidate.record.rule is not None or candidate.duration <= window.excitation + 1e-6

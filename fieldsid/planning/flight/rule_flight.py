@@ -1,0 +1,122 @@
+"""Fly a maneuver that is a rule on the motion, on many scenes at once: the exact core stepped by `maneuvers.fly`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.dynamics import integrate
+from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
+from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
+from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, prepared
+from fieldsid.planning.flight.operating_point import OperatingPoint
+
+
+@jit
+def advance_all(
+    step: float, drive: FloatArray, c: FloatArray, pieces: int, push: FloatArray, start: FloatArray, end: FloatArray,
+    state: FloatArray,
+) -> None:  # fmt: skip
+    """Move states (m, 3) on by one interval: drive (m, 8) before the fin, push (m, 3), fin angles at both ends (m,)."""
+    steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[1]))
+    for i in range(state.shape[0]):
+        for j in range(drive.shape[1]):
+            now[0, j] = drive[i, j]
+        now[0, 2] += push[i, 0] * start[i]
+        now[0, 3] += push[i, 1] * end[i]
+        now[0, 5] += push[i, 2] * 0.5 * (start[i] + end[i])
+        nonlinear_motion(steps, now, c[i], state[i], pieces, pair)
+        for j in range(3):
+            state[i, j] = pair[1, j]
+
+
+@dataclass(slots=True)
+class OperatingPointPlant:
+    """Scenes as the plant of `maneuvers.fly`; `off` (m, n-1, 2) is each fin's angle less its command about trim."""
+
+    drive: FloatArray
+    constants: FloatArray
+    pieces: int
+    push: FloatArray
+    trim: FloatArray
+    off: FloatArray
+    state: FloatArray
+    at: int = 0
+
+    @property
+    def size(self) -> int:
+        """How many scenes there are."""
+        return int(self.trim.size)
+
+    def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+        """Hold the fins (m,) about trim for `step` s; return angles and rates (m,)."""
+        i = min(self.at, self.drive.shape[1] - 1)
+        start, end = self.trim + fin + self.off[:, i, 0], self.trim + fin + self.off[:, i, 1]
+        advance_all(step, self.drive[:, i], self.constants, self.pieces, self.push[:, i], start, end, self.state)
+        self.at += 1
+        return self.state[:, 0].copy(), self.state[:, 1].copy()
+
+    def first(self, count: int) -> OperatingPointPlant:
+        """Return the first scenes only, at rest."""
+        part = slice(0, count)
+        return OperatingPointPlant(
+            self.drive[part], self.constants[part], self.pieces, self.push[part], self.trim[part], self.off[part],
+            np.zeros((count, 3)),
+        )  # fmt: skip
+
+    def again(self, off: FloatArray) -> OperatingPointPlant:
+        """Return the plant at rest at its start, with other fin offsets."""
+        return replace(self, off=off, state=np.zeros((self.size, 3)), at=0)
+
+
+def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: FloatArray | None) -> OperatingPointPlant:
+    """Return scenes at rest as one plant over n samples; moments (m, n) rad/s^2 disturb them."""
+    count = len(scenes)
+    drive, push = np.empty((count, n - 1, len(integrate.DRIVES))), np.empty((count, n - 1, 3))
+    constants = np.empty((count, len(integrate.CONSTANTS)))
+    pieces = 1
+    for i, scene in enumerate(scenes):
+        ready = prepared(scene, n, rate_hz)
+        drive[i], constants[i], push[i] = ready.drive, ready.constants, ready.push
+        pieces = max(pieces, ready.pieces)
+    if moments is not None:
+        drive[:, :, 2] += moments[:, :-1]
+        drive[:, :, 3] += moments[:, 1:]
+    trim = np.array([s.trim_fin for s in scenes])
+    return OperatingPointPlant(drive, constants, pieces, push, trim, np.zeros((count, n - 1, 2)), np.zeros((count, 3)))
+
+
+def fly_operating_points(
+    scenes: Sequence[OperatingPoint],
+    maneuver: Maneuver,
+    parameters: Parameters,
+    *,
+    limits: Limits,
+    autopilot: Autopilot,
+    schedule: Schedule,
+    moments: FloatArray | None = None,
+) -> Flight:
+    """Return a maneuver flown on scenes from straight and level, actuator effects included; moments (m, k) rad/s^2."""
+    longest = schedule.run_up + maneuver.duration(parameters) + schedule.recover
+    time = np.arange(round(longest * schedule.rate_hz) + 2) / schedule.rate_hz
+    if moments is not None:
+        moments = np.pad(moments, ((0, 0), (0, max(0, time.size - moments.shape[1]))), mode="edge")[:, : time.size]
+    plant = plant_of(scenes, time.size, schedule.rate_hz, moments)
+    moving = any(e.fin is not None for s in scenes for e in s.effects)
+    off = plant.off
+    for _ in range(ACTUATOR_ROUNDS if moving else 1):
+        flight = fly(maneuver, parameters, plant.again(off), limits=limits, autopilot=autopilot, schedule=schedule)
+        if moving:
+            off = np.stack([_offset(s, time, flight.fin[:, i]) for i, s in enumerate(scenes)])
+    return flight
+
+
+def _offset(scene: OperatingPoint, time: FloatArray, command: FloatArray) -> FloatArray:
+    """Return the fin's angle less its command over every interval, zero after the flight's end, (n-1, 2)."""
+    off = np.zeros((time.size - 1, 2))
+    off[: command.size - 1] = fin_offset(scene, time[: command.size], command)
+    return off

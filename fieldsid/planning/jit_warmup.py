@@ -1,0 +1,25 @@
+"""The compile warm-up of planning; what a fit needs too is compiled by fitting/jit_warmup.py at the same time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.dynamics import integrate
+from fieldsid.dynamics.linear_kernel import linear_sensitivities
+from fieldsid.noise.kalman.disturbance import disturbance_filter
+from fieldsid.planning.flight.closed_loop import closed_loop
+from fieldsid.planning.flight.rule_flight import OperatingPointPlant
+
+SHARED_KERNELS = (linear_sensitivities, disturbance_filter)
+"""What planning calls of what every fit needs."""
+SCENES, SAMPLES = 2, 3
+"""More than one of each, so that what is handed over lies in memory as it does when planning."""
+
+
+def compile_planning() -> None:
+    """Call once, on vehicles that do not move, what planning calls thousands of times."""
+    m, n, steps, zero = SCENES, SAMPLES, np.full(SAMPLES - 1, 0.05), np.zeros
+    drive, c = zero((m, n - 1, len(integrate.DRIVES))), zero((m, len(integrate.CONSTANTS)))
+    push, off = zero((m, n - 1, 3)), zero((m, n - 1, 2))
+    closed_loop(steps, drive[0].copy(), c[0], 1, zero(n), off[0], push[0], zero(3), zero(4), zero(n), zero((n, 3)))
+    OperatingPointPlant(drive, c, 1, push, zero(m), off, zero((m, 3))).advance(zero(m), 0.05)

@@ -1,0 +1,1 @@
+"""What is written of a plan: the file, commands, missions, figure data."""

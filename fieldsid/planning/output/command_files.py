@@ -1,0 +1,107 @@
+"""The files written with a plan: fin commands as CSV and as a bag, and mission snippets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from fieldsid.artifacts import plain, write_text
+from fieldsid.errors import UsageError
+from fieldsid.logs.readers.bags.ros2_commands import write_commands
+from fieldsid.models.axis import NAMES
+from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.design.leg import Leg, commands_of
+from fieldsid.planning.design.plan import Plan
+from fieldsid.planning.output.mission import instead, refuse_blind, render, styles
+from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
+from fieldsid.registry import near
+
+TABLE, BAG = "csv", "ros2"
+
+
+def formats() -> tuple[str, ...]:
+    """Return the names of what can be written: the table, the bag, and the stem of every mission style."""
+    return (TABLE, BAG, *sorted({_family(s) for s in styles()}))
+
+
+def write_all(plan: Plan, folder: Path, wanted: Sequence[str] = (), *, force: bool = False) -> list[Path]:
+    """Write every leg in the requested formats (all when empty) and return the files.
+
+    A leg that follows a rule on the motion is written as the list of fins it is expected to command, where that stays inside the
+    envelope open loop; else it is left out, or refused where a format was named. Raises UsageError for that and for an unknown
+    format, ArtifactError where a file exists or cannot be written.
+    """
+    check_formats(wanted)
+    chosen = tuple(wanted) or formats()
+    stems = [(leg, folder / _stem(i, leg)) for i, leg in enumerate(plan.legs, 1)]
+    if wanted:
+        for leg in plan.legs:
+            refuse_blind(plan, leg)
+    listed = [(leg, stem) for leg, stem in stems if leg.flown_from_list_in(plan.envelope)]
+    return [p for leg, stem in listed for p in _leg_files(plan, leg, stem, chosen, force=force)]
+
+
+def unwritten(plan: Plan) -> list[str]:
+    """Return what to say of the legs that no list of fins was written for."""
+    out = []
+    for i, leg in enumerate(plan.legs, 1):
+        if not leg.flown_from_list_in(plan.envelope):
+            out.append(
+                f"no commands were written for leg {i}: {leg.candidate.maneuver} at {leg.speed:g} m/s follows the motion, and "
+                f"its expected fins flown blind leave the envelope {leg.replay_risk:.0%} of the time; {instead(leg)}"
+            )
+    return out
+
+
+def check_formats(wanted: Sequence[str]) -> None:
+    """Raise UsageError for a name that is no format."""
+    known = formats()
+    for name in wanted:
+        if name not in known:
+            raise UsageError(f"there is no format {name!r} for commands", found=", ".join(known), hint=near(name, known))
+
+
+def table_text(plan: Plan, leg: Leg) -> str:
+    """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), and 1 while it does."""
+    time, fin, steered = commands_of(leg, plan.envelope)
+    head = f"time_s,{NAMES[plan.axis].fin},autopilot"
+    rows = [f"{t:.6g},{f:.6g},{s:.0f}" for t, f, s in zip(time.tolist(), fin.tolist(), steered.tolist(), strict=True)]
+    return "\n".join([head, *rows]) + "\n"
+
+
+def _leg_files(plan: Plan, leg: Leg, stem: Path, chosen: Sequence[str], *, force: bool) -> list[Path]:
+    made = []
+    if TABLE in chosen:
+        made.append(write_text(stem.with_name(f"{stem.name}.csv"), table_text(plan, leg), force=force))
+    if BAG in chosen:
+        topic = f"/{NAMES[plan.axis].fin.removesuffix('_rad')}_command"
+        bag = stem.with_name(f"{stem.name}_bag")
+        text = conditions_text(plan, leg)
+        made.append(write_commands(bag, *commands_of(leg, plan.envelope), topic=topic, conditions=text, force=force))
+    missions = [s for s in styles() if _family(s) in chosen]
+    made += [write_text(stem.with_name(f"{stem.name}_{s}"), render(plan, leg, s), force=force) for s in missions]
+    return made
+
+
+def conditions_text(plan: Plan, leg: Leg) -> str:
+    """Return what whoever plays a bag must watch, as JSON: the abort conditions, the fin's limits, and what has no limit."""
+    limits = leg.envelope_in(plan.envelope)
+    body = {
+        "schema": "fieldsid/abort/1",
+        "fin_max_rad": limits.fin,
+        "fin_rate_max_rad_s": limits.fin_rate,
+        "abort": [asdict(a) for a in aborts_of(leg, plan.envelope)],
+        "not_limited": [name for name, words in limits_said(limits).items() if words == NOT_LIMITED],
+    }
+    return json.dumps(plain(body), allow_nan=False)
+
+
+def _family(style: str) -> str:
+    """Return `moos` for `moos_timer_script.moos`."""
+    return style.partition(".")[0].partition("_")[0]
+
+
+def _stem(number: int, leg: Leg) -> str:
+    return f"leg{number:02d}_{leg.candidate.maneuver}_{leg.speed:.2f}m_s"

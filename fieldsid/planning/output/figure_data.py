@@ -1,0 +1,62 @@
+"""What the figure of a leg shows: the command, the predicted response with its band, the envelope, the track."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.design.leg import Leg, commands_of, error_in_words
+from fieldsid.planning.design.plan import Plan
+from fieldsid.planning.flight.excitation import flown
+from fieldsid.planning.flight.operating_point import operating_point
+from fieldsid.planning.safety.envelope import Envelope, track_of
+from fieldsid.planning.safety.monte_carlo import draw_ensemble, fly_ensemble
+
+FIGURE_DRAWS = 120
+LEVELS = (0.025, 0.16, 0.84, 0.975)
+TRACKS = 25
+
+
+@dataclass(frozen=True, slots=True)
+class LegFigure:
+    """One leg over time (n,) s: fin (rad), where the autopilot steers, angle (rad) and its quantiles (4, n).
+
+    `along` and `across` (n,) are the track on the prior's mean, `tracks` (2, m, n) those of some draws, in m; `errors`
+    the parameters' expected standard errors in words.
+    """
+
+    axis: Axis
+    title: str
+    time: FloatArray
+    fin: FloatArray
+    autopilot: FloatArray
+    angle: FloatArray
+    band: FloatArray
+    along: FloatArray
+    across: FloatArray
+    tracks: FloatArray
+    envelope: Envelope
+    errors: Mapping[str, str]
+
+
+def figure_data(plan: Plan, leg: Leg, model: Model) -> LegFigure:
+    """Return what the figure of a leg shows, the prior's draws flown again."""
+    envelope = plan.envelope
+    crowd = draw_ensemble(model, leg.speed, leg.window, FIGURE_DRAWS, plan.seed + 9)
+    flights = fly_ensemble(crowd, leg.candidate, envelope, leg.autopilot, 0.0)
+    mean = flown(operating_point(model, leg.speed), leg.candidate, leg.window, envelope.limits, leg.autopilot)
+    n = min(flights.time.size, mean.time.size)
+    _, fin, steered = commands_of(leg, envelope)
+    along, across = track_of(plan.axis, mean, leg.speed)
+    tracks = np.stack([flights.along[:n, :TRACKS].T, flights.side[:n, :TRACKS].T])
+    shown = np.where(steered[:n] > 0, mean.command[:n], fin[:n])
+    errors = {k: error_in_words(e.value, e.std_error, e.relative) for k, e in leg.expected.items() if np.isfinite(e.std_error)}
+    return LegFigure(
+        plan.axis, f"{leg.speed:g} m/s  {leg.candidate.maneuver}", mean.time[:n], shown, steered[:n], mean.angle[:n],
+        np.quantile(flights.angle[:n], LEVELS, axis=1), along[:n], across[:n], tracks, leg.envelope_in(envelope), errors,
+    )  # fmt: skip

@@ -1,0 +1,130 @@
+"""Mission snippets: a leg's commands and abort conditions rendered through the templates of `templates/plan/mission`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
+
+from fieldsid._version import __version__
+from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.models.axis import NAMES
+from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.design.leg import CIRCLE, Leg, commands_of
+from fieldsid.planning.design.plan import Plan
+from fieldsid.planning.output import helm
+from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
+from fieldsid.registry import near
+from fieldsid.templates import template_names, template_path
+
+FOLDER = "plan/mission"
+SUFFIX = ".j2"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """From `time` s on: the fin about trim in rad, or the autopilot."""
+
+    time: float
+    fin: float
+    autopilot: bool
+
+    @property
+    def degrees(self) -> float:
+        """The fin in degrees."""
+        return math.degrees(self.fin)
+
+
+def styles() -> tuple[str, ...]:
+    """Return the file names a mission can be written as, such as `moos_timer_script.moos`: one per template."""
+    return tuple(Path(n).name.removesuffix(SUFFIX) for n in template_names() if n.startswith(f"{FOLDER}/") and n.endswith(SUFFIX))
+
+
+def steps_of(plan: Plan, leg: Leg) -> tuple[Step, ...]:
+    """Return the instants at which the command of a leg changes; within the limits, whatever the plan holds."""
+    time, fin, steered = commands_of(leg, plan.envelope)
+    fin = np.where(steered > 0, 0.0, fin)
+    changed = (np.diff(fin, prepend=np.nan) != 0) | (np.diff(steered, prepend=np.nan) != 0)
+    return tuple(
+        Step(round(float(t), 4), round(float(f), 6), bool(s))
+        for t, f, s in zip(time[changed], fin[changed], steered[changed], strict=True)
+    )
+
+
+def render(plan: Plan, leg: Leg, style: str) -> str:
+    """Return one leg as text in a style.
+
+    Raises UsageError for an unknown style or a leg that cannot be flown from a list, ArtifactError for a broken template.
+    """
+    refuse_blind(plan, leg)
+    if style not in styles():
+        raise UsageError(f"there is no mission style {style!r}", found=", ".join(styles()) or "none", hint=near(style, styles()))
+    try:
+        text: str = _environment().get_template(style + SUFFIX).render(_context(plan, leg))
+    except TemplateError as error:
+        place = f"line {getattr(error, 'lineno', '?')}: {error}"
+        what = f"the template `{FOLDER}/{style}{SUFFIX}` is broken"
+        raise ArtifactError(what, found=place, hint="compare it with the one that was shipped") from error
+    return text.rstrip() + "\n"
+
+
+def refuse_blind(plan: Plan, leg: Leg) -> None:
+    """Raise UsageError for a leg that follows the motion and whose expected fins, flown blind, would leave the envelope."""
+    if leg.flown_from_list_in(plan.envelope):
+        return
+    raise UsageError(
+        f"`{leg.candidate.maneuver}` at {leg.speed:g} m/s follows the motion: no list of fins can be sent in its place",
+        found=f"its expected fins, flown blind, leave the envelope {leg.replay_risk:.0%} of the time, accepted is "
+        f"{plan.envelope.share:.0%}",
+        hint=instead(leg),
+    )
+
+
+def instead(leg: Leg) -> str:
+    """Return what to do where no list of fins can be sent: a circle has no kin without a rule, all others have."""
+    rule = "fly it by the vehicle's own rule"
+    return rule if leg.purpose == CIRCLE else f"{rule}, or plan with `--open-loop`"
+
+
+@cache
+def _environment() -> Environment:
+    loader = FileSystemLoader(template_path(FOLDER))
+    # The output is configuration and code of vehicles, never HTML.
+    return Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False)  # noqa: S701
+
+
+def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
+    names, aborts = NAMES[plan.axis], aborts_of(leg, plan.envelope)
+    return {
+        "tool": f"fieldsid {__version__}",
+        "plan": plan,
+        "leg": leg,
+        "axis": plan.axis.value,
+        "fin": names.fin.removesuffix("_rad"),
+        "angle": names.angle,
+        "vehicle": "".join(c for c in plan.vehicle if c.isprintable())[:80],
+        "rule": None if leg.open_loop else _blind(leg),
+        "spec": leg.candidate.spec,
+        "steps": steps_of(plan, leg),
+        "aborts": aborts,
+        "limits": leg.envelope_in(plan.envelope),
+        "unlimited": [n for n, words in limits_said(leg.envelope_in(plan.envelope)).items() if words == NOT_LIMITED],
+        "degrees": math.degrees,
+        "limit_of": {f"{a.signal}.{a.kind}": a.limit for a in aborts},
+        "headings": helm.headings(leg, aborts, plan.course),
+        "needed": helm.needed(leg, aborts, plan.course),
+        "polygon": helm.polygon(leg, aborts, plan.course),
+    }
+
+
+def _blind(leg: Leg) -> str:
+    """Return the remark that a rule's commands are the expected ones, flown whatever the vehicle does."""
+    return (
+        f"The maneuver is a rule, {leg.candidate.record.says}: these are the fins it is expected to ask for, flown blind; "
+        f"{leg.replay_risk:.1%} of the vehicles that are thought possible leave the limits so."
+    )

@@ -1,0 +1,182 @@
+"""A plan as a YAML file: written with everything needed to fly it, and checked again, number by number, when read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid.artifacts import load_record, plain, save_record
+from fieldsid.errors import ArtifactError, FieldsidError
+from fieldsid.maneuvers import Autopilot, pick_maneuver
+from fieldsid.models.axis import Axis
+from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.design.leg import Expected, Leg
+from fieldsid.planning.design.plan import MOST_PASSES, Plan
+from fieldsid.planning.flight.excitation import Excitation, Window, fits
+from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope, limits_said
+
+KIND = "fieldsid/plan"
+MAX_LEG_S = 3600.0
+MOST_LEGS = 200
+
+
+def save_plan(plan: Plan, path: Path, *, inputs: Sequence[Path] = (), parent: Path | None = None, force: bool = False) -> Path:
+    """Write a plan as YAML; raises ArtifactError."""
+    return save_record(path, f"{KIND}/1", plan_body(plan), inputs=inputs, parent=parent, force=force)
+
+
+def plan_body(plan: Plan) -> dict[str, Any]:
+    """Return a plan as nested plain mappings: what the file and `--json` hold."""
+    body = {
+        "axis": plan.axis.value,
+        "vehicle": plan.vehicle,
+        "prior": plan.prior,
+        "seed": plan.seed,
+        "course_rad": plan.course,
+        "want": dict(plan.want),
+        "minutes": plan.minutes,
+        "metres": plan.metres,
+        "break_probability": plan.break_probability,
+        "envelope": plan.envelope.plain(),
+        "limits": limits_said(plan.envelope),
+        "legs": [_leg_body(plan, leg) for leg in plan.legs],
+    }
+    out: dict[str, Any] = plain(body)
+    return out
+
+
+def _leg_body(plan: Plan, leg: Leg) -> dict[str, Any]:
+    body: dict[str, Any] = {
+        "speed_m_s": leg.speed,
+        "purpose": leg.purpose,
+        "maneuver": leg.candidate.maneuver,
+        "parameters": dict(leg.candidate.parameters),
+        "passes": leg.passes,
+        "run_up_s": leg.run_up_s,
+        "turn_s": leg.turn_s,
+        "window": {"length_s": leg.window.length, "lead_s": leg.window.lead, "recover_s": leg.window.recover},
+        "rate_hz": leg.window.rate_hz,
+        "duration_s": leg.duration_s,
+        "distance_m": leg.distance_m,
+        "autopilot": {"angle_gain": leg.autopilot.angle_gain, "rate_gain": leg.autopilot.rate_gain},
+        "expected": {n: {f: getattr(e, f) for f in Expected.__dataclass_fields__} for n, e in leg.expected.items()},
+        "excursions": dict(leg.excursions),
+        "break_probability": leg.break_probability,
+        "heading_limit_rad": leg.heading,
+        "abort": [asdict(a) for a in aborts_of(leg, plan.envelope)],
+    }
+    if not leg.open_loop:
+        body["replay_break_probability"] = leg.replay_risk
+        body["expected_fin_rad"] = [None if math.isnan(v) else round(v, 5) for v in leg.nominal.tolist()]
+    return body
+
+
+def load_plan(path: Path) -> Plan:
+    """Read a plan back, every number checked against what a plan may hold.
+
+    Raises ArtifactError naming what is missing, wrong or out of bounds.
+    """
+    body = load_record(path, KIND)
+    try:
+        return _plan_of(body)
+    except FieldsidError as error:
+        raise ArtifactError(f"`{path}`: {error.what}", found=error.found, hint=error.hint or "plan again") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ArtifactError(
+            f"`{path}` is not a complete plan", found=f"{type(error).__name__}: {error}", hint="plan again, with `--force`"
+        ) from error
+
+
+def _plan_of(body: Mapping[str, Any]) -> Plan:
+    limits = {k: (None if v is None else _number(v, k)) for k, v in body["envelope"].items()}
+    limits["fin_rate"] = np.inf if limits.get("fin_rate") is None else limits["fin_rate"]
+    envelope = Envelope(**limits)  # type: ignore[arg-type]
+    legs = body["legs"]
+    if not isinstance(legs, list) or not 0 < len(legs) <= MOST_LEGS:
+        raise ArtifactError(f"a plan has 1 to {MOST_LEGS} legs", found=str(len(legs)))
+    return Plan(
+        axis=Axis(body["axis"]),
+        vehicle=str(body["vehicle"]),
+        prior=str(body["prior"]),
+        envelope=envelope,
+        legs=tuple(_leg_of(leg, envelope) for leg in legs),
+        want={str(k): _within(v, f"want {k}", 0.0, 1.0) for k, v in body["want"].items()},
+        seed=int(body["seed"]),
+        course=None if body.get("course_rad") is None else _within(body["course_rad"], "course_rad", 0.0, 2.0 * math.pi),
+    )
+
+
+def _leg_of(body: Mapping[str, Any], envelope: Envelope) -> Leg:
+    maneuver = pick_maneuver(str(body["maneuver"]))
+    candidate = Excitation(maneuver.name, maneuver.checked({k: _number(v, k) for k, v in body["parameters"].items()}))
+    _check_fins(candidate, envelope)
+    w = body["window"]
+    lead, recover = (_within(w[k], k, 0.0, MAX_LEG_S) for k in ("lead_s", "recover_s"))
+    window = Window(
+        _within(w["length_s"], "length_s", 1.0, MAX_LEG_S), lead, recover, _within(body["rate_hz"], "rate_hz", 0.1, 1000.0)
+    )
+    if not fits(candidate, window):
+        raise ArtifactError(
+            f"{candidate.duration:.1f} s of `{maneuver.name}` do not fit a window of {window.length:g} s",
+            found=f"{window.excitation:g} s between lead and recovery",
+        )
+    pilot = body["autopilot"]
+    return Leg(
+        speed=_within(body["speed_m_s"], "speed_m_s", 1e-3, LARGEST_SPEED),
+        candidate=candidate,
+        window=window,
+        run_up_s=_within(body["run_up_s"], "run_up_s", 0.0, MAX_LEG_S),
+        turn_s=_within(body["turn_s"], "turn_s", 0.0, MAX_LEG_S),
+        autopilot=Autopilot(_number(pilot["angle_gain"], "angle_gain"), _number(pilot["rate_gain"], "rate_gain"), envelope.fin),
+        expected={str(n): _expected(e) for n, e in body["expected"].items()},
+        excursions={str(k): _number(v, k) for k, v in body["excursions"].items()},
+        break_probability=_within(body["break_probability"], "break_probability", 0.0, 1.0),
+        passes=round(_within(body["passes"], "passes", 1, MOST_PASSES)),
+        purpose=str(body["purpose"]),
+        heading=None
+        if body["heading_limit_rad"] is None
+        else _within(body["heading_limit_rad"], "heading_limit_rad", 1e-3, 30.0),
+        replay_risk=_risk(body.get("replay_break_probability")),
+        nominal=np.clip([_fin(v) for v in body.get("expected_fin_rad", [])], -envelope.fin, envelope.fin),
+    )
+
+
+def _check_fins(candidate: Excitation, envelope: Envelope) -> None:
+    for parameter in candidate.record.parameters:
+        value = candidate.parameters[parameter.name]
+        if parameter.unit == "rad" and parameter.name != "turn" and value > envelope.fin * (1 + 1e-9):
+            raise ArtifactError(
+                f"`{candidate.maneuver}` asks for {value:g} rad of fin, more than the plan's limit",
+                found=f"{parameter.name} = {value:g}, limit {envelope.fin:g} rad",
+                hint=f"set `{parameter.name}` to at most {envelope.fin:g}",
+            )
+
+
+def _expected(body: Mapping[str, Any]) -> Expected:
+    return Expected(**{f: math.nan if body[f] is None else float(body[f]) for f in Expected.__dataclass_fields__})
+
+
+def _risk(value: Any) -> float:
+    return math.nan if value is None else _within(value, "replay_break_probability", 0.0, 1.0)
+
+
+def _fin(value: Any) -> float:
+    return math.nan if value is None else _number(value, "expected_fin_rad")
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ArtifactError(f"`{name}` must be a finite number", found=repr(value), hint=f"write a number after `{name}:`")
+    return float(value)
+
+
+def _within(value: Any, name: str, low: float, high: float) -> float:
+    number = _number(value, name)
+    if not low <= number <= high:
+        raise ArtifactError(f"`{name}` must be in {low:g} .. {high:g}", found=f"{number:g}", hint=f"correct `{name}`")
+    return number

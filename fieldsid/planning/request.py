@@ -1,0 +1,257 @@
+"""From what a user typed to a plan: vehicle, prior, envelope and accuracy goals, checked against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fieldsid import angles
+from fieldsid.dynamics.free_run import effects_of
+from fieldsid.errors import UsageError
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import Model
+from fieldsid.planning.belief.prior_file import load_believed
+from fieldsid.planning.belief.prior_model import checked_prior, named_prior
+from fieldsid.planning.design.plan import WINDOW, Plan, Request, make_plan
+from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
+from fieldsid.planning.discriminate.separating_plan import LONGEST_WINDOW_S, separating_plan
+from fieldsid.planning.flight.excitation import Window
+from fieldsid.planning.output.plan_file import plan_body
+from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
+from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
+from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
+
+FIN_MAX = 0.26
+"""Fin limit (rad) where no vehicle says another: beyond it the fins of the paper's vehicle stall."""
+HEADING_MAX, PITCH_MAX = float(np.radians(60.0)), float(np.radians(30.0))
+PRIOR, NONE = "torpedo", "none"
+
+
+@dataclass(frozen=True, slots=True)
+class EnvelopeLimits:
+    """The limits as typed."""
+
+    area: str | None = None
+    depth_band: str | None = None
+    heading: str | None = None
+    track: float | None = None
+    pitch: str | None = None
+    roll: str | None = None
+    fin: str | None = None
+    fin_rate: str | None = None
+    share: float = 0.05
+
+
+UNLIMITED = EnvelopeLimits()
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """Everything that was typed, None where nothing was."""
+
+    axis: Axis | None = None
+    speeds: str | None = None
+    vehicle: Path | None = None
+    model: Path | None = None
+    prior: str | None = None
+    want: str | None = None
+    minutes: float | None = None
+    limiting: EnvelopeLimits = UNLIMITED
+    window: float | None = None
+    run_up: float = 10.0
+    rate: float = 20.0
+    radius: bool = False
+    separate: tuple[str, ...] = ()
+    diagnosis: Path | None = None
+    seed: int = 1
+    open_loop: bool = False
+    course: str | None = None
+
+    @property
+    def legs(self) -> int:
+        """How many legs will be searched, for a progress bar."""
+        return 1 if self.speeds is None else max(1, len(parse_speeds(self.speeds)))
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A plan, the prior it was made on, and what there is to print."""
+
+    plan: Plan
+    model: Model
+    body: Mapping[str, Any]
+
+
+def planned(asked: PlanRequest, step: Callable[[], None] = lambda: None, ready: Callable[[], None] = lambda: None) -> Made:
+    """Return the requested plan; raises FieldsidError with what would be possible.
+
+    `ready` is called once the request has been read and checked, before the search.
+    """
+    vehicle = _vehicle(asked.vehicle)
+    if asked.model is not None and asked.prior is not None:
+        raise UsageError("`--model` and `--prior` both say what is believed", found=f"--prior {asked.prior}", hint="give one")
+    if asked.separate or asked.diagnosis is not None:
+        return _separating(asked, vehicle, step, ready)
+    model = _signed(prior_model(asked), vehicle)
+    request = _request(asked, model, vehicle, asked.axis or model.axis)
+    known = [*NAMES[request.axis].base, *(c.name for e in effects_of(model) for c in e.shared)]
+    request = replace(request, want=parse_accuracy_goals(asked.want, known) if asked.want else {})
+    ready()
+    plan = make_plan(model, request, step)
+    return Made(plan, model, plan_body(plan))
+
+
+def _request(asked: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Axis, window_s: float = WINDOW.length) -> Request:
+    return Request(
+        axis=axis,
+        speeds=_speeds(asked, model),
+        envelope=envelope_of(axis, asked.limiting, vehicle),
+        want={},
+        minutes=asked.minutes,
+        window=Window(window_s if asked.window is None else asked.window, rate_hz=asked.rate),
+        run_up_s=_run_up(asked.run_up),
+        radius=_with_circles(asked),
+        open_loop=asked.open_loop,
+        seed=asked.seed,
+        vehicle=vehicle.name if vehicle else "vehicle",
+        slowest=vehicle.speed_min_m_s if vehicle else None,
+        fastest=vehicle.speed_max_m_s if vehicle else None,
+        course=_course(asked.course),
+    )
+
+
+def _course(text: str | None) -> float | None:
+    return None if text is None else angles.parse_angle(text, "--course", 2.0 * np.pi) % (2.0 * np.pi)
+
+
+def _with_circles(asked: PlanRequest) -> bool:
+    """Return whether circles are requested; raises UsageError where a limit excludes every circle, or rules are excluded."""
+    if asked.radius and asked.limiting.heading not in (None, NONE):
+        raise UsageError(
+            "a circle turns through more than a whole turn, whatever `--max-heading` says",
+            found=f"--radius --max-heading {asked.limiting.heading}",
+            hint="leave `--max-heading` out, or plan the circles apart: `sysid plan --radius`",
+        )
+    if asked.radius and asked.open_loop:
+        raise UsageError(
+            "a circle follows the heading: it is not open loop", found="--radius --open-loop", hint="leave one of the two out"
+        )
+    return asked.radius
+
+
+def prior_model(asked: PlanRequest) -> Model:
+    """Return the prior model: a model or prior file, else the named prior of the axis."""
+    return named_prior(asked.prior or PRIOR, asked.axis or Axis.YAW) if asked.model is None else load_believed(asked.model)
+
+
+def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -> Envelope:
+    """Return the envelope: what was typed, then the vehicle's own limits, then the defaults; raises UsageError.
+
+    `none` takes the default of heading or pitch away.
+    """
+    area = parse_area(limiting.area) or (None, None)
+    band = parse_band(limiting.depth_band) or (None, None)
+    own = None if vehicle is None else vehicle.fin_max_rad(axis.value)
+    fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN)
+    if fin is not None and own is not None and fin > own:
+        raise UsageError(
+            f"a fin of {fin:g} rad is more than the vehicle has",
+            found=f"{own:g} rad in vehicle.yaml",
+            hint=f"give `--fin-max {own:g}rad`",
+        )
+    rate = vehicle.fin_rate_rad_s if vehicle else None
+    if limiting.fin_rate is not None:
+        rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE)
+    return Envelope(
+        fin=fin if fin is not None else own if own is not None else FIN_MAX,
+        fin_rate=np.inf if rate is None else rate,
+        heading=_limit(limiting.heading, "--max-heading", angles.HEADING, HEADING_MAX if axis is Axis.YAW else None),
+        track=limiting.track,
+        depth_low=band[0],
+        depth_high=band[1],
+        pitch=_limit(limiting.pitch, "--max-pitch", angles.TILT, PITCH_MAX if axis is Axis.PITCH else None),
+        roll=_limit(limiting.roll, "--max-roll", angles.TILT),
+        area_length=area[0],
+        area_width=area[1],
+        share=limiting.share,
+    )
+
+
+def _limit(text: str | None, option: str, most: float, default: float | None = None) -> float | None:
+    """Return the limit that was typed, None for `none`, the default where nothing was."""
+    if text is None:
+        return default
+    return None if text.strip().lower() == NONE else angles.parse_angle(text, option, most)
+
+
+def _separating(asked: PlanRequest, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:
+    if asked.want:
+        raise UsageError(
+            "`--want` asks for accuracy, not for what tells effects apart",
+            found=f"--want {asked.want}",
+            hint="leave it out, or plan the two apart",
+        )
+    rivals = _rivals(asked, vehicle)
+    request = _request(asked, rivals[0], vehicle, rivals[0].axis, LONGEST_WINDOW_S)
+    ready()
+    plan, found = separating_plan(rivals, request, step)
+    best = max(found, key=lambda s: s.expected_log_odds)
+    says = [line for s in found for line in s.says()]
+    body = {"separation": best.plain(), "separations": [s.plain() for s in found], "says": says}
+    return Made(plan, rivals[0], {**plan_body(plan), **body})
+
+
+def _rivals(asked: PlanRequest, vehicle: Vehicle | None) -> tuple[Model, ...]:
+    if asked.diagnosis is None:
+        model = _signed(prior_model(asked), vehicle)
+        # no speeds: a base that is unstable alone may be held by what is added to it
+        return rivals_named(checked_prior(model, asked.axis or model.axis, ()), asked.separate)
+    if asked.model is not None or asked.prior is not None:
+        raise UsageError(
+            "a diagnosis says itself what is believed", found="`--from` with `--model` or `--prior`", hint="leave the latter out"
+        )
+    rivals = rivals_from(asked.diagnosis, asked.separate)
+    if asked.axis not in (None, rivals[0].axis):
+        raise UsageError(
+            f"`{asked.diagnosis}` is a diagnosis of {rivals[0].axis.value}",
+            found=f"--axis {asked.axis.value}" if asked.axis else "",
+            hint=f"write `--axis {rivals[0].axis.value}`, or leave it out",
+        )
+    return rivals
+
+
+def _vehicle(path: Path | None) -> Vehicle | None:
+    return find_vehicle(Path()) if path is None else load_vehicle(path)
+
+
+def _signed(model: Model, vehicle: Vehicle | None) -> Model:
+    """Return a prior with the sign of its authority turned to the vehicle's convention, where one is stated."""
+    if vehicle is None or model.method != "prior":
+        return model
+    side = vehicle.positive_rudder if model.axis is Axis.YAW else vehicle.positive_elevator
+    if side is None:
+        return model
+    name = NAMES[model.axis].authority
+    sign = 1.0 if side in ("starboard", "nose_up") else -1.0
+    return replace(model, values={**model.values, name: sign * abs(model.values[name])})
+
+
+def _speeds(asked: PlanRequest, model: Model) -> tuple[float, ...]:
+    if asked.speeds is not None:
+        return parse_speeds(asked.speeds)
+    if not np.isfinite(model.law.reference):
+        raise UsageError("the model does not say at what speed it holds", found="no speed", hint="give `--speeds 1.0,1.4,1.8`")
+    return (round(model.law.reference, 3),)
+
+
+def _run_up(seconds: float) -> float:
+    if not 0 <= seconds <= 600:
+        raise UsageError(
+            f"a run-up of {seconds:g} s cannot be meant", found=f"--run-up {seconds:g}", hint="for example `--run-up 10`"
+        )
+    return seconds

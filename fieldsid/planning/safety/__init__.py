@@ -1,0 +1,1 @@
+"""The safety envelope, and a Monte Carlo ensemble flown inside it."""

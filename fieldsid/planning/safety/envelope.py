@@ -1,0 +1,211 @@
+"""The safety envelope: limits of heading, track, depth, pitch, roll and fin, and the excursions of a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from fieldsid.angles import said
+from fieldsid.errors import UsageError
+from fieldsid.maneuvers import Limits
+from fieldsid.models.axis import Axis
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.flight.closed_loop import Response
+
+GRAVITY = 9.80665
+LARGEST_FIN = 0.7
+LARGEST_SPEED = 15.0
+MOST_TURNS = 4.0
+"""Turns that a deviation of heading may be: more was meant in degrees."""
+NOT_LIMITED = "NOT LIMITED"
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """Limits about straight and level; None where there is none.
+
+    heading, pitch, roll (rad) and track (m) are largest deviations to either side; `depth_low` and `depth_high` (m)
+    the band, entered at its middle; `area_length` (m) along the leg from the start of its run-up, `area_width` (m) across it,
+    half to either side of its line. `fin` (rad) and `fin_rate` (rad/s) bound every command. `share` is the accepted
+    probability of leaving any of them.
+    """
+
+    fin: float
+    fin_rate: float = np.inf
+    heading: float | None = None
+    track: float | None = None
+    depth_low: float | None = None
+    depth_high: float | None = None
+    pitch: float | None = None
+    roll: float | None = None
+    area_length: float | None = None
+    area_width: float | None = None
+    share: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name in ("fin", "fin_rate", "heading", "track", "pitch", "roll", "area_length", "area_width", "share"):
+            _positive(name, getattr(self, name))
+        _at_most("fin", self.fin, LARGEST_FIN, "rad", "fin angle")
+        for name in ("pitch", "roll"):
+            _at_most(name, getattr(self, name), np.pi / 2, "rad", f"{name} limit")
+        _at_most("heading", self.heading, MOST_TURNS * 2 * np.pi, "rad", "heading limit")
+        _at_most("share", self.share, 0.5, "", "accepted probability")
+        low, high = self.depth_low, self.depth_high
+        if low is not None and high is not None and not 0 <= low < high:
+            raise UsageError(
+                f"the depth band {low:g}..{high:g} m is empty or above the surface",
+                found=f"{low:g}:{high:g}",
+                hint="give shallowest and deepest in metres, for example `--depth-band 1:5`",
+            )
+
+    @property
+    def limits(self) -> Limits:
+        """The fin limits of every command."""
+        return Limits(self.fin, self.fin_rate)
+
+    def depth_room(self) -> float | None:
+        """Return how far the depth may move from the middle of the band, m."""
+        if self.depth_low is None or self.depth_high is None:
+            return None
+        return 0.5 * (self.depth_high - self.depth_low)
+
+    def rooms(self) -> dict[str, float]:
+        """Return the limit of every excursion that has one."""
+        known = {
+            "heading": self.heading, "track": self.track, "depth": self.depth_room(), "pitch": self.pitch,
+            "roll": self.roll, "along": self.area_length,
+            "across": None if self.area_width is None else 0.5 * self.area_width,
+        }  # fmt: skip
+        return {k: v for k, v in known.items() if v is not None}
+
+    def plain(self) -> dict[str, float | None]:
+        """Return the limits as a mapping; an unlimited fin rate is None."""
+        out = {f.name: getattr(self, f.name) for f in fields(self)}
+        return out | {"fin_rate": self.fin_rate if np.isfinite(self.fin_rate) else None}
+
+
+@dataclass(frozen=True, slots=True)
+class Excursion:
+    """How far one flight went: rad and m, zero where the axis does not move it.
+
+    along is the farthest ahead of the start of the run-up, behind the farthest back of it, across the farthest to a side.
+    """
+
+    heading: float
+    track: float
+    depth: float
+    pitch: float
+    roll: float
+    along: float
+    behind: float
+    across: float
+
+    def over(self, envelope: Envelope) -> dict[str, float]:
+        """Return the share of its limit that each limited excursion uses, 1 at the limit: the area begins at the start."""
+        over = {k: getattr(self, k) / room for k, room in envelope.rooms().items()}
+        if envelope.area_length is not None and self.behind > 0.0:
+            over["along"] = max(over["along"], 1.0 + self.behind / envelope.area_length)
+        return over
+
+
+def track_of(axis: Axis, response: Response, speed: float) -> tuple[FloatArray, FloatArray]:
+    """Return distance along and across the leg (n,) in m; across is depth for pitch. The speed is kept in the turn."""
+    step = np.diff(response.time, append=response.time[-1])
+    along = np.cumsum(speed * np.cos(response.angle) * step)
+    side = np.cumsum(speed * np.sin(response.angle) * step) * (1.0 if axis is Axis.YAW else -1.0)
+    return along, side
+
+
+def excursion_of(axis: Axis, response: Response, speed: float, *, run_up: float = 0.0, roll_gain: float = 1.0) -> Excursion:
+    """Return how far a flight went.
+
+    run_up is the distance (m) flown before it. Roll is that of a neutrally buoyant hull in a steady turn, u r / g,
+    times `roll_gain`: the centripetal force acts at the centre of mass, the hull's at its axis.
+    """
+    along, side = track_of(axis, response, speed)
+    angle = float(np.max(np.abs(response.angle)))
+    ahead, behind = run_up + float(np.max(along)), max(0.0, -run_up - float(np.min(along)))
+    off = float(np.max(np.abs(side)))
+    if axis is Axis.PITCH:
+        return Excursion(0.0, 0.0, off, angle, 0.0, ahead, behind, 0.0)
+    roll = roll_gain * speed * float(np.max(np.abs(response.rate))) / GRAVITY
+    return Excursion(angle, off, 0.0, 0.0, roll, ahead, behind, off)
+
+
+def check_speeds(speeds: tuple[float, ...], low: float | None, high: float | None) -> None:
+    """Raise UsageError for speeds that are not positive, beyond any vehicle, or outside the vehicle's own range."""
+    if not speeds:
+        raise UsageError("no speeds are given", found="an empty list", hint="for example `--speeds 1.0,1.4,1.8`")
+    for speed in speeds:
+        if not (np.isfinite(speed) and 0 < speed <= LARGEST_SPEED):
+            raise UsageError(
+                f"a speed of {speed:g} m/s cannot be right",
+                found=f"--speeds {','.join(f'{s:g}' for s in speeds)}",
+                hint=f"give speeds in m/s, above 0 and at most {LARGEST_SPEED:g}",
+            )
+        if (low is not None and speed < low) or (high is not None and speed > high):
+            raise UsageError(
+                f"{speed:g} m/s is outside the vehicle's speeds",
+                found=f"{'any' if low is None else f'{low:g}'} .. {'any' if high is None else f'{high:g}'} m/s in vehicle.yaml",
+                hint="change `--speeds`, or `speed_min_m_s` and `speed_max_m_s` in vehicle.yaml",
+            )
+
+
+def check_room(envelope: Envelope, speeds: tuple[float, ...], run_up_s: float, shortest_s: float) -> None:
+    """Raise UsageError when the area is too short for run-up and the shortest useful maneuver at some speed."""
+    if envelope.area_length is None:
+        return
+    for speed in speeds:
+        need = speed * (run_up_s + shortest_s)
+        if need <= envelope.area_length:
+            continue
+        possible = envelope.area_length / (run_up_s + shortest_s)
+        raise UsageError(
+            f"the area is {envelope.area_length:g} m long; {speed:g} m/s needs {need:.0f} m "
+            f"({speed * run_up_s:.0f} m of run-up, {speed * shortest_s:.0f} m of maneuver)",
+            found=f"--area {envelope.area_length:g}x{envelope.area_width or 0:g}",
+            hint=f"fly at most {possible:.2g} m/s there, or give `--area {np.ceil(need):.0f}x{envelope.area_width or 50:g}`",
+        )
+
+
+def _positive(name: str, value: float | None) -> None:
+    if value is not None and not value > 0:
+        raise UsageError(
+            f"the limit `{name}` must be above zero", found=f"{name} = {value:g}", hint="leave it out where there is no limit"
+        )
+
+
+def _at_most(name: str, value: float | None, most: float, unit: str, says: str) -> None:
+    if value is not None and value > most:
+        meant = unit == "rad" and value > 2.0 * most and np.radians(value) <= most
+        degrees = f"write `{value:g}deg` if it is in degrees" if meant else f"at most {most:.4g} {unit}".rstrip()
+        raise UsageError(
+            f"the {says} {value:g} {unit}".rstrip() + " cannot be right", found=f"{name} = {value:g}, most {most:g}", hint=degrees
+        )
+
+
+def used(over: Mapping[str, float]) -> float:
+    """Return the largest share of a limit that is used, 0 where there is no limit."""
+    return max(over.values(), default=0.0)
+
+
+def limits_said(envelope: Envelope) -> dict[str, str]:
+    """Return every limit in words, in both units, NOT_LIMITED where there is none; the depth is about the middle of its band."""
+    low, high, length, width = envelope.depth_low, envelope.depth_high, envelope.area_length, envelope.area_width
+    fin_rate = envelope.fin_rate if np.isfinite(envelope.fin_rate) else None
+
+    def angle(value: float | None, per: str = "") -> str:
+        return NOT_LIMITED if value is None else f"{said(value)}{per}"
+
+    return {
+        "fin": angle(envelope.fin),
+        "fin rate": angle(fin_rate, " per s"),
+        "heading": angle(envelope.heading),
+        "track": NOT_LIMITED if envelope.track is None else f"{envelope.track:g} m to either side",
+        "pitch": angle(envelope.pitch),
+        "roll": angle(envelope.roll),
+        "depth": NOT_LIMITED if low is None or high is None else f"{low:g} to {high:g} m",
+        "area": NOT_LIMITED if length is None or width is None else f"{length:g} m along, {0.5 * width:g} m to either side",
+    }

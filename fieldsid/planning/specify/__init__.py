@@ -1,0 +1,1 @@
+"""What the user asks for: accuracy goals and quantities as they are typed."""

@@ -1,0 +1,245 @@
+"""All laws of one axis against speed (`sysid fit`): made from points, saved and loaded as `fieldsid/fit/1`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fieldsid.artifacts import load_record, save_record
+from fieldsid.display import Plotted
+from fieldsid.errors import ArtifactError, DataError, UsageError
+from fieldsid.logs.run import Note
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import KIND as MODEL_KIND
+from fieldsid.models.model import Model, model_of
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law, without_candidates
+from fieldsid.plant.laws.regression import Regression, regression_of
+from fieldsid.plant.points import Point, check_authority, distinct_speeds
+from fieldsid.rounding import nine_digits
+
+KIND = "fieldsid/fit"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Laws(Plotted):
+    """The laws of one axis by parameter name, and the points they were drawn through."""
+
+    axis: Axis
+    points: tuple[Point, ...]
+    by_name: Mapping[str, ParameterLaw]
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def authority(self) -> ParameterLaw:
+        """The law of the control authority."""
+        return self.by_name[NAMES[self.axis].authority]
+
+    @property
+    def speeds(self) -> FloatArray:
+        """Speeds of the points, (n,) m/s, rising."""
+        return np.sort(np.array([p.speed for p in self.points]))
+
+    def at(self, speed: float) -> dict[str, float]:
+        """Return the parameters at a speed by the chosen laws."""
+        return {n: float(law.at(speed)[0]) for n, law in self.by_name.items()}
+
+    def std(self, speed: float) -> dict[str, float]:
+        """Return the standard errors of the parameters at a speed, as the laws know them."""
+        return {n: float(law.line.std(speed)[0]) for n, law in self.by_name.items()}
+
+
+def fit_laws(axis: Axis, points: Sequence[Point], *, weighted: bool = True) -> Laws:
+    """Fit the law of every parameter of an axis that at least two speeds give.
+
+    Weighted by the points' standard errors where all have one (`weighted`), else every point counts alike. Raises
+    DataError when there is one speed only (no law), or the authority's sign is not the same everywhere.
+    """
+    points = tuple(sorted(points, key=lambda p: nine_digits(p.speed)))
+    sign = check_authority(axis, points)
+    _refuse_single_speed(axis, points)
+    laws, notes = {}, []
+    for name in NAMES[axis].base:
+        held = [p for p in points if name in p.values]
+        if len(held) < 2 or distinct_speeds(np.array([p.speed for p in held])) < 2:
+            continue
+        speeds = np.array([p.speed for p in held])
+        values = np.array([p.values[name] for p in held])
+        errors = _errors(name, held) if weighted else None
+        if errors is None and weighted:
+            notes.append(
+                Note("unweighted", f"{name}: not every point has a standard error, so all count alike", {"parameter": name})
+            )
+        labels = [p.name for p in held]
+        if name == NAMES[axis].authority:
+            laws[name] = authority_law(name, sign, speeds, values, errors, labels)
+        else:
+            laws[name] = other_law(name, speeds, values, errors, labels)
+    return Laws(axis, points, MappingProxyType(laws), tuple(notes))
+
+
+def with_own_law(laws: Laws, text: str) -> Laws:
+    """Replace one law by the user's `NAME=c0[,c1]`, meaning c0 + c1 u^2; raises UsageError."""
+    name, _, numbers = text.partition("=")
+    try:
+        coefficients = np.array([float(n) for n in numbers.split(",")])
+    except ValueError as error:
+        raise UsageError(
+            f"`--law {text}` is not NAME=c0[,c1]", found=str(error), hint="write `--law a22=1` or `--law b2=-0.23,-0.33`"
+        ) from error
+    if name not in NAMES[laws.axis].base or coefficients.size > 2:
+        raise UsageError(f"`--law {text}` is not NAME=c0[,c1]", found=name, hint=f"names: {', '.join(NAMES[laws.axis].base)}")
+    size = coefficients.size
+    powers = (0.0, 2.0)[:size]
+    line = Regression("affine" if size == 2 else "constant", powers, coefficients, np.zeros((size, size)), 0, float("nan"), 0.0)
+    base = laws.by_name.get(name)
+    speeds = laws.speeds
+    empty = ParameterLaw(name, 1.0, speeds, np.asarray(line.at(speeds)), None, (line,), line.kind, None, ())
+    own = empty if base is None else without_candidates(replace(base, sign=1.0, values=base.sign * base.values), line)
+    return replace(laws, by_name=MappingProxyType({**laws.by_name, name: own}))
+
+
+def report(laws: Laws) -> dict[str, Any]:
+    """Return the laws as the plain record that `--json` prints and the file holds."""
+    return {
+        "axis": laws.axis.value,
+        "speed_low_m_s": float(laws.speeds[0]),
+        "speed_high_m_s": float(laws.speeds[-1]),
+        "points": [
+            {"name": p.name, "speed_m_s": p.speed, "values": dict(p.values), "std_errors": dict(p.std_errors)}
+            for p in laws.points
+        ],
+        "laws": {n: _law_record(law) for n, law in laws.by_name.items()},
+        "warnings": [{"code": n.code, "message": n.message} for n in (*laws.notes, *law_notes(laws))],
+    }
+
+
+def law_notes(laws: Laws) -> tuple[Note, ...]:
+    """Return the remarks of every law, those on points that do not belong first."""
+    odd = [
+        Note(
+            "does_not_belong",
+            f"{law.name} of `{p.name}` ({p.value:.4g} at {p.speed:.2f} m/s) does not belong to the others' law "
+            f"({p.predicted_without:.4g}): {p.studentised:+.1f} of its standard errors off (limit {p.limit:.1f} for "
+            f"{len(law.points)} points)",
+            {"point": p.name, "parameter": law.name},
+        )
+        for law in laws.by_name.values()
+        for p in law.points
+        if not p.belongs
+    ]
+    return (*odd, *(n for law in laws.by_name.values() for n in law.notes))
+
+
+def save_laws(laws: Laws, path: Path, *, models: Sequence[Path] = (), inputs: Sequence[Path] = (), force: bool = False) -> Path:
+    """Write the laws as YAML, with the models they came from whole: effects, covariance and all; raises ArtifactError."""
+    carried = [{"name": p.stem, "record": load_record(p, MODEL_KIND)} for p in models]
+    return save_record(path, f"{KIND}/1", report(laws) | {"models": carried}, inputs=inputs, force=force)
+
+
+def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
+    """Return the models a fit file carries with their names, none where it came from a table; raises ArtifactError.
+
+    A file that does not say which models it came from would lose their effects without a word: it is refused.
+    """
+    body = load_record(path, KIND)
+    try:
+        return tuple((str(m["name"]), model_of(m["record"], path)) for m in body["models"])
+    except (KeyError, TypeError) as error:
+        raise ArtifactError(
+            f"`{path}` does not carry the models it was made from: their effects would be lost",
+            found=f"{type(error).__name__}: {error}",
+            hint="make it again: `sysid fit MODEL... -o " + f"{path} --force`",
+        ) from error
+
+
+def load_laws(path: Path) -> Laws:
+    """Read laws back; raises ArtifactError naming the key that is missing or wrong."""
+    body = load_record(path, KIND)
+    try:
+        points = tuple(
+            Point(
+                str(p["name"]),
+                float(p["speed_m_s"]),
+                MappingProxyType({k: float(v) for k, v in p["values"].items()}),
+                MappingProxyType({k: float(v) for k, v in p["std_errors"].items()}),
+            )
+            for p in body["points"]
+        )
+        laws = {n: _law_of(n, r, points) for n, r in body["laws"].items()}
+        return Laws(Axis(body["axis"]), points, MappingProxyType(laws))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ArtifactError(
+            f"`{path}` is not a complete fit file",
+            found=f"{type(error).__name__}: {error}",
+            hint="make it again: `sysid fit MODEL...`",
+        ) from error
+
+
+def _law_record(law: ParameterLaw) -> dict[str, Any]:
+    exponent = law.exponent
+    affine = next((c for c in law.candidates if c.kind == "affine"), None)
+    return {
+        "sign": law.sign,
+        "chosen": law.chosen,
+        "weighted": law.std_errors is not None,
+        "slope": None if affine is None else affine.coefficients[1],
+        "intercept": None if affine is None else affine.coefficients[0],
+        "candidates": {c.kind: c.record() for c in law.candidates},
+        "exponent": None
+        if exponent is None
+        else {
+            "value": exponent.value,
+            "std_error": exponent.std_error,
+            "interval95": list(exponent.interval95),
+            "p_against_2": exponent.p_against_2,
+            "says": exponent.says,
+        },
+        "leave_one_out": [
+            {
+                "name": p.name,
+                "speed_m_s": p.speed,
+                "value": p.value,
+                "predicted_without": p.predicted_without,
+                "leading_coefficient_without": p.leading_coefficient_without,
+                "studentised": p.studentised,
+                "limit": p.limit,
+                "belongs": p.belongs,
+            }
+            for p in law.points
+        ],
+    }
+
+
+def _law_of(name: str, record: Mapping[str, Any], points: Sequence[Point]) -> ParameterLaw:
+    held = [p for p in points if name in p.values]
+    sign = float(record["sign"])
+    lines = tuple(regression_of(c) for c in record["candidates"].values())
+    values = sign * np.array([p.values[name] for p in held])
+    speeds = np.array([p.speed for p in held])
+    if record["chosen"] not in {line.kind for line in lines}:
+        raise ValueError(f"chosen law {record['chosen']!r} of {name} is not among its candidates")
+    return ParameterLaw(name, sign, speeds, values, _errors(name, held), lines, str(record["chosen"]), None, ())
+
+
+def _errors(name: str, points: Sequence[Point]) -> FloatArray | None:
+    errors = [p.std_errors.get(name, float("nan")) for p in points]
+    return np.array(errors) if bool(np.all(np.isfinite(errors))) and errors else None
+
+
+def _refuse_single_speed(axis: Axis, points: Sequence[Point]) -> None:
+    speeds = np.array([p.speed for p in points])
+    if distinct_speeds(speeds) > 1:
+        return
+    shown = "; ".join(f"at {p.speed:.3g} m/s " + ", ".join(f"{n} = {v:.4g}" for n, v in p.values.items()) for p in points)
+    raise DataError(
+        "one speed only: no law against u^2 can be drawn through a single point",
+        found=shown,
+        hint=f"use the point as it is, `sysid turn-radius` and `sysid schedule` take it; or fly two more speeds: "
+        f"`sysid plan --axis {axis.value} --speeds {0.8 * speeds[0]:.2f},{speeds[0]:.2f},{1.2 * speeds[0]:.2f}`",
+    )

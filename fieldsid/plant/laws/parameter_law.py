@@ -1,0 +1,203 @@
+"""The law of one parameter against speed: candidate laws, the exponent with its test, and the points that are outliers.
+
+Authority is proportional to u^2 by physics (lift of the fin), so its law is fitted against u^2 and the exponent of |b| = k u^e is
+tested against 2. Damping is proportional to u, the trim to u^2 (asymmetric hull) or constant (buoyancy). Outliers are found by
+externally studentised residuals (Cook & Weisberg 1982, chapter 2) against Bonferroni's limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.display import Brief
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.tail_probabilities import student_quantile, student_tail
+from fieldsid.plant.laws.regression import Regression, fit_power_law, fit_powers, rounding_of, t_factor
+from fieldsid.rounding import nine_digits
+
+FAMILY_ALPHA = 0.05
+MIN_DEGREES_OF_FREEDOM = 2
+"""Degrees of freedom of the others' scatter above which a point is tested against it: with one, two points in line by chance
+(rounded digits make such) put a third any number of its standard errors off."""
+ROUNDING_SHARE = 1e-9
+"""Share of a value below which its scatter is that of the arithmetic."""
+AUTHORITY = (("affine", (0.0, 2.0)), ("through_zero", (2.0,)))
+OTHERS = (("constant", (0.0,)), ("linear", (0.0, 1.0)), ("affine", (0.0, 2.0)))
+EXPONENT_OF_LIFT = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Exponent:
+    """The e of |b| = k u^e with its 95 % interval, and the two-sided p of e = 2."""
+
+    value: float
+    std_error: float
+    interval95: tuple[float, float]
+    p_against_2: float
+
+    @property
+    def says(self) -> str:
+        """One sentence for the reader."""
+        low, high = self.interval95
+        spread = f"u^{self.value:.2f} (95 % {low:.2f} .. {high:.2f})"
+        if not np.isfinite(self.p_against_2):
+            return f"{spread}: two speeds fit any exponent, so nothing is tested"
+        if self.p_against_2 < 0.05:
+            return (
+                f"{spread}: not u^2 (p = {self.p_against_2:.2g}); something is missing from the model or moves with speed "
+                "(lag, sway, r|r|, thrust): `sysid diagnose` finds which"
+            )
+        return f"{spread}: u^2 is not refuted (p = {self.p_against_2:.2g}); a high R^2 alone would not have shown that"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PointCheck(Brief):
+    """One point left out: what the law of the others says there, and how far off the point is, in its standard errors.
+
+    Beyond the limit it does not belong; infinite where the points are too few to say so of any.
+    """
+
+    name: str
+    speed: float
+    value: float
+    predicted_without: float
+    leading_coefficient_without: float
+    studentised: float
+    limit: float
+
+    @property
+    def belongs(self) -> bool:
+        """Whether the point is within the limit."""
+        return not abs(self.studentised) > self.limit
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ParameterLaw(Brief):
+    """A parameter's law: `sign` times the chosen one of the `candidates`; magnitudes (n,) at speeds (n,)."""
+
+    name: str
+    sign: float
+    speeds: FloatArray
+    values: FloatArray
+    std_errors: FloatArray | None
+    candidates: tuple[Regression, ...]
+    chosen: str
+    exponent: Exponent | None
+    points: tuple[PointCheck, ...]
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def line(self) -> Regression:
+        """The chosen candidate, of the magnitude."""
+        return self.candidate(self.chosen)
+
+    def candidate(self, kind: str) -> Regression:
+        """Return a candidate by its kind."""
+        return next(c for c in self.candidates if c.kind == kind)
+
+    def at(self, speed: npt.ArrayLike) -> FloatArray:
+        """Return the signed parameter (n,) at speeds (n,)."""
+        return self.sign * self.line.at(speed)
+
+
+def authority_law(
+    name: str, sign: float, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None, labels: Sequence[str]
+) -> ParameterLaw:
+    """Return the law of a control authority against u^2; values (n,) are signed, all of `sign`."""
+    size = np.abs(values)
+    lines = [fit_powers(k, p, speeds, size, std_errors) for k, p in AUTHORITY if len(p) <= size.size]
+    power = fit_power_law(speeds, size, std_errors)
+    chosen = _authority_choice(lines)
+    return ParameterLaw(
+        name, sign, speeds, size, std_errors, (*lines, power), chosen, _exponent(power),
+        leave_one_out(lines[0], speeds, size, std_errors, labels), _notes(name, lines[0], power),
+    )  # fmt: skip
+
+
+def other_law(
+    name: str, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None, labels: Sequence[str]
+) -> ParameterLaw:
+    """Return the law of a damping, stiffness or trim: constant unless its slope is clear of zero.
+
+    Then linear in u or affine in u^2, whichever leaves less.
+    """
+    lines = [fit_powers(k, p, speeds, values, std_errors) for k, p in OTHERS if len(p) <= max(1, values.size - 1)]
+    rising = [line for line in lines[1:] if _clear_of_zero(line, 1)]
+    # at two speeds both go through the same two means: the first of them then
+    best = max(rising, key=lambda line: nine_digits(line.r2)) if rising else lines[0]
+    checks = leave_one_out(best, speeds, values, std_errors, labels)
+    return ParameterLaw(name, 1.0, speeds, values, std_errors, tuple(lines), best.kind, None, checks)
+
+
+def leave_one_out(
+    line: Regression, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None, labels: Sequence[str]
+) -> tuple[PointCheck, ...]:
+    """Refit without each point; empty where too few points would be left to measure a scatter."""
+    count, size = values.size, len(line.powers)
+    degrees = count - 1 - size
+    if degrees < 1:
+        return ()
+    limit = student_quantile(1.0 - FAMILY_ALPHA / (2 * count), degrees) if degrees >= MIN_DEGREES_OF_FREEDOM else float("inf")
+    checks = []
+    for i in range(count):
+        keep = np.arange(count) != i
+        rest = None if std_errors is None else std_errors[keep]
+        other = fit_powers(line.kind, line.powers, speeds[keep], values[keep], rest)
+        guess, spread = float(other.at(speeds[i])[0]), float(other.std(speeds[i])[0])
+        own = _scatter(other, speeds[keep], values[keep], rest) * (1.0 if std_errors is None else float(std_errors[i]))
+        least = max(ROUNDING_SHARE * abs(float(values[i])), float(np.finfo(np.float64).tiny))
+        off = (float(values[i]) - guess) / max(float(np.hypot(own, spread)), least)
+        checks.append(PointCheck(labels[i], float(speeds[i]), float(values[i]), guess, float(other.coefficients[-1]), off, limit))
+    return tuple(checks)
+
+
+def _scatter(line: Regression, speeds: FloatArray, values: FloatArray, std_errors: FloatArray | None) -> float:
+    """Return the residual's standard deviation in units of the stated errors (at least one of them)."""
+    error = values - line.at(speeds)
+    if std_errors is None:
+        return float(np.hypot(np.sqrt(np.sum(error**2) / line.dof), rounding_of(values)))
+    return max(1.0, float(np.sqrt(np.sum((error / std_errors) ** 2) / line.dof)))
+
+
+def _authority_choice(lines: Sequence[Regression]) -> str:
+    """Affine where its intercept is clear of zero, else through zero."""
+    if len(lines) < 2 or lines[0].dof < 1:
+        return "through_zero"
+    return "affine" if _clear_of_zero(lines[0], 0) else "through_zero"
+
+
+def _clear_of_zero(line: Regression, index: int) -> bool:
+    """Whether a coefficient's 95 % interval leaves out zero; never where no scatter could be measured."""
+    if line.dof < 1:
+        return False
+    return bool(abs(line.coefficients[index]) > t_factor(line.dof) * np.sqrt(line.covariance[index, index]))
+
+
+def _exponent(power: Regression) -> Exponent:
+    value, error = float(power.coefficients[1]), float(np.sqrt(power.covariance[1, 1]))
+    half = t_factor(power.dof) * error
+    p = float("nan")
+    if power.dof > 0 and error > 0:
+        p = 2.0 * student_tail(abs(value - EXPONENT_OF_LIFT) / error, power.dof)
+    return Exponent(value, error, (value - half, value + half), p)
+
+
+def _notes(name: str, affine: Regression, power: Regression) -> tuple[Note, ...]:
+    """Say where the straight line would give an authority of the wrong sign, and that R^2 says little."""
+    notes = []
+    if affine.kind == "affine" and affine.coefficients[0] < 0 < affine.coefficients[1]:
+        zero = float(np.sqrt(-affine.coefficients[0] / affine.coefficients[1]))
+        notes.append(Note("law_crosses_zero", f"the affine law of {name} crosses zero at {zero:.2f} m/s", {"speed_m_s": zero}))
+    if affine.r2 > 0.95 and power.dof > 0:
+        notes.append(Note("r2_proves_little", f"R^2 = {affine.r2:.3f} proves little: read the exponent", {"r2": affine.r2}))
+    return tuple(notes)
+
+
+def without_candidates(law: ParameterLaw, line: Regression) -> ParameterLaw:
+    """Return the law replaced by a given line (a user's own), nothing else changed."""
+    return replace(law, candidates=(line,), chosen=line.kind, exponent=None, points=())

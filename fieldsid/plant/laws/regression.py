@@ -1,0 +1,153 @@
+"""One law y(u) and its band: a sum of powers of the speed, fitted by (weighted) least squares, or k u^e fitted in logarithms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.display import Brief
+from fieldsid.errors import ArtifactError
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.tail_probabilities import student_quantile
+
+CONFIDENCE_LEVEL = 0.95
+ROUNDING_SHARE = 1e-9
+"""Share of the largest value to which values are known at best: what a line leaves below it is rounding, and says nothing."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Regression(Brief):
+    """y(u) = sum_k c_k u^p_k, or exp(c_0) u^c_1 where `powers` is empty, with the covariance of c and its degrees of freedom."""
+
+    kind: str
+    powers: tuple[float, ...]
+    coefficients: FloatArray
+    covariance: FloatArray
+    dof: int
+    r2: float
+    rms: float
+
+    def columns(self, speed: npt.ArrayLike) -> FloatArray:
+        """Return the derivative of y with respect to c, (n, k)."""
+        u = np.atleast_1d(np.asarray(speed, dtype=np.float64))
+        if self.powers:
+            return np.stack([u**p for p in self.powers], axis=1)
+        value = self.at(u)
+        return np.stack([value, value * np.log(u)], axis=1)
+
+    def at(self, speed: npt.ArrayLike) -> FloatArray:
+        """Return y, (n,), at speeds (n,) in m/s."""
+        u = np.atleast_1d(np.asarray(speed, dtype=np.float64))
+        if self.powers:
+            return np.asarray(self.columns(u) @ self.coefficients)
+        return np.asarray(np.exp(self.coefficients[0]) * u ** self.coefficients[1])
+
+    def std(self, speed: npt.ArrayLike) -> FloatArray:
+        """Return the standard error of y, (n,); NaN where there is one point for every coefficient."""
+        x = self.columns(speed)
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", x, self.covariance, x), 0.0)))
+
+    def band(self, speed: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return the 95 % confidence band of the law, two arrays (n,)."""
+        half = t_factor(self.dof) * self.std(speed)
+        middle = self.at(speed)
+        return middle - half, middle + half
+
+    def record(self) -> dict[str, Any]:
+        """Return the plain record of this law, as a file holds it."""
+        return {
+            "kind": self.kind,
+            "powers": list(self.powers),
+            "coefficients": self.coefficients,
+            "std_errors": np.sqrt(np.maximum(np.diag(self.covariance), 0.0)),
+            "covariance": self.covariance,
+            "dof": self.dof,
+            "r2": self.r2,
+            "rms": self.rms,
+        }
+
+
+def regression_of(record: Mapping[str, Any]) -> Regression:
+    """Return the law of a plain record; raises ArtifactError when a key is missing or wrong."""
+    try:
+        count = len(record["coefficients"])
+        covariance = [[np.nan if v is None else v for v in row] for row in record["covariance"]]
+        return Regression(
+            kind=str(record["kind"]),
+            powers=tuple(float(p) for p in record["powers"]),
+            coefficients=np.array(record["coefficients"], dtype=np.float64),
+            covariance=np.array(covariance, dtype=np.float64).reshape(count, count),
+            dof=int(record["dof"]),
+            r2=_number(record["r2"]),
+            rms=_number(record["rms"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError(
+            "a law in the file is not complete",
+            found=f"{type(error).__name__}: {error}",
+            hint="make it again: `sysid fit MODEL...`",
+        ) from error
+
+
+def fit_powers(
+    kind: str, powers: tuple[float, ...], speed: FloatArray, value: FloatArray, std_error: FloatArray | None
+) -> Regression:
+    """Fit sum_k c_k u^p_k to values (n,), by QR; weighted by 1/std_error where given.
+
+    With weights the covariance is widened by the scatter when that exceeds the errors given (Birge ratio), never narrowed.
+    """
+    x = np.stack([speed**p for p in powers], axis=1)
+    coefficients, covariance, dof = _least_squares(x, value, std_error, rounding_of(value))
+    error = value - x @ coefficients
+    return Regression(kind, powers, coefficients, covariance, dof, _r2(value, error), _rms(error))
+
+
+def fit_power_law(speed: FloatArray, value: FloatArray, std_error: FloatArray | None) -> Regression:
+    """Fit value = k u^e (value > 0) in logarithms, errors carried over as std_error/value."""
+    x = np.stack([np.ones_like(speed), np.log(speed)], axis=1)
+    log_error = None if std_error is None else std_error / value
+    coefficients, covariance, dof = _least_squares(x, np.log(value), log_error, ROUNDING_SHARE)
+    error = value - np.exp(x @ coefficients)
+    return Regression("power", (), coefficients, covariance, dof, _r2(value, error), _rms(error))
+
+
+def t_factor(dof: int) -> float:
+    """Return Student's 97.5 % point; the normal one where no scatter could be measured."""
+    return student_quantile(0.5 + CONFIDENCE_LEVEL / 2, dof)
+
+
+def rounding_of(value: FloatArray) -> float:
+    """Return the size of rounding errors of values (n,)."""
+    return ROUNDING_SHARE * float(np.max(np.abs(value)))
+
+
+def _least_squares(
+    x: FloatArray, y: FloatArray, std_error: FloatArray | None, rounding: float
+) -> tuple[FloatArray, FloatArray, int]:
+    weight = np.ones_like(y) if std_error is None else 1.0 / std_error
+    q, r = np.linalg.qr(x * weight[:, None])
+    coefficients = np.linalg.solve(r, q.T @ (y * weight))
+    inverse = np.linalg.inv(r)
+    dof = y.size - x.shape[1]
+    left = np.hypot(y - x @ coefficients, rounding) * weight
+    scatter = float(np.sum(left**2)) / dof if dof > 0 else float("nan")
+    if std_error is not None:
+        scatter = max(1.0, scatter) if dof > 0 else 1.0
+    return coefficients, np.asarray(inverse @ inverse.T * scatter), dof
+
+
+def _r2(value: FloatArray, error: FloatArray) -> float:
+    total = float(np.sum((value - value.mean()) ** 2))
+    return 1.0 - float(np.sum(error**2)) / total if total > value.size * rounding_of(value) ** 2 else float("nan")
+
+
+def _rms(error: FloatArray) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)

@@ -1,0 +1,95 @@
+"""What the laws are drawn through: parameters at speeds, taken from identified models of one axis (a table: `table.py`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.display import Brief
+from fieldsid.errors import DataError
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+
+EQUAL_SPEED_SHARE = 0.03
+"""Speeds closer than this fraction count as one: log-to-log spread of a held thrust setting."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Point(Brief):
+    """Parameters identified at one speed (m/s), by name, with standard errors where they are known."""
+
+    name: str
+    speed: float
+    values: Mapping[str, float]
+    std_errors: Mapping[str, float]
+
+
+def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tuple[Point, ...]]:
+    """Return the points of identified models; a joint model gives one point per speed group.
+
+    Raises DataError when the models are of two axes, or one of them knows no speed.
+    """
+    axes = {m.axis for m in models}
+    if len(axes) != 1:
+        found = ", ".join(f"{n}: {m.axis.value}" for n, m in zip(names, models, strict=True))
+        raise DataError("the models are not of one axis", found=found, hint="give the yaw models and the pitch models apart")
+    points = [p for m, n in zip(models, names, strict=True) for p in _model_points(m, n)]
+    return models[0].axis, tuple(points)
+
+
+def distinct_speeds(speeds: FloatArray) -> int:
+    """Count speeds that differ by more than the spread of one thrust setting."""
+    ordered = np.sort(speeds)
+    return int(1 + np.sum(np.diff(ordered) > EQUAL_SPEED_SHARE * ordered[:-1])) if ordered.size else 0
+
+
+def check_authority(axis: Axis, points: Sequence[Point]) -> float:
+    """Return the common sign of the authority; raises DataError when the points disagree or have none."""
+    name = NAMES[axis].authority
+    given = [(p.name, p.values[name]) for p in points if name in p.values]
+    signs = {float(np.sign(v)) for _, v in given}
+    if signs in ({1.0}, {-1.0}):
+        return signs.pop()
+    if not given:
+        raise DataError(
+            f"no point gives `{name}`",
+            found=", ".join(sorted({k for p in points for k in p.values})),
+            hint=f"add a column `{name}`",
+        )
+    raise DataError(
+        f"the sign of {name} is not the same at every speed",
+        found=", ".join(f"{n}: {name} = {v:.4g}" for n, v in given),
+        hint="give the fin one sign on import (`sign: -1` in mapping.yaml), or leave the odd run out",
+    )
+
+
+def _model_points(model: Model, name: str) -> list[Point]:
+    names = NAMES[model.axis]
+    if not np.isfinite(model.law.reference):
+        raise DataError(
+            f"model `{name}` does not know its speed",
+            found="no surge in its runs",
+            hint="identify from runs with `surge_m_s`, or give a table with a speed_m_s column",
+        )
+    speeds = [s for s, _ in model.law.points] or [model.law.reference]
+    points = []
+    for speed in speeds:
+        values = model.at_speed(speed)
+        errors = {n: _error_at(model, n, values[n], speed) for n in names.base}
+        errors = {n: e for n, e in errors.items() if np.isfinite(e) and e > 0}
+        label = name if len(speeds) == 1 else f"{name} at {speed:.2f} m/s"
+        points.append(Point(label, float(speed), MappingProxyType(values), MappingProxyType(errors)))
+    return points
+
+
+def _error_at(model: Model, name: str, value: float, speed: float) -> float:
+    """Return the error of a base parameter at a speed: the speed group's own, else that at the reference, scaled."""
+    group = model.info.get("law_parameters", {}).get(f"{name}@{speed:.3g}", {})
+    if group.get("std_error") is not None:
+        return float(group["std_error"])
+    reference = model.values[name]
+    return abs(model.std_error(name) * (value / reference if reference != 0 else 1.0))

@@ -1,0 +1,39 @@
+"""What helps where a turn or a straight run cannot be had: worked out from the models and what they were made from."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from math import ceil, degrees, radians
+from shlex import quote
+
+from fieldsid.artifacts import inputs_of
+from fieldsid.dynamics.free_run import LIMITING_EFFECT
+from fieldsid.plant.parameter_source import ParameterSource
+
+RIGHT_ANGLE_DEG = 90.0
+
+
+def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
+    """Return the hint for a fin limit below `needed` rad: that of the models' runs where it does, else what it takes."""
+    flown = ceil(1e4 * source.largest_fin) / 1e4
+    if source.largest_fin > needed:
+        return f"the models' runs had the fin at up to {flown:.4g} rad: `{option} {flown:.4g}`"
+    return f"trim the fin: a limit has to be above {needed:.4g} rad, {degrees(needed):.1f} deg"
+
+
+def in_radians(option: str, given: float) -> str:
+    """Return the hint for an angle that is none in rad: that angle in rad where it may be one in degrees."""
+    if radians(RIGHT_ANGLE_DEG) < given <= RIGHT_ANGLE_DEG:
+        return f"{given:g} deg are `{option} {radians(given):.4g}`"
+    return f"for 15 deg: `{option} 0.26`"
+
+
+def damping_that_holds(source: ParameterSource, speed: float, effects: Collection[str] = ()) -> str:
+    """Return the hint for a yaw rate that nothing holds at a speed in m/s."""
+    if LIMITING_EFFECT in effects:
+        return "fly a maneuver with longer turns, and identify again"
+    if not (source.models and source.paths) or source.is_fit_file:  # no file of a model to extend
+        return f"identify with the damping that holds it: `sysid identify RUN... --axis yaw --effects {LIMITING_EFFECT}`"
+    path = source.paths[source.near(speed)[0][0]]
+    runs = " ".join(quote(str(p)) for p in inputs_of(path)) or "RUN..."
+    return f"add the damping that holds it: `sysid extend {quote(str(path))} {runs} --add {LIMITING_EFFECT}`"

@@ -1,0 +1,261 @@
+"""The identified yaw model as arrays over draws of its parameters, ready for steady turns at any speed.
+
+    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - F(v, r) + b(u) delta + m + M(r) + x
+    c(u) x + c_q(u) x|x| = -c_r(u) r + c_d(u) delta
+with every coefficient at the speed u kept in the turn, by the model's own speed law and its effects' own scaling.
+The actuator's effects are taken as they leave a fin that was told to stay at its limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.dynamics.assemble import combined_terms, fin_path
+from fieldsid.dynamics.free_run import command_record, effects_of
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Core, Effect, Motion
+from fieldsid.models.model import Model
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+
+SETTLE_S = 60.0
+STEP_S = 0.05
+SCALES = np.geomspace(0.2, 5.0, 9)
+EXPONENT = "damping_exponent"
+CORE = ("cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "quadratic", "crossflow", "beyond_square")
+
+
+@dataclass(frozen=True, slots=True)
+class Scaled:
+    """A coefficient that goes with the scale as a power: value (d, 1) at the reference speed and its exponent."""
+
+    value: FloatArray
+    exponent: float
+
+    def at(self, scale: FloatArray) -> FloatArray:
+        """Return the coefficient (d, s) at scales (d, s) or (1, s)."""
+        return np.asarray(self.value * scale**self.exponent)
+
+
+@dataclass(frozen=True, slots=True)
+class YawPlant:
+    """One model, d draws of its values; draw 0 is the estimate itself. Arrays (d, 1); `fin` by rate sign, (d, 1) rad.
+
+    `moment` (d, s) is at the speeds that turns are entered at.
+    """
+
+    model: Model
+    effects: tuple[Effect, ...]
+    damping: FloatArray
+    damping_exponent: FloatArray
+    authority_ratio: FloatArray
+    trim: FloatArray
+    core: Mapping[str, Scaled]
+    length: FloatArray
+    fin: Mapping[float, FloatArray]
+    moment: FloatArray
+    damping_more: FloatArray
+    factors: tuple[FloatArray, FloatArray]
+    law: tuple[FloatArray, FloatArray]
+    sway_seen: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Number of draws."""
+        return int(self.damping.shape[0])
+
+    def scale(self, speed: FloatArray) -> FloatArray:
+        """Return speed over the model's reference speed, one where that is not known."""
+        reference = self.model.law.reference
+        return speed / reference if np.isfinite(reference) and reference > 0 else np.ones_like(speed)
+
+    def damping_at(self, speed: FloatArray) -> FloatArray:
+        """Return a(u), (d, s) 1/s."""
+        return np.asarray(self.damping * self.factors[0] * self.scale(speed) ** self.damping_exponent + self.damping_more)
+
+    def authority_at(self, speed: FloatArray) -> FloatArray:
+        """Return b(u), (d, s) 1/s^2."""
+        level = np.interp(np.log(speed), *self.law) * speed**2
+        return np.asarray(self.authority_ratio * self.factors[1] * level)
+
+    def trim_at(self, speed: FloatArray) -> FloatArray:
+        """Return C(u), (d, s) rad/s^2."""
+        if not self.model.law.trim_of_fin:
+            return self.trim
+        there = np.full_like(speed, _known(self.model.law.reference))
+        return np.asarray(self.trim * self.factors[1] * self.authority_at(speed) / self.authority_at(there))
+
+    def one(self, index: int = 0) -> YawPlant:
+        """Return the plant of one draw alone."""
+        keep = slice(index, index + 1)
+        return replace(
+            self,
+            **{f: getattr(self, f)[keep] for f in ARRAYS},
+            core={n: Scaled(c.value[keep], c.exponent) for n, c in self.core.items()},
+            fin={s: d[keep] for s, d in self.fin.items()},
+            factors=(self.factors[0][keep], self.factors[1][keep]),
+        )
+
+
+ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "length", "moment", "damping_more", "sway_seen")
+
+
+def yaw_plant(
+    model: Model, draws: Sequence[Mapping[str, float]], fin_limit: float, exponents: FloatArray, entry: FloatArray
+) -> YawPlant:
+    """Return the plant of a model for draws of its values (the first its own), at a fin command of +/-fin_limit rad.
+
+    `exponents` (d,) are the damping exponents of the draws, `entry` (s,) the speeds in m/s that turns are entered at: a
+    propeller keeps the thrust it had there. Raises what the effects' hooks raise.
+    """
+    names = NAMES[model.axis]
+    parts = effects_of(model)
+    starts = {c.name: c.start for e in parts for c in e.nuisance}
+    values = [starts | {EXPONENT: float(e)} | dict(d) for d, e in zip(draws, exponents, strict=True)]
+    sign = float(np.sign(model.base[names.authority])) or 1.0
+    steady = as_trained(model, _known(model.law.reference))
+    own = [e for e in parts if not follows_the_run(e)]
+    terms = [combined_terms(steady, parts, v) for v in values]
+    free = [combined_terms(steady, own, v) for v in values]
+
+    def column(numbers: Sequence[float]) -> FloatArray:
+        return np.array(numbers, dtype=np.float64)[:, None]
+
+    return YawPlant(
+        model=model,
+        effects=parts,
+        damping=column([v[names.damping] for v in values]),
+        damping_exponent=exponents[:, None],
+        authority_ratio=column([v[names.authority] / model.values[names.authority] for v in values]),
+        trim=column([v[names.trim] for v in values]),
+        core=_scaled_core(parts, values),
+        length=column([_core(parts, v, 1.0).length for v in values]),
+        fin={s: column(steady_fins(parts, values, s * sign * fin_limit, steady.speed)) for s in (1.0, -1.0)},
+        moment=straight_moment(model, parts, values, entry) + column([_mean(t.moment, 0.0) for t in free]),
+        damping_more=column([_mean(t.damping, 0.0) for t in terms]),
+        factors=(
+            column([_mean(t.damping_factor, 1.0) for t in terms]),
+            column([_mean(t.authority_factor, 1.0) for t in terms]),
+        ),
+        law=_law_table(model),
+        sway_seen=column([_seen_share(model, v) for v in values]),
+    )
+
+
+def straight_moment(
+    model: Model, parts: Sequence[Effect], values: Sequence[Mapping[str, float]], speeds: FloatArray
+) -> FloatArray:
+    """Return the moment (d, s) rad/s^2 of thrust, depth and speed on straight runs at speeds (s,) in m/s, fin at zero."""
+    own = [e for e in parts if follows_the_run(e)]
+    out = np.zeros((len(values), speeds.size))
+    if own:
+        for j, speed in enumerate(speeds):
+            record = as_trained(model, float(speed))
+            out[:, j] = [_mean(combined_terms(record, own, v).moment, 0.0) for v in values]
+    return out
+
+
+def follows_the_run(effect: Effect) -> bool:
+    """Return whether an effect's terms follow signals that a straight run has."""
+    return effect.terms is not None and bool({"thrust", "depth", "surge"} & set(effect.needs))
+
+
+def as_trained(model: Model, speed: float) -> Record:
+    """Return a straight run at a speed in m/s with the fin at zero, at the thrust and depth of the runs the model is from.
+
+    The thrust goes with the speed as it did from run to run there.
+    """
+    time, fin = _step(0.0)
+    known = model.trained
+    thrust, depth = known.get("thrust_mean", 0.0), known.get("depth_mean", 0.0)
+    if "thrust_at_1_m_s" in known:
+        thrust = known["thrust_at_1_m_s"] * speed ** known["thrust_exponent"]
+    signals = {r: np.full(time.size, v) for r, v in (("thrust", thrust), ("depth", depth)) if np.isfinite(v)}
+    return command_record(model.axis, time, fin, speed=speed, signals=signals)
+
+
+def steady_fins(parts: Sequence[Effect], values: Sequence[Mapping[str, float]], command: float, speed: float) -> list[float]:
+    """Return the steady fin angle, rad, for every draw, after a command step from zero."""
+    acting = [e for e in parts if e.fin is not None]
+    if not acting:
+        return [command] * len(values)
+    record = command_record(Axis.YAW, *_step(command), speed=speed)
+    return [float(fin_path(record, acting, v).end[-1]) for v in values]
+
+
+def fin_after_step(plant: YawPlant, side: float, command: float) -> tuple[FloatArray, FloatArray]:
+    """Return time (n,) s and fin angle (n,) rad of the estimate after a step of the command to its limit at time 0."""
+    sign = float(np.sign(plant.model.base[NAMES[plant.model.axis].authority])) or 1.0
+    record = command_record(Axis.YAW, *_step(side * sign * command), speed=_known(plant.model.law.reference))
+    values = {c.name: c.start for e in plant.effects for c in e.nuisance} | dict(plant.model.values)
+    path = fin_path(record, [e for e in plant.effects if e.fin is not None], values)
+    return record.time[1:] - STEP_S, np.append(path.start[1:], path.end[-1])
+
+
+def own_moment(parts: Sequence[Effect], values: Mapping[str, float], rate: FloatArray, record: Record) -> FloatArray:
+    """Return the moment (k,) rad/s^2 at steady rates (k,) of effects the core does not know, a circle's mean of each."""
+    own = [e for e in parts if e.moment is not None]
+    out = np.zeros(rate.size)
+    for effect in own:
+        if effect.moment is None:
+            continue
+        for i, r in enumerate(rate):
+            angle = np.linspace(0.0, 2.0 * np.pi, len(record), endpoint=False)
+            out[i] += float(np.mean(effect.moment(Motion(angle, np.full(len(record), r)), values, record)))
+    return out
+
+
+def _seen_share(model: Model, values: Mapping[str, float]) -> float:
+    """Return the share of the sway mode's settled moment that counts: all of it, or what the longest held turn showed.
+
+    A mode slower than any turn held, that would make the vehicle unstable on a straight course, was not seen by the data:
+    its moment is then counted as far as it had grown by the end of the longest hold.
+    """
+    damping, held = values.get("cross_damping", 0.0), model.trained.get("held_s", np.inf)
+    if damping <= 0.0 or not damping * held < 1.0:
+        return 1.0
+    settled = values[NAMES[model.axis].damping] + values.get("cross_rate", 0.0) / damping
+    return 1.0 if settled > 0.0 else float(-np.expm1(-damping * held))
+
+
+def _law_table(model: Model) -> tuple[FloatArray, FloatArray]:
+    """Return log speed and b(u)/u^2 of the model's own law, (k,) each; it is linear between in log speed."""
+    speeds = np.unique(np.concatenate([np.geomspace(0.02, 50.0, 400), [s for s, _ in model.law.points]]))
+    base = model.base[NAMES[model.axis].authority]
+    return np.log(speeds), np.array([model.law.authority(float(u), base) for u in speeds]) / speeds**2
+
+
+def _step(command: float) -> tuple[FloatArray, FloatArray]:
+    time = np.arange(0.0, SETTLE_S, STEP_S)
+    return time, np.where(time < 0.5 * STEP_S, 0.0, command)
+
+
+def _core(parts: Sequence[Effect], values: Mapping[str, float], scale: float) -> Core:
+    core = Core()
+    for effect in parts:
+        if effect.core is not None:
+            core = core.plus(effect.core(values, scale))
+    return core
+
+
+def _scaled_core(parts: Sequence[Effect], values: Sequence[Mapping[str, float]]) -> dict[str, Scaled]:
+    """Return the core's coefficients of all draws, each with the power of the scale it goes with."""
+    double = _core(parts, values[0], 2.0)
+    cores = [_core(parts, v, 1.0) for v in values]
+    out = {}
+    for name in CORE:
+        at_one, at_two = getattr(cores[0], name), getattr(double, name)
+        exponent = float(np.log2(at_two / at_one)) if at_one != 0 and at_two / at_one > 0 else 0.0
+        out[name] = Scaled(np.array([getattr(c, name) for c in cores])[:, None], exponent)
+    return out
+
+
+def _mean(values: FloatArray | None, absent: float) -> float:
+    return absent if values is None else float(np.mean(values))
+
+
+def _known(speed: float) -> float:
+    return speed if np.isfinite(speed) else 1.0

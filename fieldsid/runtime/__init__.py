@@ -1,0 +1,1 @@
+"""How work is run: the pool of worker processes and the count of evaluations."""

@@ -1,0 +1,1 @@
+"""The circle a run really turned."""

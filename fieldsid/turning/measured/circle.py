@@ -1,0 +1,202 @@
+"""A robust geometric circle through a track, on a centre that a steady current carries along.
+
+Minimises sum rho(d_i), d_i = |p_i - c - w t_i| - R, over centre c, radius R and current w (Gander, Golub & Strebel 1994
+for the geometric distance; Taubin 1991 for the start; Huber's rho for outliers). The standard error is corrected for
+correlated residuals by the length of their autocorrelation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from fieldsid.display import Brief
+from fieldsid.errors import DataError
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.laws.regression import t_factor
+
+HUBER = 1.345
+MAD_TO_SD = 1.4826
+ROUNDING_SHARE = 1e-9
+"""Share of the track's size below which its extent, or its curvature, is rounding."""
+LEAST_SAMPLES = 12
+MAX_REWEIGHTINGS = 12
+LEAST_TURN_RAD = 1.5
+"""Below about a quarter circle the radius and the centre trade against each other."""
+LEAST_TURN_FOR_CURRENT_RAD = 5.0
+"""Below most of a full circle a current cannot be told from a shift of the centre."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Circle(Brief):
+    """A fitted circle: radius and its standard error (m), centre at t = 0 (m), current (m/s), residual (n,) m."""
+
+    radius: float
+    radius_std_error: float
+    centre: tuple[float, float]
+    current: tuple[float, float]
+    residual: FloatArray
+    turned: float
+    effective_samples: float
+
+    @property
+    def interval95(self) -> tuple[float, float]:
+        """The 95 % interval of the radius, m."""
+        half = t_factor(round(self.effective_samples)) * self.radius_std_error
+        return self.radius - half, self.radius + half
+
+    @property
+    def residual_sd(self) -> float:
+        """Robust scatter of the track about the circle, m."""
+        return _robust_sd(self.residual)
+
+
+def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray | None = None) -> Circle:
+    """Fit a circle to a track (n,) in s and m; the current is fitted too where most of a circle was turned.
+
+    `heading` (n,) rad, unwrapped, gives a start that stands any current; without it a weak current is taken for granted.
+    Raises DataError when there are too few samples or too short an arc.
+    """
+    ok = np.isfinite(x) & np.isfinite(y) & (True if heading is None else np.isfinite(heading))
+    t, track = time[ok] - time[ok][0] if ok.any() else time[:0], np.stack([x[ok], y[ok]], axis=1)
+    if t.size < LEAST_SAMPLES:
+        raise DataError(
+            "too few positions for a circle",
+            found=f"{t.size}, at least {LEAST_SAMPLES}",
+            hint="give a run with x_m and y_m throughout the turn",
+        )
+    middle = track.mean(axis=0)
+    scale = float(np.sqrt(np.mean(np.sum((track - middle) ** 2, axis=1))))
+    if not scale > ROUNDING_SHARE * float(np.max(np.abs(track))):
+        raise DataError(
+            "the track does not leave its first position, no circle",
+            found=f"{t.size} positions alike",
+            hint="give the run of a turn",
+        )
+    points = (track - middle) / scale
+    if heading is None:
+        start = np.concatenate([_taubin(_medians(points)), [0.0, 0.0]])
+        turned = _turned(_medians(points), start)
+    else:
+        start = _by_heading(points, t / (float(t[-1]) or 1.0), heading[ok])
+        turned = float(abs(heading[ok][-1] - heading[ok][0]))
+    if turned < LEAST_TURN_RAD:
+        raise DataError(
+            "the settled part of the turn is too short an arc for a circle",
+            found=f"{np.degrees(turned):.0f} deg, at least {np.degrees(LEAST_TURN_RAD):.0f}",
+            hint="fly the turn on, one and a half times round: `sysid plan --axis yaw --radius`",
+        )
+    free = 5 if turned >= LEAST_TURN_FOR_CURRENT_RAD else 3
+    return _refined(t, track, middle, scale, start, free, turned)
+
+
+def _refined(
+    t: FloatArray, track: FloatArray, middle: FloatArray, scale: float, start: FloatArray, free: int, turned: float
+) -> Circle:
+    span = float(t[-1]) or 1.0
+    points, share = (track - middle) / scale, t / span
+
+    def off(p: FloatArray) -> FloatArray:
+        return _distance(points, share, np.concatenate([p, np.zeros(5 - p.size)]))
+
+    best = start[:free]
+    for _ in range(4):
+        spread = max(_robust_sd(off(best)), 1e-9)
+        fit = least_squares(off, best, loss="huber", f_scale=HUBER * spread, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        best = np.asarray(fit.x)
+    residual = off(best)
+    size = _effective(residual)
+    jac = np.asarray(fit.jac, dtype=np.float64)
+    inverse = np.linalg.pinv(jac.T @ jac)
+    error = _robust_sd(residual) * float(np.sqrt(inverse[2, 2] * t.size / max(size - free, 1.0)))
+    full = np.concatenate([best, np.zeros(5 - free)])
+    return Circle(
+        radius=float(abs(full[2]) * scale),
+        radius_std_error=error * scale,
+        centre=(float(full[0] * scale + middle[0]), float(full[1] * scale + middle[1])),
+        current=(float(full[3] * scale / span), float(full[4] * scale / span)),
+        residual=residual * scale,
+        turned=turned,
+        effective_samples=size,
+    )
+
+
+def _distance(points: FloatArray, share: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the signed distance (n,) of each point to the circle (cx, cy, R, wx, wy)."""
+    away = points - p[:2] - share[:, None] * p[3:5]
+    return np.asarray(np.hypot(away[:, 0], away[:, 1]) - p[2])
+
+
+def _by_heading(points: FloatArray, share: FloatArray, heading: FloatArray) -> FloatArray:
+    """Return (cx, cy, R, wx, wy): x = cx + wx t + p sin + q cos, y = cy + wy t - p cos + q sin of the heading.
+
+    Linear in all of it; least absolute deviations by reweighting, so that wild fixes do not count.
+    """
+    one, zero, sin, cos = np.ones_like(share), np.zeros_like(share), np.sin(heading), np.cos(heading)
+    along = np.stack([one, zero, share, zero, sin, cos], axis=1)
+    across = np.stack([zero, one, zero, share, -cos, sin], axis=1)
+    columns, values = np.concatenate([along, across]), np.concatenate([points[:, 0], points[:, 1]])
+    weight = np.ones_like(values)
+    for _ in range(MAX_REWEIGHTINGS):
+        root = np.sqrt(weight)[:, None]
+        found = np.linalg.lstsq(columns * root, values * root[:, 0], rcond=None)[0]
+        weight = 1.0 / np.maximum(np.abs(values - columns @ found), 1e-3)
+    return np.array([found[0], found[1], np.hypot(found[4], found[5]), found[2], found[3]])
+
+
+def _medians(points: FloatArray) -> FloatArray:
+    """Return running medians of nine fixes, (n, 2), so that a wild one does not count."""
+    padded = np.pad(points, ((4, 4), (0, 0)), mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 9, axis=0), axis=-1))
+
+
+def _taubin(points: FloatArray) -> FloatArray:
+    """Return (cx, cy, R) of Taubin's algebraic fit, by SVD (Chernov 2010, section 5.7)."""
+    middle = points.mean(axis=0)
+    centred = points - middle
+    z = np.sum(centred**2, axis=1)
+    mean_z = float(z.mean())
+    z0 = (z - mean_z) / (2.0 * np.sqrt(mean_z))
+    _, _, vt = np.linalg.svd(np.stack([z0, centred[:, 0], centred[:, 1]], axis=1), full_matrices=False)
+    a = vt[2].copy()
+    a[0] /= 2.0 * np.sqrt(mean_z)
+    if abs(a[0]) < ROUNDING_SHARE:
+        raise DataError("the track is a straight line, no circle", found="no curvature", hint="give the run of a turn")
+    last = -mean_z * a[0]
+    centre = -a[1:] / (2.0 * a[0])
+    radius = np.sqrt(max(a[1] ** 2 + a[2] ** 2 - 4.0 * a[0] * last, 0.0)) / (2.0 * abs(a[0]))
+    return np.array([*(centre + middle), radius])
+
+
+def _turned(points: FloatArray, circle: FloatArray) -> float:
+    """Return the angle swept about the centre, rad: from first to last, unwrapped."""
+    angle = np.unwrap(np.arctan2(points[:, 1] - circle[1], points[:, 0] - circle[0]))
+    return float(abs(angle[-1] - angle[0]))
+
+
+def _robust_sd(residual: FloatArray) -> float:
+    return float(MAD_TO_SD * np.median(np.abs(residual - np.median(residual))))
+
+
+def _effective(residual: FloatArray) -> float:
+    """Return the number of independent samples in correlated residuals (n,), the lesser of two estimates.
+
+    n / (1 + 2 sum of the autocorrelation), and that of an AR(1) whose coefficient is corrected for its bias (Kendall 1954):
+    the sum is cut where it is lost in noise, the AR(1) misses colour under white noise.
+    """
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    if power <= 0.0:
+        return float(residual.size)
+    total = 1.0
+    for lag in range(1, residual.size // 2):
+        rho = float(centred[:-lag] @ centred[lag:]) / power
+        if rho < 2.0 / np.sqrt(residual.size):
+            break
+        total += 2.0 * rho
+    size = residual.size
+    rho = float(centred[1:] @ centred[:-1]) / power
+    rho = min(max(rho + (1.0 + 4.0 * rho) / size, 0.0), 0.995)
+    return max(min(size / total, size * (1.0 - rho) / (1.0 + rho)), 2.0)

@@ -1,0 +1,90 @@
+"""Settled turns of a source of models at any speed: each model scaled by its own law, neighbours in speed blended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.parameter_source import ParameterSource, draw_values
+from fieldsid.plant.yaw_plant import YawPlant, yaw_plant
+from fieldsid.runtime.worker_pool import parallel_map
+from fieldsid.turning.prediction import SIDES
+from fieldsid.turning.steady.speed_loss import SpeedLoss, SurgeModel, draw_speed_loss, no_speed_loss
+from fieldsid.turning.steady.steady_turn import SteadyTurn, steady_turn
+from fieldsid.turning.steady.transient import Transient, turn_transient
+
+FALLBACK_CURVATURE = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class BlendedTurns:
+    """Turns to one side from entry speeds (s,): radius (d, s) over draws; magnitudes (s,) of rate and path speed; transient."""
+
+    entry: FloatArray
+    radius: FloatArray
+    rate: FloatArray
+    path_speed: FloatArray
+    transient: Transient
+    effects: tuple[str, ...]
+
+
+def blended_turns(
+    source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
+) -> dict[str, BlendedTurns]:
+    """Return the settled turns of a source's models with the rudder held at `rudder` rad, to either side by name."""
+    weight = np.zeros((len(source.models), entry.size))
+    for i, speed in enumerate(entry):
+        for index, share in source.near(float(speed)):
+            weight[index, i] = share
+    asked = []
+    for index, model in enumerate(source.models):
+        used = np.flatnonzero(weight[index])
+        if used.size:
+            plant, speed_loss = _plant_and_speed_loss(model, rudder, surge, draws, rng, entry[used])
+            asked += [(side, index, used, plant, speed_loss) for side in SIDES]
+
+    def turned(of: tuple[str, int, npt.NDArray[np.int_], YawPlant, SpeedLoss]) -> tuple[SteadyTurn, Transient]:
+        side, _, used, plant, speed_loss = of
+        turn = steady_turn(plant, speed_loss, entry[used], SIDES[side])
+        return turn, turn_transient(plant, speed_loss, entry[used], SIDES[side], rudder)
+
+    sums = {side: _Sums(draws, entry.size) for side in SIDES}
+    for (side, index, used, _, _), (turn, after) in zip(asked, parallel_map(turned, asked), strict=True):
+        sums[side].add(used, weight[index, used], turn, after)
+    effects = tuple(sorted({e for m in source.models for e in m.effects}))
+    return {side: total.turns(entry, effects) for side, total in sums.items()}
+
+
+class _Sums:
+    """Weighted sums over neighbouring models: logarithms of what is positive and multiplies, the rest as it is."""
+
+    def __init__(self, draws: int, speeds: int) -> None:
+        self.log_radius = np.zeros((draws, speeds))
+        self.log_rate, self.log_speed = np.zeros(speeds), np.zeros(speeds)
+        self.after = {f.name: np.zeros(speeds) for f in fields(Transient)}
+
+    def add(self, used: npt.NDArray[np.int_], share: FloatArray, turn: SteadyTurn, after: Transient) -> None:
+        self.log_radius[:, used] += share * np.log(turn.radius)
+        self.log_rate[used] += share * np.log(np.abs(turn.rate[0]))
+        self.log_speed[used] += share * np.log(turn.speed[0])
+        for name, total in self.after.items():
+            total[used] += share * getattr(after, name)
+
+    def turns(self, entry: FloatArray, effects: tuple[str, ...]) -> BlendedTurns:
+        rate, speed = np.exp(self.log_rate), np.exp(self.log_speed)
+        return BlendedTurns(entry, np.exp(self.log_radius), rate, speed, Transient(**self.after), effects)
+
+
+def _plant_and_speed_loss(
+    model: Model, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator, entry: FloatArray
+) -> tuple[YawPlant, SpeedLoss]:
+    values, exponents = draw_values(model, draws, rng)
+    plant = yaw_plant(model, values, rudder, exponents, entry)
+    kept = steady_turn(plant.one(), no_speed_loss(1), entry, 1.0)
+    middle = int(np.argsort(entry)[entry.size // 2])
+    curvature = float(np.abs(kept.rate[0, middle]) / kept.surge[0, middle])
+    return plant, draw_speed_loss(surge, curvature if np.isfinite(curvature) else FALLBACK_CURVATURE, draws, rng)

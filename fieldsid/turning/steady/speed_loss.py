@@ -1,0 +1,226 @@
+"""Speed lost in a turn and drift, identified from measured surge and sway of the runs.
+
+    u' = a_u (u0^2 - u^2) - k_r r^2 - k_d u^2 delta^2      (drag of hull; added resistance of the turn; drag of the fin)
+In a settled turn u0^2 = u^2 (1 + (k_d/a_u) delta^2 + (k_r/a_u) (r/u)^2). Drift: v = -l_r r, so the path's speed is
+hypot(u, l_r r). Source: Fossen 2011, section 7.1.3 (surge with loss term X_rr r^2); Prestero 2001, chapter 4 (axial drag).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from fieldsid.display import Brief
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import knows_speed, record_of
+from fieldsid.numerics.arrays import FloatArray
+
+BLOCK_S = 0.2
+LEAST_SAMPLES = 40
+LEAST_TURN_RAD_S = 0.03
+TYPICAL_LOSS = 0.15
+TYPICAL_LOSS_LOG_SD = 0.6
+TYPICAL_DRIFT_RAD = 0.12
+TYPICAL_DRIFT_LOG_SD = 0.5
+"""Assumed where nothing was measured: 15 % of the speed lost (95 %: 5 .. 50) and 7 deg of drift (3 .. 18) in the requested turn.
+The ensemble of `model_error.py` lost 9 .. 38 % and drifted 2 .. 5 deg."""
+
+
+MIN_VARIANCE = 1e-18
+"""Variance below which a coefficient counts as known."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SurgeModel(Brief):
+    """a_u (1/m), k_r (m), k_d (1/m), l_r (m) with their covariance (4, 4); what was measured; the fit's scatter m/s."""
+
+    drag: float
+    turn_loss: float
+    fin_loss: float
+    drift_per_rate: float
+    covariance: FloatArray
+    surge_measured: bool
+    sway_measured: bool
+    surge_rms: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLoss:
+    """Draws (d, 1): turn loss k_r/a_u (m^2), fin loss k_d/a_u, drift per rate l_r (m), and drag a_u (1/m)."""
+
+    turn: FloatArray
+    fin: FloatArray
+    drift_per_rate: FloatArray
+    drag: FloatArray
+
+    def factor(self, fin: FloatArray, rate_per_speed: FloatArray) -> FloatArray:
+        """Return u0/u for a fin (d, 1) rad and r/u (d, s) 1/m."""
+        return np.asarray(np.sqrt(1.0 + self.fin * fin**2 + self.turn * rate_per_speed**2))
+
+    def one(self, index: int = 0) -> SpeedLoss:
+        """Return one draw alone."""
+        keep = slice(index, index + 1)
+        return SpeedLoss(self.turn[keep], self.fin[keep], self.drift_per_rate[keep], self.drag[keep])
+
+
+def no_speed_loss(count: int) -> SpeedLoss:
+    """Return a speed that is kept and no drift, for the formulas."""
+    zero = np.zeros((count, 1))
+    return SpeedLoss(zero, zero, zero, np.full((count, 1), 0.1))
+
+
+def draw_speed_loss(model: SurgeModel | None, typical_curvature: float, count: int, rng: np.random.Generator) -> SpeedLoss:
+    """Return draws of the slowing, the first the estimate; typical values where nothing was measured.
+
+    `typical_curvature` (1/m) is that of the turn in question: it turns a typical loss of speed into a coefficient.
+    """
+    z = rng.standard_normal((count, 4))
+    z[0] = 0.0
+    kr2 = typical_curvature**2
+    loss = np.clip(TYPICAL_LOSS * np.exp(TYPICAL_LOSS_LOG_SD * z[:, 0]), 0.0, 0.6)
+    turn = (1.0 / (1.0 - loss) ** 2 - 1.0) / kr2
+    fin = np.zeros(count)
+    drag = np.full(count, 0.1)
+    drift = np.tan(np.clip(TYPICAL_DRIFT_RAD * np.exp(TYPICAL_DRIFT_LOG_SD * z[:, 3]), 0.0, 0.6)) / typical_curvature
+    if model is not None and model.surge_measured:
+        spread = z[:, :3] @ _root(model.covariance[:3, :3]).T
+        drag = np.maximum(model.drag + spread[:, 0], 0.2 * model.drag)
+        turn = np.maximum(model.turn_loss + spread[:, 1], 0.0) / drag
+        fin = np.maximum(model.fin_loss + spread[:, 2], 0.0) / drag
+    if model is not None and model.sway_measured:
+        drift = model.drift_per_rate + z[:, 3] * np.sqrt(model.covariance[3, 3])
+    return SpeedLoss(turn[:, None], fin[:, None], drift[:, None], drag[:, None])
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Return the lower root (n, n) of a covariance: Cholesky's, and one where rounding has made it indefinite as well."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), MIN_VARIANCE))
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T) / np.outer(scale, scale))
+    upper = np.asarray(np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T, mode="r"))
+    return np.asarray(scale[:, None] * (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T)
+
+
+def fit_surge(runs: Sequence[Run]) -> SurgeModel | None:
+    """Fit the slowing to runs with measured surge and yaw rate, jointly; None where none of them says anything.
+
+    A run says something when it turns at more than a few hundredths of a rad/s.
+    """
+    cases = [c for c in (_case(run) for run in runs) if c is not None]
+    if not cases:
+        return None
+    with_surge = [c for c in cases if np.isfinite(c.surge).all()]
+    with_sway = [c for c in cases if np.isfinite(c.sway).all()]
+    covariance = np.zeros((4, 4))
+    drag, turn, fin, rms = 0.1, 0.0, 0.0, float("nan")
+    if with_surge:
+        (drag, turn, fin), covariance[:3, :3], rms = _fit_loss(with_surge)
+    drift, drift_variance = _fit_drift(with_sway) if with_sway else (0.0, 0.0)
+    covariance[3, 3] = drift_variance
+    if not with_surge and not with_sway:
+        return None
+    return SurgeModel(drag, turn, fin, drift, covariance, bool(with_surge), bool(with_sway), rms)
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """One run in block means: time, surge, sway, rate, fin, thrust ratio, (n,) each; NaN where not measured."""
+
+    time: FloatArray
+    surge: FloatArray
+    sway: FloatArray
+    rate: FloatArray
+    fin: FloatArray
+    thrust: FloatArray
+
+
+def _case(run: Run) -> _Case | None:
+    if not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")) or not (run.has("rudder_rad") or run.has("rudder_measured_rad")):
+        return None
+    record = record_of(run, Axis.YAW)
+    angle_only = not record.rate_ok.any()
+    rate = (
+        np.gradient(record.angle, record.time)
+        if angle_only
+        else np.interp(record.time, record.time[record.rate_ok], record.rate[record.rate_ok])
+    )
+    width = max(1, round(BLOCK_S / float(np.median(record.steps))))
+    none = np.full(len(record), np.nan)
+    thrust = record.signals.get("thrust")
+    start = float(np.median(thrust[: max(10, thrust.size // 20)])) if thrust is not None else 0.0
+    ratio = thrust / start if thrust is not None and start > 0 else np.ones(len(record))
+    surge = _filled(run, "surge_m_s", none) if knows_speed(run) else none
+    columns = (record.time, surge, _filled(run, "sway_m_s", none), rate, record.fin, ratio)
+    blocks = [_blocks(c, width) for c in columns]
+    if blocks[0].size < LEAST_SAMPLES or float(np.max(np.abs(blocks[3]))) < LEAST_TURN_RAD_S:
+        return None
+    return _Case(*blocks)
+
+
+def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:
+    if not run.has(name):
+        return none
+    values = run[name]
+    ok = np.isfinite(values)
+    return np.interp(run.time, run.time[ok], values[ok])
+
+
+def _blocks(values: FloatArray, width: int) -> FloatArray:
+    count = values.size // width
+    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
+
+
+def _simulated(case: _Case, drag: float, turn: float, fin: float, straight: float, first: float) -> FloatArray:
+    """Return surge (n,) by Heun's steps."""
+    u = np.empty(case.time.size)
+    u[0] = first
+    loss_r, loss_d = turn * case.rate**2, fin * case.fin**2
+    push = drag * straight**2 * case.thrust
+    steps = np.diff(case.time)
+    for i, h in enumerate(steps):
+        now = u[i]
+        slope = push[i] - (drag + loss_d[i]) * now * now - loss_r[i]
+        ahead = now + h * slope
+        after = push[i + 1] - (drag + loss_d[i + 1]) * ahead * ahead - loss_r[i + 1]
+        u[i + 1] = min(max(now + 0.5 * h * (slope + after), 0.01), 50.0)
+    return u
+
+
+def _fit_loss(cases: Sequence[_Case]) -> tuple[tuple[float, float, float], FloatArray, float]:
+    firsts = [float(np.median(c.surge[:10])) for c in cases]
+
+    def residual(p: FloatArray) -> FloatArray:
+        return np.concatenate(
+            [c.surge - _simulated(c, p[0], p[1], p[2], p[3 + 2 * i], p[4 + 2 * i]) for i, c in enumerate(cases)]
+        )
+
+    start = np.array([0.1, 0.2, 0.05, *[s for first in firsts for s in (first, first)]])
+    low = np.array([1e-3, 0.0, 0.0] + [1e-3] * (2 * len(cases)))
+    high = np.array([5.0, 50.0, 20.0] + [50.0] * (2 * len(cases)))
+    fit = least_squares(residual, start, bounds=(low, high), x_scale=np.maximum(start, 0.05))
+    jac = np.asarray(fit.jac, dtype=np.float64)
+    variance = float(np.sum(fit.fun**2)) / max(fit.fun.size - start.size, 1)
+    covariance = np.linalg.pinv(jac.T @ jac)[:3, :3] * variance * _inflation(fit.fun)
+    return (float(fit.x[0]), float(fit.x[1]), float(fit.x[2])), np.asarray(covariance), float(np.sqrt(variance))
+
+
+def _fit_drift(cases: Sequence[_Case]) -> tuple[float, float]:
+    """Return l_r of v = -l_r r + v_0 and its variance, each run with an offset of its own."""
+    rate = np.concatenate([c.rate - c.rate.mean() for c in cases])
+    sway = np.concatenate([c.sway - c.sway.mean() for c in cases])
+    power = float(rate @ rate)
+    slope = -float(rate @ sway) / power
+    left = sway + slope * rate
+    return slope, float(np.mean(left**2)) / power * _inflation(left)
+
+
+def _inflation(residual: FloatArray) -> float:
+    """Return how much fewer independent samples correlated residuals hold: (1 + rho) / (1 - rho)."""
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    rho = float(centred[1:] @ centred[:-1]) / power if power > 0 else 0.0
+    rho = min(max(rho, 0.0), 0.98)
+    return (1.0 + rho) / (1.0 - rho)

@@ -1,0 +1,60 @@
+"""Which effects, and which of their forms, a log can show at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.dynamics.free_run import command_record
+from fieldsid.effects import pick_effect
+from fieldsid.models.axis import Axis
+
+PROP = pick_effect("prop_moment")
+
+
+def run(axis: Axis, *roles: str):
+    time = np.arange(0.0, 10.0, 0.1)
+    signals = {role: np.ones(time.size) for role in roles}
+    made = command_record(axis, time, np.zeros(time.size), speed=1.5, signals=signals)
+    object.__setattr__(made, "signals", MappingProxyType(signals))
+    return made
+
+
+def test_an_effect_without_its_signal_is_left_out_with_the_reason():
+    kept, skipped = applicable_effects([PROP], [run(Axis.YAW, "thrust"), run(Axis.YAW)])
+    assert kept == ()
+    assert skipped == {"prop_moment": "needs thrust, which the log lacks"}
+
+
+@pytest.mark.parametrize(
+    ("axis", "roles", "more"),
+    [
+        (Axis.YAW, ("thrust", "surge"), {"build_up", "prop_trimmed"}),
+        (Axis.YAW, ("thrust",), {"build_up"}),
+        (Axis.PITCH, ("thrust", "surge"), set()),
+    ],
+)
+def test_a_form_is_tried_on_its_own_axes_and_with_its_own_signals_alone(axis, roles, more):
+    (kept,), _ = applicable_effects([PROP], [run(axis, *roles)])
+    tried = {c.name for form in kept.variants for c in form.coefficients}
+    assert tried == {"prop_square"} | more
+
+
+def test_each_form_has_its_own_numbers():
+    assert len({frozenset(c.name for c in f.coefficients) for f in PROP.variants}) == len(PROP.variants)
+
+
+def test_an_effect_all_of_whose_forms_can_be_tried_is_the_one_declared():
+    (kept,), _ = applicable_effects([PROP], [run(Axis.YAW, "thrust", "surge")])
+    assert kept is PROP
+
+
+def test_runs_that_log_their_thrust_in_different_units_do_not_show_one_moment_of_it():
+    mixed = [replace(run(Axis.YAW, "thrust"), thrust_column=c) for c in ("thrust", "propeller_rpm")]
+    kept, skipped = applicable_effects([PROP], mixed)
+    assert kept == ()
+    assert skipped == {"prop_moment": "needs one thrust for all runs, and they log it as propeller_rpm and as thrust"}

@@ -1,0 +1,93 @@
+"""What an addition must bring to be named, and the order effects are named in, on hypotheses made by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.evidence.acceptance import gains_evidence, is_accepted, leaves_error, lowers_error, variant_improves
+from fieldsid.diagnosis.records import Errors
+from fieldsid.diagnosis.verdict import added_effects
+from fieldsid.models.effect import effect_named
+from fieldsid.models.model import Noise
+
+FLOOR = Noise(0.004, 0.002)
+
+
+def hypothesis(*names, gain=0.0, over=1.0, train=1.0):
+    """One with this much log evidence beyond the base, half of it learned, and errors over the floor."""
+    errors = [Errors(FLOOR.angle * e, FLOOR.rate * e) for e in (over, train)]
+    effects = tuple(effect_named(n) for n in names)
+    learned = np.array([0.25 * gain, 0.25 * gain])
+    return SimpleNamespace(
+        names=names,
+        effects=effects,
+        log_likelihood_by_run=learned,
+        log_evidence=gain,
+        selection_errors=errors[0],
+        train=errors[1],
+    )
+
+
+BASE = hypothesis(over=1.2)
+
+
+@pytest.mark.parametrize(("over", "named", "refined"), [(1.19, False, False), (1.14, False, True), (1.09, True, True)])
+def test_a_name_asks_for_a_twelfth_of_the_error_and_a_form_for_less(over, named, refined):
+    found = hypothesis("servo_lag", gain=50.0, over=over)
+    assert (is_accepted(BASE, found), variant_improves(BASE, found)) == (named, refined)
+
+
+@pytest.mark.parametrize(
+    ("over", "train", "refined"), [(1.19, 1.0, True), (1.19, 1.24, False), (1.21, 1.0, False), (1.16, 1.3, True)]
+)
+def test_a_form_may_show_on_the_runs_fitted_to_where_it_raises_no_error_on_the_others(over, train, refined):
+    plain = hypothesis("stall", over=1.2, train=1.25)
+    assert variant_improves(plain, hypothesis("stall", gain=50.0, over=over, train=train)) == refined
+
+
+@pytest.mark.parametrize(("gain", "paid"), [(-1.0, False), (1.0, True)])
+def test_the_error_alone_is_not_enough(gain, paid):
+    found = hypothesis("servo_lag", gain=gain, over=1.0)
+    assert (is_accepted(BASE, found), gains_evidence(BASE, found)) == (paid, paid)
+
+
+@pytest.mark.parametrize(
+    ("over", "train", "counts"),
+    [(1.0, 1.5, True), (1.2, 1.3, True), (1.19, 1.45, False), (1.0, 1.7, True), (1.0, 1.9, False), (1.3, 1.0, False)],
+)
+def test_an_addition_matters_on_fitted_or_on_unseen_runs_if_it_lowers_all_and_no_unseen_one_rises(over, train, counts):
+    base = hypothesis(over=1.2, train=1.5)
+    assert lowers_error(base, hypothesis("servo_lag", gain=50.0, over=over, train=train)) == counts
+
+
+def test_numbers_of_every_runs_own_must_be_learned_on_the_runs_fitted_to():
+    found = hypothesis("wave", gain=7.0, over=1.0)
+    assert not is_accepted(BASE, found)
+    assert is_accepted(BASE, hypothesis("wave", gain=20.0, over=1.0))
+
+
+def test_a_third_effect_must_bring_more():
+    two = hypothesis("servo_lag", "gyro_bias", gain=50.0, over=1.2)
+    assert not is_accepted(two, hypothesis("servo_lag", "gyro_bias", "stall", gain=99.0, over=1.09))
+    assert is_accepted(two, hypothesis("servo_lag", "gyro_bias", "stall", gain=99.0, over=1.06))
+
+
+@pytest.mark.parametrize(("over", "train", "more"), [(1.01, 1.01, False), (1.03, 1.0, True), (1.0, 1.03, True)])
+def test_what_is_left_may_be_left_on_either_runs(over, train, more):
+    assert leaves_error(hypothesis(over=over, train=train), FLOOR) == more
+
+
+def test_the_effect_whose_lack_costs_most_on_unseen_runs_is_named_first():
+    both = hypothesis("speed_varying", "current", gain=90.0, over=1.0)
+    likely, useful = hypothesis("speed_varying", gain=60.0, over=3.0), hypothesis("current", gain=50.0, over=1.3)
+    search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, likely, useful)})
+    assert added_effects(search, both) == ("current", "speed_varying")
+
+
+def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
+    both, alone = hypothesis("speed_varying", "stall", gain=90.0, over=1.0), hypothesis("stall", gain=80.0, over=1.2)
+    search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, alone)})
+    assert added_effects(search, both) == ("stall", "speed_varying")

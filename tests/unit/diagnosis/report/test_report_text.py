@@ -1,0 +1,94 @@
+"""The evidence in words, on hypotheses made by hand: what it says is what the table and the figure show."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.diagnose import confusable
+from fieldsid.diagnosis.evidence.scored_model import pooled_errors
+from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.diagnosis.report.report_text import evidence
+from fieldsid.diagnosis.verdict import excess_explained, probabilities, worsens
+from fieldsid.models.model import Noise
+
+FLOOR = Noise(0.004, 0.002)
+
+
+def _errors(*over: float) -> Errors:
+    """Errors over the floor of some runs of the same length."""
+    mean = float(np.sqrt(np.mean(np.square(over))))
+    return Errors(FLOOR.angle * mean, FLOOR.rate * mean, tuple(Errors(FLOOR.angle * e, FLOOR.rate * e) for e in over))
+
+
+def _made(*names: str, train: tuple[float, ...], unseen: tuple[float, ...], score: float, runs: tuple[float, ...] = ()):
+    """One with errors over the floor of its fitted and unseen runs, a log evidence, and that of its runs."""
+    pair = Pair(_errors(*train), _errors(*unseen))
+    likely = np.array(runs or [score / 2.0] * (len(train) + len(unseen)))
+    by_run, of_unseen = likely[: len(train)], likely[len(train) :]
+    return SimpleNamespace(
+        names=names,
+        log_evidence=score,
+        errors=pair,
+        selection_errors=pair.validation,
+        log_likelihood_by_run=by_run,
+        validation_log_density=of_unseen,
+    )
+
+
+BASE = _made(train=(1.1,), unseen=(1.1,), score=0.0)
+
+
+def _search(base=BASE):
+    return SimpleNamespace(base=lambda: base, validation=(None,), known=(), floor=FLOOR)
+
+
+def test_what_raises_the_error_is_said_to_make_it_worse():
+    h = _made("current", train=(1.0,), unseen=(3.3,), score=40.0)
+    said = evidence(_search(), h, h.errors, FLOOR, h.log_evidence)
+    assert said.startswith("makes it worse: error on unseen runs 1.10 -> 3.30 x noise floor; log evidence +40.0")
+    assert "%" not in said
+    assert worsens(_search(), h, FLOOR)
+
+
+def test_what_lowers_it_says_the_share_of_the_table():
+    h = _made("servo_lag", train=(1.0,), unseen=(1.02,), score=40.0)
+    said = evidence(_search(), h, h.errors, FLOOR, h.log_evidence)
+    assert f"1.10 -> 1.02 x noise floor ({100 * excess_explained(_search(), h, FLOOR):.0f} % of the excess)" in said
+    assert not worsens(_search(), h, FLOOR)
+
+
+def test_runs_are_counted_by_the_error_that_the_sentence_is_about():
+    base = _made(train=(90.0,), unseen=(145.0,), score=0.0)
+    h = _made("stall", train=(800.0,), unseen=(1922.0,), score=9.0, runs=(4.0, 5.0))
+    said = evidence(_search(base), h, h.errors, FLOOR, h.log_evidence)
+    assert "145.00 -> 1922.00" in said
+    assert said.endswith("error lower on 0 of 2 runs")
+
+
+def test_what_is_alike_is_not_lower():
+    base = _made(train=(2.0, 2.0), unseen=(2.0,), score=0.0)
+    h = _made("stall", train=(1.99, 1.5), unseen=(1.0,), score=9.0)
+    assert evidence(_search(base), h, h.errors, FLOOR, h.log_evidence).endswith("error lower on 2 of 3 runs")
+
+
+@pytest.mark.parametrize(("behind", "rival"), [(0.5, True), (5.9, True), (6.1, False), (400.0, False)])
+def test_a_rival_is_one_whose_probability_makes_it_one(behind, rival):
+    base = _made(train=(3.0,), unseen=(3.0,), score=0.0)
+    first = _made("servo_lag", train=(1.0,), unseen=(1.12,), score=500.0)
+    other = _made("delay", train=(1.6,), unseen=(1.67,), score=500.0 - behind)
+    shown = [first, other]
+    p = probabilities({frozenset(h.names): h.log_evidence for h in shown})
+    assert confusable(_search(base), first, shown, p, FLOOR) == (("delay",) if rival else ())
+    assert confusable(_search(base), other, shown, p, FLOOR) == (("servo_lag",) if rival else ())
+
+
+def test_errors_hold_those_of_each_run():
+    records = [SimpleNamespace(ok=np.ones((2, n), dtype=bool)) for n in (10, 30)]
+    residuals = [np.full((2, 10), 0.1), np.full((2, 30), 0.3)]
+    found = pooled_errors(records, residuals)
+    assert [e.angle_rms_rad for e in found.each] == pytest.approx([0.1, 0.3])
+    assert found.rate_rms_rad_s == pytest.approx(np.sqrt((10 * 0.01 + 30 * 0.09) / 40))
+    assert pooled_errors([], []).each == ()

@@ -1,0 +1,88 @@
+"""A search ends by a count of what it has worked out: the same with a copy of the process and without, and it says so."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import hidden_lag
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.diagnose import body_of, diagnose
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.search import move_evaluation, search, search_state
+from fieldsid.diagnosis.search.budget import Budget
+from fieldsid.diagnosis.search.search import Search
+from fieldsid.effects import all_effects
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+from fieldsid.runtime import evaluation_counter
+from fieldsid.runtime.worker_pool import can_fork
+
+
+def patch(monkeypatch, name, value):
+    """Replace a name in every file of the search that uses it."""
+    for part in (search, move_evaluation, search_state):
+        if hasattr(part, name):
+            monkeypatch.setattr(part, name, value)
+
+
+RUNS, UNSEEN = hidden_lag.runs()
+EFFECTS = all_effects(Axis.YAW)
+
+
+def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
+    allowance = Budget(2, 10.0)
+    evaluation_counter.count_evaluation(19)
+    assert allowance.remaining()
+    assert not allowance.is_exhausted
+    evaluation_counter.count_evaluation()
+    assert not allowance.remaining()
+    assert allowance.is_exhausted
+    assert Budget(2, np.inf).remaining()
+
+
+def test_what_a_copy_has_worked_out_counts():
+    before = evaluation_counter.evaluations()
+    ParallelMap((), ()).map(lambda _item: evaluation_counter.count_evaluation(3), range(6))
+    assert evaluation_counter.evaluations() - before == 18
+
+
+def a_search(*, thorough: bool) -> Search:
+    learned, unseen = (tuple(record_of(r, Axis.YAW) for r in runs) for runs in (RUNS, [UNSEEN]))
+    made = Search(learned, unseen, Axis.YAW, [EFFECTS[n] for n in ("servo_lag", "quadratic_damping")], thorough=thorough)
+    made.best()
+    return made
+
+
+def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch):
+    patch(monkeypatch, "MAX_EVALUATIONS_PER_RUN", 0)
+    short, thorough = a_search(thorough=False), a_search(thorough=True)
+    assert short.expanded == {short.root}
+    assert short.budget.is_exhausted
+    assert frozenset({"servo_lag"}) in short.tried
+    assert not thorough.budget.is_exhausted
+
+
+@pytest.mark.parametrize("thorough", [False, True])
+def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, thorough):
+    patch(monkeypatch, "MAX_EVALUATIONS_PER_RUN", 0)
+    without_lag = [e for name, e in EFFECTS.items() if name in ("quadratic_damping", "stall")]
+    monkeypatch.setattr(
+        import_module("fieldsid.diagnosis.diagnose"), "applicable_effects", lambda _all, _records: (tuple(without_lag), {})
+    )
+    found = diagnose(RUNS, Axis.YAW, [UNSEEN], thorough=thorough)
+    assert [n.code for n in found.notes].count("search_ended") == (not thorough)
+
+
+@pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
+def test_a_copy_changes_neither_the_count_nor_the_answer(monkeypatch):
+    answers, counts = [], []
+    for alone in (False, True):
+        if alone:
+            monkeypatch.setenv("FIELDSID_IS_COPY", "1")
+        before = evaluation_counter.evaluations()
+        answers.append(body_of(diagnose(RUNS, Axis.YAW, [UNSEEN])))
+        counts.append(evaluation_counter.evaluations() - before)
+    assert counts[0] == counts[1]
+    assert answers[0] == answers[1]

@@ -1,0 +1,73 @@
+"""What a search keeps of several ends of one hypothesis: that of most evidence on all runs, not of the best fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import hidden_lag
+import pytest
+
+from fieldsid.diagnosis.search import move_evaluation, search, search_state
+from fieldsid.diagnosis.search.search import Search
+from fieldsid.effects import all_effects
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+
+
+def patch(monkeypatch, name, value):
+    """Replace a name in every file of the search that uses it."""
+    for part in (search, move_evaluation, search_state):
+        if hasattr(part, name):
+            monkeypatch.setattr(part, name, value)
+
+
+@pytest.fixture(scope="module")
+def base():
+    """A search with its base judged."""
+    training, unseen = hidden_lag.runs()
+    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
+    lag = [all_effects(Axis.YAW)["servo_lag"]]
+    made = Search(*records, Axis.YAW, lag)
+    made.base()
+    return made
+
+
+@pytest.fixture
+def other_ends(monkeypatch):
+    """Make what is judged from now on predict unseen runs so much better than it does."""
+
+    def by(much):
+        real = search_state.score_model
+        patch(
+            monkeypatch,
+            "score_model",
+            lambda *of: replace(h := real(*of), validation_log_density=h.validation_log_density + much),
+        )
+
+    return by
+
+
+@pytest.mark.parametrize(("unseen", "kept"), [(-300.0, False), (1.0, True)])
+def test_a_better_fit_is_kept_where_unseen_runs_agree(base, other_ends, unseen, kept):
+    other_ends(unseen)
+    before = base.tried[base.root]
+    fits = replace(before.likelihood_fit, log_likelihood=before.likelihood_fit.log_likelihood + 5.0)
+    found = base._keep(fits)
+    assert (found is not before) == kept
+    base.tried[base.root] = before
+
+
+@pytest.mark.parametrize(("unseen", "kept"), [(-300.0, False), (1.0, True)])
+def test_an_end_that_a_child_has_led_to_is_kept_where_unseen_runs_agree(base, other_ends, monkeypatch, unseen, kept):
+    other_ends(unseen)
+    before = base.tried[base.root]
+    child = SimpleNamespace(log_evidence=before.log_evidence + 100.0)
+    monkeypatch.setattr(type(base), "_children", lambda _self, _key: [child])
+    fits = replace(before.likelihood_fit, log_likelihood=before.likelihood_fit.log_likelihood + 5.0)
+    monkeypatch.setattr(type(base), "_fit_from", lambda *_of: fits)
+    patch(monkeypatch, "prefer_output_error", lambda h, *_more: h)
+    monkeypatch.setattr(type(base), "_keep", lambda _self, judged: judged)
+    base._refit_from_best_child(base.root)
+    assert (base.tried[base.root] is not before) == kept
+    base.tried[base.root] = before

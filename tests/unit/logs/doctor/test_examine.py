@@ -1,0 +1,209 @@
+"""The doctor finds each fault that is put into a healthy log, and nothing in the healthy one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldsid.logs import load_run, save_run
+from fieldsid.logs.doctor.examine import examine
+from fieldsid.logs.doctor.stated import Stated
+from fieldsid.logs.mapping.mapping_file import mapping_of
+from fieldsid.logs.run import Run
+
+
+def healthy(seed=1, n=1200):
+    """Slow turns with noise, all signals agreeing with each other."""
+    rng = np.random.default_rng(seed)
+    time = 0.05 * np.arange(n)
+    yaw, pitch = 0.6 * np.sin(0.5 * time), 0.2 * np.sin(0.7 * time + 1)
+    surge = 1.5 + 0.05 * np.sin(0.3 * time)
+    signals = {
+        "yaw_rad": yaw + 0.002 * rng.normal(size=n),
+        "yaw_rate_rad_s": 0.3 * np.cos(0.5 * time) + 0.003 * rng.normal(size=n),
+        "pitch_rad": pitch + 0.002 * rng.normal(size=n),
+        "pitch_rate_rad_s": 0.14 * np.cos(0.7 * time + 1) + 0.003 * rng.normal(size=n),
+        "surge_m_s": surge + 0.01 * rng.normal(size=n),
+        "x_m": np.cumsum(surge * np.cos(yaw)) * 0.05,
+        "y_m": np.cumsum(surge * np.sin(yaw)) * 0.05,
+        "rudder_rad": 0.25 * np.sign(np.sin(0.5 * time)),
+    }
+    return Run("healthy", time, signals)
+
+
+def changed(run, **signals):
+    return Run(run.name, run.time, {**run.signals, **signals})
+
+
+def codes(run, **more):
+    return {(n.code, n.data.get("signal")) for n in examine(run, **more)}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_healthy_log_has_no_findings(seed):
+    assert codes(healthy(seed)) == set()
+
+
+def with_value(values, where, value):
+    values = values.copy()
+    values[where] = value
+    return values
+
+
+FAULTS = {
+    "rate_sign": lambda r: (("rate_sign", "yaw_rate_rad_s"), {"yaw_rate_rad_s": -r["yaw_rate_rad_s"]}),
+    "angle in degrees": lambda r: (("unit", "yaw_rad"), {"yaw_rad": np.degrees(r["yaw_rad"])}),
+    "rate in degrees": lambda r: (("unit", "pitch_rate_rad_s"), {"pitch_rate_rad_s": np.degrees(r["pitch_rate_rad_s"])}),
+    "rate scale": lambda r: (("rate_scale", "yaw_rate_rad_s"), {"yaw_rate_rad_s": 0.5 * r["yaw_rate_rad_s"]}),
+    "late angle": lambda r: (("clock_offset", "yaw_rad"), {"yaw_rad": np.interp(r.time - 0.3, r.time, r["yaw_rad"])}),
+    "knots": lambda r: (("speed_unit", "surge_m_s"), {"surge_m_s": r["surge_m_s"] / 0.5144}),
+    "astern": lambda r: (("speed_sign", "surge_m_s"), {"surge_m_s": -r["surge_m_s"]}),
+    "frozen": lambda r: (
+        ("frozen", "yaw_rate_rad_s"),
+        {"yaw_rate_rad_s": with_value(r["yaw_rate_rad_s"], slice(300, 360), 0.01)},
+    ),
+    "constant": lambda r: (("constant", "pitch_rad"), {"pitch_rad": np.full(len(r), 0.1)}),
+    "empty": lambda r: (("empty", "pitch_rad"), {"pitch_rad": np.full(len(r), np.nan)}),
+    "missing": lambda r: (("missing", "yaw_rad"), {"yaw_rad": with_value(r["yaw_rad"], slice(None, None, 3), np.nan)}),
+    "coarse": lambda r: (("coarse", "yaw_rad"), {"yaw_rad": np.round(r["yaw_rad"] / 0.05) * 0.05}),
+    "spikes": lambda r: (("spikes", "yaw_rate_rad_s"), {"yaw_rate_rad_s": with_value(r["yaw_rate_rad_s"], [400, 700], 3.0)}),
+    "fin in degrees": lambda r: (("unit", "rudder_rad"), {"rudder_rad": np.degrees(r["rudder_rad"])}),
+    "swapped": lambda r: (("swapped", "pitch_rad"), {"pitch_rad": r["yaw_rad"], "yaw_rad": r["pitch_rad"]}),
+    "fin sign": lambda r: (
+        ("fin_sign", "rudder_measured_rad"),
+        {"rudder_measured_rad": -np.interp(r.time - 0.1, r.time, r["rudder_rad"])},
+    ),
+    "fin before command": lambda r: (
+        ("clock_offset", "rudder_measured_rad"),
+        {"rudder_measured_rad": np.interp(r.time + 0.4, r.time, r["rudder_rad"])},
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_found_and_named(fault):
+    run = healthy()
+    expected, signals = FAULTS[fault](run)
+    assert expected in codes(changed(run, **signals))
+
+
+def test_a_finding_carries_its_number_its_limit_and_what_to_change():
+    run = healthy()
+    note = next(n for n in examine(changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"])) if n.code == "rate_sign")
+    assert note.data["value"] == pytest.approx(-1.0, abs=0.05)
+    assert "sign: -1" in note.message
+
+
+def test_the_lag_between_two_clocks_is_measured():
+    run = healthy()
+    late = changed(run, yaw_rad=np.interp(run.time - 0.3, run.time, run["yaw_rad"]))
+    note = next(n for n in examine(late) if n.code == "clock_offset")
+    assert note.data["value"] == pytest.approx(0.3, abs=0.03)
+
+
+def test_gaps_and_jitter_of_the_clock_are_found():
+    run = healthy()
+    rng = np.random.default_rng(0)
+    shaky = Run("shaky", run.time + rng.uniform(-0.02, 0.02, len(run)), run.signals)
+    assert ("jitter", None) in codes(shaky)
+    holed = np.delete(np.arange(len(run)), slice(500, 540))
+    gap = Run("gap", run.time[holed], {k: v[holed] for k, v in run.signals.items()})
+    found = {n.code: n for n in examine(gap)}
+    assert found["time_gap"].data["value"] == pytest.approx(41 * 0.05)
+
+
+def test_saturation_is_judged_by_the_limit_that_is_given():
+    assert ("saturated", "rudder_rad") in codes(healthy(), fin_max_rad={"rudder_rad": 0.2})
+    assert ("saturated", "rudder_rad") not in codes(healthy(), fin_max_rad={"rudder_rad": 0.25})  # there, and not beyond
+    seen = changed(healthy(), rudder_measured_rad=np.clip(healthy()["rudder_rad"], -0.2, 0.2))
+    assert ("saturated", "rudder_rad") not in codes(seen, fin_max_rad={"rudder_rad": 0.2})
+
+
+def test_a_log_without_fin_or_motion_is_said_to_be_of_no_use():
+    time = np.arange(100.0)
+    assert ("no_fin", None) in codes(Run("a", time, {"yaw_rad": np.sin(time)}))
+    assert ("no_motion", None) in codes(Run("a", time, {"rudder_rad": np.sin(time)}))
+
+
+def test_a_constant_propeller_is_no_finding():
+    run = healthy()
+    assert codes(changed(run, thrust=np.full(len(run), 9.0))) == set()
+
+
+@given(st.integers(0, 40), st.integers(0, 2**31), st.floats(0.0, 1.0))
+def test_any_run_is_examined_without_a_crash(n, seed, share):
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.uniform(1e-3, 1.0, n))
+    names = (
+        "yaw_rad",
+        "yaw_rate_rad_s",
+        "pitch_rad",
+        "pitch_rate_rad_s",
+        "surge_m_s",
+        "x_m",
+        "y_m",
+        "rudder_rad",
+        "rudder_measured_rad",
+    )
+    signals = {s: np.where(rng.random(n) < share, np.nan, rng.normal(size=n)) for s in names}
+    for note in examine(Run("any", time, signals), {"rudder_rad": 0.3}):
+        assert note.code
+        assert note.message
+
+
+def message(run, code, **stated):
+    *_, note = (n for n in examine(run, stated=Stated(**stated)) if n.code == code)
+    return note
+
+
+@pytest.mark.parametrize(
+    ("reach", "units", "advice", "unit"),
+    [
+        (15.0, {}, "set its unit, probably `unit: deg`", "deg"),
+        (15.0, {"rudder_rad": "rad"}, "set its unit, probably `unit: deg`", "deg"),
+        (2.147, {"rudder_rad": "deg"}, "taken as `deg` already: check which one it is", None),
+        (1500.0, {}, "check its unit, and which one it is", None),
+    ],
+)
+def test_a_unit_is_advised_only_where_it_is_not_set_and_makes_the_signal_possible(reach, units, advice, unit):
+    run = healthy()
+    note = message(changed(run, rudder_rad=reach * np.sign(run["rudder_rad"])), "unit", units=units)
+    assert note.message == f"rudder_rad reaches {reach:.4g} rad (limit 1.6): {advice}"
+    assert note.data.get("unit") == unit
+
+
+@pytest.mark.parametrize(
+    ("signal", "units", "advice"),
+    [
+        ("yaw_rad", {}, "yaw_rad is probably in deg: set `unit: deg`"),
+        ("yaw_rad", {"yaw_rad": "deg"}, "taken as `deg` already: check which ones they are"),
+        ("yaw_rad", {"yaw_rate_rad_s": "deg/s"}, "set `unit: deg` or yaw_rate_rad_s is not in `deg/s`"),
+        ("yaw_rad", {"yaw_rad": "deg", "yaw_rate_rad_s": "deg/s"}, "yaw_rate_rad_s is not in `deg/s`"),
+        ("yaw_rate_rad_s", {"yaw_rad": "deg", "yaw_rate_rad_s": "deg/s"}, "yaw_rad is not in `deg`"),
+    ],
+)
+def test_degrees_of_one_of_a_pair_are_told_by_what_is_set(signal, units, advice):
+    run = healthy()
+    assert message(changed(run, **{signal: np.degrees(run[signal])}), "unit", units=units).message.endswith(advice)
+
+
+def test_a_sign_that_is_set_is_taken_back_and_stamps_are_named_where_they_were_chosen():
+    run = healthy()
+    against, astern = changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"]), changed(run, surge_m_s=-run["surge_m_s"])
+    assert "set `sign: -1` at yaw_rad or yaw_rate_rad_s" in message(against, "rate_sign").message
+    turned = frozenset({"yaw_rate_rad_s", "surge_m_s"})
+    assert "take `sign: -1` away from yaw_rate_rad_s" in message(against, "rate_sign", turned=turned).message
+    assert "take `sign: -1` away from surge_m_s" in message(astern, "speed_sign", turned=turned).message
+    late = changed(run, yaw_rad=np.interp(run.time - 0.3, run.time, run["yaw_rad"]))
+    assert "stamp" not in message(late, "clock_offset").message
+    assert "use `stamp: header`" in message(late, "clock_offset", received=frozenset({"yaw_rad"})).message
+
+
+def test_what_a_mapping_states_reaches_the_doctor(tmp_path):
+    run = healthy()
+    log = save_run(changed(run, rudder_rad=123.0 * np.sign(run["rudder_rad"])), tmp_path / "a.csv")
+    mapping = mapping_of(
+        {"time": {"column": "time_s"}, "signals": {"yaw_rad": "yaw_rad", "rudder_rad": {"column": "rudder_rad", "unit": "deg"}}}
+    )
+    notes = {n.code: n.message for n in load_run(log, mapping).notes}
+    assert notes["unit"] == "rudder_rad reaches 2.147 rad (limit 1.6): taken as `deg` already: check which one it is"

@@ -1,0 +1,65 @@
+"""The area as it is exported: from the start of the run-up on, half of its width to either side; every limit has its abort."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plan_legs import leg
+
+from fieldsid.models.axis import Axis
+from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.flight.closed_loop import Response
+from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, excursion_of, limits_said
+
+TIME = 0.05 * np.arange(801)
+
+
+def flown(angle):
+    """A flight that follows a heading (n,) rad at 1 m/s."""
+    return Response(TIME, 0.0 * TIME, angle, np.gradient(angle, TIME))
+
+
+def test_a_flight_all_to_one_side_leaves_an_area_whose_half_it_leaves():
+    sideways = flown(np.full(TIME.size, np.pi / 2))  # 40 m to starboard
+    far = excursion_of(Axis.YAW, sideways, 1.0, run_up=10.0)
+    assert far.across == pytest.approx(40.0, abs=0.1)
+    assert far.over(Envelope(0.2, area_length=100.0, area_width=60.0))["across"] > 1.3
+    assert far.over(Envelope(0.2, area_length=100.0, area_width=90.0))["across"] < 1.0
+
+
+def test_the_area_begins_at_the_start_of_the_run_up():
+    back = flown(np.full(TIME.size, np.pi))
+    area = Envelope(0.2, area_length=100.0, area_width=60.0)
+    assert excursion_of(Axis.YAW, back, 1.0, run_up=50.0).over(area)["along"] < 1.0
+    behind = excursion_of(Axis.YAW, back, 1.0, run_up=30.0)
+    assert behind.behind == pytest.approx(10.0, abs=0.1)
+    assert behind.over(area)["along"] > 1.0
+
+
+def test_every_limit_that_is_set_ends_the_maneuver_whatever_axis_it_moves():
+    limits = Envelope(
+        0.26, 1.0, heading=1.0, track=20.0, depth_low=1.0, depth_high=6.0, pitch=0.4, roll=0.3, area_length=200.0, area_width=50.0
+    )
+    found = {(a.signal, a.kind): a.limit for a in aborts_of(leg(), limits)}
+    assert found == {
+        ("time_s", "time"): 38.0, ("surge_m_s", "below"): pytest.approx(0.84), ("yaw_rad", "deviation"): 1.0,
+        ("pitch_rad", "deviation"): 0.4, ("roll_rad", "deviation"): 0.3, ("depth_m", "above"): 6.0, ("depth_m", "below"): 1.0,
+        ("y_m", "deviation"): 20.0, ("x_m", "above"): pytest.approx(186.0), ("x_m", "below"): pytest.approx(-14.0),
+    }  # fmt: skip
+    bare = {a.signal for a in aborts_of(leg(), Envelope(0.26))}
+    assert bare == {"time_s", "surge_m_s"}
+
+
+def test_a_leg_with_a_heading_of_its_own_is_ended_by_that():
+    circle = replace(leg(), heading=9.0)
+    (heading,) = (a for a in aborts_of(circle, Envelope(0.26, heading=1.0)) if a.signal == "yaw_rad")
+    assert heading.limit == 9.0
+
+
+def test_limits_are_said_in_both_units_and_their_lack_is():
+    said = limits_said(Envelope(0.26, heading=np.radians(60.0), area_length=200.0, area_width=50.0))
+    assert said["heading"] == "60 deg (1.05 rad)"
+    assert said["area"] == "200 m along, 25 m to either side"
+    assert {n for n, words in said.items() if words == NOT_LIMITED} == {"fin rate", "track", "pitch", "roll", "depth"}

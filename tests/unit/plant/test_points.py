@@ -1,0 +1,220 @@
+"""Tables, models and fit files become one source of parameters against speed; what cannot be meant is refused."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fieldsid.errors import ArtifactError, DataError, FieldsidError, UsageError
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise, save_model
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
+from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of
+from fieldsid.plant.points import distinct_speeds
+from fieldsid.plant.table import read_table
+
+TABLE = """thrust_percent,speed_m_s,a22,b2,C0,b2_std_error
+60,1.0,1.1,-0.6,-0.01,0.02
+80,1.6,1.0,-1.1,-0.01,0.03
+90,2.1,1.1,-1.8,0,0.05
+"""
+
+
+def written(folder, text, name="table.csv"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def yaw_model(speed=1.5, effects=(), **values):
+    own = {"a22": 1.2, "b2": -1.0, "C0": 0.01} | values
+    free = tuple(own)
+    covariance = np.diag([(0.02 * abs(v)) ** 2 for v in own.values()])
+    known = {"speed_low": speed, "speed_high": speed, "fin_max": 0.26, "rate_max": 0.2, "held_s": 2.0}
+    return Model(Axis.YAW, effects, own, dict.fromkeys(own, ""), free, covariance, SpeedLaw(speed), Noise(0.005, 0.005), known)
+
+
+def test_extra_columns_are_passed_over_and_errors_are_taken(tmp_path):
+    axis, points = read_table(written(tmp_path, TABLE))
+    assert axis is Axis.YAW
+    assert [p.speed for p in points] == [1.0, 1.6, 2.1]
+    assert points[0].values == {"a22": 1.1, "b2": -0.6, "C0": -0.01}
+    assert points[1].std_errors == {"b2": 0.03}
+
+
+def test_dash_reads_standard_input(monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO(TABLE))
+    assert load_parameter_source([Path("-")]).speeds == pytest.approx([1.0, 1.6, 2.1])
+
+
+def test_fin_offset_column_stands_in_for_an_absent_trim(tmp_path):
+    _, points = read_table(written(tmp_path, "speed_m_s,a22,b2,delta_r0_rad\n1.37,2.15,-1.62,-0.064\n"))
+    assert points[0].values["C0"] == pytest.approx(-1.62 * -0.064)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "not a table"),
+        ("a22,b2\n1,2\n", "speed_m_s"),
+        ("speed_m_s,foo\n1,2\n", "one axis"),
+        ("speed_m_s,b2,d2\n1,2,3\n", "one axis"),
+        ("speed_m_s,b2\n1,x\n", "line 2"),
+        ("speed_m_s,b2\n1,1\n-1,2\n", "line 3"),
+        ("speed_m_s,b2\n", "no rows"),
+    ],
+)
+def test_a_table_that_cannot_be_meant_is_refused_with_three_parts(tmp_path, text, word):
+    with pytest.raises(DataError) as caught:
+        read_table(written(tmp_path, text))
+    assert word in caught.value.what
+    assert caught.value.found
+    assert caught.value.hint
+
+
+def test_one_speed_only_gives_no_law_but_shows_the_point(tmp_path):
+    source = load_parameter_source([written(tmp_path, "speed_m_s,a22,b2\n1.50,1.0,-0.8\n1.51,1.0,-0.82\n")])
+    assert source.laws is None
+    with pytest.raises(DataError) as caught:
+        fit_laws(source.axis, source.points)
+    assert "one speed only" in caught.value.what
+    assert "b2 = -0.8" in caught.value.found
+
+
+def test_authority_of_opposite_signs_is_refused_naming_the_rows(tmp_path):
+    with pytest.raises(DataError, match="sign of b2") as caught:
+        load_parameter_source([written(tmp_path, TABLE.replace("-1.1,", "1.1,"))])
+    assert "row 2: b2 = 1.1" in caught.value.found
+
+
+def test_models_of_two_axes_are_refused(tmp_path):
+    yaw = save_model(yaw_model(), tmp_path / "yaw.yaml")
+    pitch = Model(
+        Axis.PITCH, (), {"c22": 1.0, "c23": 0.1, "d2": 1.0, "Cb": 0.0}, {}, (), np.zeros((0, 0)), SpeedLaw(1.5), Noise(0.01, 0.01)
+    )  # fmt: skip
+    with pytest.raises(DataError, match="one axis"):
+        load_parameter_source([yaw, save_model(pitch, tmp_path / "pitch.yaml")])
+
+
+def test_a_model_without_speed_is_refused(tmp_path):
+    path = save_model(yaw_model(speed=float("nan")), tmp_path / "model.yaml")
+    with pytest.raises(DataError, match="does not know its speed"):
+        load_parameter_source([path])
+
+
+def test_models_give_points_with_their_errors(tmp_path):
+    paths = [save_model(yaw_model(u, b2=-0.4 * u**2), tmp_path / f"m{i}.yaml") for i, u in enumerate((1.0, 1.5, 2.0))]
+    source = load_parameter_source(paths)
+    assert source.speeds == pytest.approx([1.0, 1.5, 2.0])
+    assert source.points[2].std_errors["b2"] == pytest.approx(0.02 * 1.6)
+    assert source.laws.authority.chosen == "through_zero"
+    assert source.laws.authority.exponent.value == pytest.approx(2.0)
+
+
+def test_laws_come_back_from_their_file(tmp_path):
+    source = load_parameter_source([written(tmp_path, TABLE)])
+    path = save_laws(source.laws, tmp_path / "law.yaml", inputs=[tmp_path / "table.csv"])
+    again = load_laws(path)
+    assert again.at(1.3) == pytest.approx(source.laws.at(1.3), rel=1e-5)
+    assert again.std(1.3) == pytest.approx(source.laws.std(1.3), rel=1e-4)
+    assert load_parameter_source([path]).base_at(1.9) == pytest.approx(source.laws.at(1.9), rel=1e-5)
+
+
+def test_a_fit_file_with_a_missing_key_is_refused(tmp_path):
+    path = save_laws(load_parameter_source([written(tmp_path, TABLE)]).laws, tmp_path / "law.yaml")
+    path.write_text(path.read_text().replace("chosen:", "chose:"))
+    with pytest.raises(ArtifactError, match="not a complete fit file"):
+        load_laws(path)
+
+
+def test_a_fit_file_carries_its_models_with_effects_covariance_and_logs(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("x\n")
+    paths = []
+    for i, u in enumerate((1.0, 2.0)):
+        (tmp_path / str(i)).mkdir()  # two models of one name
+        model = yaw_model(u, ("servo_lag",), b2=-0.4 * u**2, lag=0.3)
+        paths.append(save_model(model, tmp_path / str(i) / "model.yaml", inputs=[log]))
+    path = save_laws(load_parameter_source(paths).laws, tmp_path / "law.yaml", models=paths)
+    given, carried = load_parameter_source(paths), load_parameter_source([path])
+    assert [m.effects for m in carried.models] == [("servo_lag",)] * 2
+    for one, other in zip(given.models, carried.models, strict=True):
+        assert one.values == other.values
+        assert np.array_equal(one.covariance, other.covariance)
+    assert logs_of([path]) == logs_of(paths) == (log,)
+
+
+def test_a_fit_file_that_does_not_say_what_its_models_carry_is_refused(tmp_path):
+    path = save_laws(load_parameter_source([written(tmp_path, TABLE)]).laws, tmp_path / "law.yaml")
+    path.write_text(path.read_text().replace("models: []", ""))
+    with pytest.raises(ArtifactError, match="effects would be lost") as error:
+        load_parameter_source([path])
+    assert f"-o {path} --force" in error.value.hint
+
+
+def test_own_law_overrides_points_and_laws(tmp_path):
+    source = load_parameter_source([written(tmp_path, TABLE)], laws=["b2=-0.2,-0.3", "a22=1"])
+    assert source.base_at(1.6)["b2"] == pytest.approx(-0.2 - 0.3 * 1.6**2)
+    assert source.base_at(1.6)["a22"] == 1.0
+    assert source.base_at(1.6)["C0"] == -0.01
+
+
+@pytest.mark.parametrize("text", ["b2", "b2=x", "q=1", "b2=1,2,3"])
+def test_an_own_law_that_cannot_be_meant_is_refused(tmp_path, text):
+    with pytest.raises(UsageError, match="--law"):
+        load_parameter_source([written(tmp_path, TABLE)], laws=[text])
+
+
+def test_a_table_with_models_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="stands alone"):
+        load_parameter_source([written(tmp_path, TABLE), tmp_path / "m.yaml"])
+
+
+def test_draws_have_the_models_covariance_and_the_first_is_the_model():
+    model = yaw_model()
+    draws, exponent = draw_values(model, 4000, np.random.default_rng(1))
+    assert draws[0] == dict(model.values)
+    assert exponent[0] == 1.0
+    spread = np.std([d["a22"] for d in draws])
+    assert spread == pytest.approx(0.024, rel=0.05)
+
+
+def test_neighbouring_models_share_a_speed_between_them(tmp_path):
+    paths = [save_model(yaw_model(u), tmp_path / f"m{i}.yaml") for i, u in enumerate((2.0, 1.0))]
+    source = load_parameter_source(paths)
+    assert source.near(1.0) == [(1, 1.0)]
+    assert source.near(5.0) == [(0, 1.0)]
+    shares = dict(source.near(np.sqrt(2.0)))
+    assert shares == pytest.approx({0: 0.5, 1: 0.5})
+    assert source.supports(1.5)
+    assert not source.supports(2.2)
+
+
+@given(st.lists(st.floats(0.2, 5.0), min_size=1, max_size=8))
+def test_speeds_within_three_percent_count_once(speeds):
+    count = distinct_speeds(np.array(speeds))
+    assert 1 <= count <= len(set(speeds))
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_a_table_or_a_three_part_error(text):
+    stdin = io.StringIO(text)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.stdin", stdin)
+        found = outcome(Path("-"))
+    assert found == "a table" or all(found)
+
+
+def outcome(path):
+    """`a table`, or the first and last part of the error."""
+    try:
+        read_table(path)
+    except FieldsidError as error:
+        return (error.what, error.hint)
+    return "a table"
