@@ -32,9 +32,11 @@ FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
 )
 """Binary formats by their signature: what they are, and how to make a log of them where there is a way."""
 NO_LOG = MappingProxyType({b"\x89PNG": "a picture", b"%PDF": "a document", b"\x7fELF": "a program"})
-READ_ELSEWHERE = (ULOG, DATAFLASH, b"MATLAB ", b"dbd_label:", b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
+READ_ELSEWHERE = (ULOG, DATAFLASH, b"MATLAB ", b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
 """How files start that another reader takes."""
 
+_GLIDER = re.compile(rb"dbd_label:\s*\w+\(dinkum_binary_data\)")
+"""The head of a glider's binary log; the same as text has a head of its own and is a table."""
 _OWN = re.compile(rb"^\s*\{?\s*[\"']?schema[\"']?\s*:\s*[\"']?(fieldsid/([a-z-]+)/\d+)", re.MULTILINE)
 _HEAD = 4096
 
@@ -44,9 +46,13 @@ def is_text(path: Path) -> bool:
     head = _head_of(path)
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return True
-    if head.startswith((*FOREIGN, *NO_LOG, *READ_ELSEWHERE)) or _OWN.search(head):
+    if head.startswith((*FOREIGN, *NO_LOG)) or _is_read_elsewhere(head) or _OWN.search(head):
         return False
     return b"\x00" not in head[:512] or head[:512].count(b"\x00") > len(head[:512]) // 4
+
+
+def _is_read_elsewhere(head: bytes) -> bool:
+    return head.startswith(READ_ELSEWHERE) or _GLIDER.match(head) is not None
 
 
 def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
@@ -58,7 +64,7 @@ def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:
     own = _OWN.search(head)
     if own is not None:
         return _of_own(path, own[1].decode(), own[2].decode(), give)
-    if head.startswith(READ_ELSEWHERE):
+    if _is_read_elsewhere(head):
         return LogError(f"`{path}` starts as a log of another kind does, and is none", found=size, hint=COPY_AGAIN)
     for signature, (what, way) in FOREIGN.items():
         if head.startswith(signature):
