@@ -35,8 +35,6 @@ NO_LOG = MappingProxyType({b"\x89PNG": "a picture", b"%PDF": "a document", b"\x7
 READ_ELSEWHERE = (ULOG, DATAFLASH, b"MATLAB ", b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
 """How files start that another reader takes."""
 
-_GLIDER = re.compile(rb"dbd_label:\s*\w+\(dinkum_binary_data\)")
-"""The head of a glider's binary log; the same as text has a head of its own and is a table."""
 _OWN = re.compile(rb"^\s*\{?\s*[\"']?schema[\"']?\s*:\s*[\"']?(fieldsid/([a-z-]+)/\d+)", re.MULTILINE)
 _HEAD = 4096
 
@@ -51,8 +49,13 @@ def is_text(path: Path) -> bool:
     return b"\x00" not in head[:512] or head[:512].count(b"\x00") > len(head[:512]) // 4
 
 
+def is_glider_log(head: bytes) -> bool:
+    """Whether a file with this head is a glider's binary log; the same as text has a head of its own and is a table."""
+    return head.startswith(b"dbd_label:") and b"(dinkum_binary_data)" in head[:100]
+
+
 def _is_read_elsewhere(head: bytes) -> bool:
-    return head.startswith(READ_ELSEWHERE) or _GLIDER.match(head) is not None
+    return head.startswith(READ_ELSEWHERE) or is_glider_log(head)
 
 
 def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:

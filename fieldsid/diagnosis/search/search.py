@@ -67,11 +67,10 @@ class Search(MoveEvaluation):
             return self.base()
         if not self.budget.remaining():
             return None
-        best = max(self.tried.values(), key=lambda h: h.log_evidence)
+        best = self._most_evident()
         least = MAX_ERROR_RATIO * best.selection_errors.mean
         front = [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
-        parts = [self.tried[k] for e in best.names if (k := frozenset(best.names) - {e}) in self.tried]
-        leading = [best, *front, *parts] if leaves_error(best, self.floor) else front
+        leading = [best, *front, *self._less(best)] if leaves_error(best, self.floor) else front
         return next((h for h in leading if self._is_expandable(h)), None)
 
     def _is_expandable(self, h: ScoredModel) -> bool:
@@ -81,7 +80,7 @@ class Search(MoveEvaluation):
 
     def _drop_each(self) -> None:
         """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle."""
-        best = max(self.tried.values(), key=lambda h: h.log_evidence)
+        best = self._most_evident()
         if len(best.names) > len(self.known) + 1:
             for gone in best.effects:
                 if gone.name not in self.known and frozenset(best.names) - {gone.name} not in self.tried:

@@ -152,6 +152,10 @@ class SearchState:
         for h in FormSearch(self.resolution_floor, self.noise_kind, self.floor, self.parallel).try_variants(asked):
             self.tried[frozenset(h.names)], self.evidence_at_variants[frozenset(h.names)] = h, h.log_evidence
 
+    def _most_evident(self) -> ScoredModel:
+        """Return the model of the highest log evidence, whether or not its effects are accepted."""
+        return max(self.tried.values(), key=lambda h: h.log_evidence)
+
     def core_of(self, h: ScoredModel) -> frozenset[str]:
         """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good."""
         while idle := [w for w in self._less(h) if not is_accepted(w, h)]:

@@ -14,10 +14,8 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, library, raw_log_of, topic_of
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN, is_glider_log
 
-LABEL = b"dbd_label:"
-BINARY = b"(dinkum_binary_data)"
 END = b"X"
 HEAD = 2048
 MEANS: Means = {
@@ -40,8 +38,7 @@ def sniff(path: Path) -> bool:
     if path.is_dir():
         return False
     with path.open("rb") as stream:
-        head = stream.read(HEAD)
-    return head.startswith(LABEL) and BINARY in head[:100]
+        return is_glider_log(stream.read(HEAD))
 
 
 def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
