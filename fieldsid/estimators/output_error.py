@@ -6,8 +6,6 @@ missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from fieldsid.fitting.covariance.kenward_roger import (
@@ -17,15 +15,15 @@ from fieldsid.fitting.covariance.kenward_roger import (
     noise_covariance,
 )
 from fieldsid.fitting.covariance.noise_selection import chosen_noise
+from fieldsid.fitting.covariance.output_error_covariance import white_weight_covariance
 from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood
 from fieldsid.fitting.initial.forward_build import forward_build
-from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations, sandwich
+from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations
 from fieldsid.fitting.optimise.residual_weights import squares_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution, shared_covariance
-from fieldsid.fitting.problem.problem import Problem, RunResult
+from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
-from fieldsid.noise.sandwich_covariance import score_covariance
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
@@ -97,25 +95,6 @@ def _found_over_parts(problem: Problem) -> tuple[Minimum, Noise]:
     return levenberg_marquardt(problem, found.x, new, tolerance=LONG_RECORD_COST_TOLERANCE, damping=INITIAL_DAMPING), new
 
 
-def coloured_covariance(problem: Problem, found: Minimum, weights: Noise, noise: Noise) -> FloatArray:
-    """Return the covariance (F, F) of an output-error estimate under a noise model of any colour."""
-    _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
-    return _sandwich(problem, found, weights, noise_vector(noise), normal, results)
-
-
-def _sandwich(
-    problem: Problem, found: Minimum, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult]
-) -> FloatArray:
-    sigma = np.array([weights.angle, weights.rate])
-    place = {slot: i for i, slot in enumerate(found.free)}
-    centre = np.zeros_like(normal)
-    for record, result in zip(problem.records, results, strict=True):
-        weighted = np.where(record.ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
-        index = np.array([place[s] for s in result.columns])
-        centre[np.ix_(index, index)] += score_covariance(record, noise, result.base.damping, result.base.stiffness, weighted)
-    return sandwich(normal, centre)
-
-
 def errors(problem: Problem, found: Minimum, weights: Noise, noise: Noise, noise_kind: str) -> FloatArray:
     """Return the covariance (F, F) of the estimate, allowing on short records for noise that is not known exactly."""
     if noise_kind == "white":
@@ -123,12 +102,12 @@ def errors(problem: Problem, found: Minimum, weights: Noise, noise: Noise, noise
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
     vector = noise_vector(noise)
     if sum(len(r) for r in problem.records) > KNOWN_NOISE_SAMPLES:
-        return _sandwich(problem, found, weights, vector, normal, results)
+        return white_weight_covariance(problem, found, weights, vector, normal, results)
     lines, count = linearise_runs(problem, found.x), len(problem.layout.parameters)
     spread = noise_covariance(lambda v: reml_likelihood(lines, count, v), vector, noise_kind)
     still = found.x[list(found.free)]
     return kenward_roger(
-        lambda v: (still, _sandwich(problem, found, weights, v, normal, results)),
+        lambda v: (still, white_weight_covariance(problem, found, weights, v, normal, results)),
         vector,
         noise_kind,
         spread,

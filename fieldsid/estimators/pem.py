@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.estimators.output_error import found_minimum
+from fieldsid.estimators.output_error import found_minimum, residual_noise
 from fieldsid.fitting.covariance.kenward_roger import KNOWN_NOISE_SAMPLES, kenward_roger, noise_covariance
 from fieldsid.fitting.covariance.reml import (
     MAX_NOISE_SAMPLES,
@@ -35,6 +35,11 @@ def solve(problem: Problem, _options: Options) -> Solution:
     """Return the prediction-error solution of a joint problem."""
     found, weights = found_minimum(problem)
     return solve_from(problem, found.x, weights)
+
+
+def after(problem: Problem, plain: Solution) -> Solution:
+    """Return the prediction-error solution that an output-error solution leads to."""
+    return solve_from(problem, plain.x, residual_noise(problem, plain.x, len(plain.x)))
 
 
 def solve_from(problem: Problem, x: FloatArray, weights: Noise) -> Solution:
@@ -77,4 +82,5 @@ ESTIMATOR = Estimator(
     says="output error whitened by a Kalman filter with a disturbance moment and coloured sensor noise",
     source="Ljung 1999, chapter 7",
     solve=solve,
+    after=after,
 )

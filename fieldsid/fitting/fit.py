@@ -11,14 +11,13 @@ from fieldsid.display import Plotted
 from fieldsid.dynamics.assemble import fin_path
 from fieldsid.effects import refuse_clash
 from fieldsid.errors import DataError, UsageError
-from fieldsid.fitting.auto_method import keeps_free_run, residuals_are_disturbed
+from fieldsid.fitting.auto_method import best_start, choose
 from fieldsid.fitting.checks.parameter_checks import parameter_checks
 from fieldsid.fitting.checks.record_checks import record_checks
 from fieldsid.fitting.checks.score_tests import score_tests
 from fieldsid.fitting.covariance.noise_selection import residual_whiteness
 from fieldsid.fitting.estimates import estimates
 from fieldsid.fitting.initial.trim_speed_law import groups_by_trim
-from fieldsid.fitting.optimise.residual_weights import white_weights
 from fieldsid.fitting.predict.predict import Prediction, refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.parameters import layout_of
@@ -76,8 +75,8 @@ def fit(
 ) -> Fit:
     """Return the joint fit of records on one axis.
 
-    method "auto" is output error, and the prediction-error method where the residuals are coloured by a
-    disturbance that does not follow the fin (a missing effect does). Raises DataError for records too short or
+    method "auto" is output error, and the prediction-error method where a disturbance, and no missing effect, colours
+    the residuals. Raises DataError for records too short or
     without fin movement, UsageError for a method that cannot take the effects or several runs, EffectError for two effects
     that cannot be in one model.
     """
@@ -89,23 +88,22 @@ def fit(
 
 
 def _solve(problem: Problem, method: str, options: Options) -> Solution:
-    chosen: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "output_error" if method == AUTO else method)
-    if problem.layout.effects and not chosen.takes_effects:
+    first: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "output_error" if method == AUTO else method)
+    if problem.layout.effects and not first.takes_effects:
         raise UsageError(
-            f"`{chosen.name}` cannot estimate effects",
+            f"`{first.name}` cannot estimate effects",
             found=", ".join(e.name for e in problem.layout.effects),
             hint="use `--method output_error`",
         )
-    if len(problem.records) > 1 and not chosen.joint:
+    if len(problem.records) > 1 and not first.joint:
         raise UsageError(
-            f"`{chosen.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out"
+            f"`{first.name}` takes one run at a time", found=f"{len(problem.records)} runs", hint="leave `--joint` out"
         )
-    solution = chosen.solve(problem, options)
-    if method == AUTO and residuals_are_disturbed(problem, solution):
+    solution = first.solve(problem, options)
+    if method == AUTO:
         finer: Estimator = pick("fieldsid.estimators", "ESTIMATOR", "pem")
-        refined = finer.solve(problem, options)
-        if keeps_free_run(problem, solution, refined, white_weights(problem, solution.x)):
-            solution = refined
+        plain = solution
+        solution = choose(problem, plain, lambda: finer.refined(problem, plain, options))
     if not solution.nuisances_fitted:
         x = solution.x
         for run, record in enumerate(problem.records):
@@ -163,7 +161,9 @@ def fitted(problem: Problem, solution: Solution) -> Fit:
         *solution.notes,
     )
     model = model_of(problem, solution)
-    predictions = tuple(prediction_of(problem, solution.x, run) for run in range(len(problem.records)))
+    # a start of least prediction error is not that of the best free run, which every other command shows
+    shown = solution.x if solution.weights is None else best_start(problem, solution.x, floor)
+    predictions = tuple(prediction_of(problem, shown, run) for run in range(len(problem.records)))
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(sigma, sigma)
     order = [names.index(n) for n in model.free]

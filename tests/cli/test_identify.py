@@ -140,3 +140,14 @@ def test_a_folder_that_cannot_be_written_is_refused(run_cli, tmp_path):
     run = trial.flown(tmp_path)
     tmp_path.chmod(0o500)
     assert run_cli("identify", run, "--axis", "yaw", "-o", tmp_path / "models").code == 2
+
+
+def test_it_says_why_auto_took_its_method_where_it_had_to_choose(run_cli, tmp_path):
+    run = trial.flown(tmp_path, hidden=("servo_lag", {"lag": 0.4}))
+    answer = run_cli("identify", run, "--axis", "yaw")
+    (fit,) = run_cli("identify", run, "--axis", "yaw", "--json").json["fits"]
+    assert fit["method"] == "output_error"
+    assert fit["method_reason"].startswith("`auto` took output error: what prediction error leaves follows fin and motion")
+    assert fit["method_reason"] in answer.out
+    (fit,) = run_cli("identify", run, "--axis", "yaw", "--method", "output_error", "--json").json["fits"]
+    assert fit["method_reason"] is None

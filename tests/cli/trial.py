@@ -25,9 +25,10 @@ def vehicle(axis: Axis, *effects: str, **values: float) -> Model:
 
 
 def flown(
-    folder: Path, axis: Axis = Axis.YAW, *, spec: str = "square_pulses", speed: float = 1.4, seed: int = 3, name: str = "run7"
-) -> Path:
-    model = vehicle(axis)
+    folder: Path, axis: Axis = Axis.YAW, *, spec: str = "square_pulses", speed: float = 1.4, seed: int = 3, name: str = "run7",
+    hidden: tuple[str, dict[str, float]] | None = None,
+) -> Path:  # fmt: skip
+    model = vehicle(axis) if hidden is None else vehicle(axis, hidden[0], **hidden[1])
     run = with_noise(dry_run(model, *parse_spec(spec), speed=speed, limits=Limits(0.35)), model, seed)
     return save_run(replace(run, name=name), folder / f"{name}.parquet")
 

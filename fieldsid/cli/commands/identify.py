@@ -62,8 +62,8 @@ def command(
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
     With `-o` each model is written to DIR/RUN_AXIS.yaml with its figure beside it. `auto` is output error, and prediction error
-    (pem) where the residuals show a disturbance. Of several runs one that cannot be used is skipped with its reason, and the
-    exit code is 1.
+    (pem) where a disturbance, and no missing effect, explains the residuals; it says why. Of several runs one that cannot be used
+    is skipped with its reason, and the exit code is 1.
 
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
@@ -137,7 +137,7 @@ def _stem(fit: Fit) -> str:
 
 
 def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
-    from fieldsid.fitting.checks.warnings import is_warning
+    from fieldsid.fitting.checks.warnings import METHOD_CHOSEN, is_warning
     from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 
     m, model = goodness_of_fit(fit.predictions), fit.model
@@ -147,6 +147,7 @@ def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
         "model": None if path is None else str(path),
         "speed_m_s": model.law.reference,
         "method": model.method,
+        "method_reason": next((n.message for n in fit.notes if n.code == METHOD_CHOSEN), None),
         "effects": list(model.effects),
         "parameters": _parameters(fit),
         **_merit(m),
@@ -203,6 +204,15 @@ def _render_warnings(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
         to.print(f"warning: {runs[0]}: {first[code]} \\[{code}]{others}", soft_wrap=True)
 
 
+def _render_reasons(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Say why `auto` took each method it had to choose between, with the numbers of the first run it took it for."""
+    weighed = [e for e in entries if e["method_reason"] is not None]
+    for method in sorted({e["method"] for e in weighed}):
+        first, *others = (e for e in weighed if e["method"] == method)
+        more = f" ({method} for {len(others)} more too: `--json`)" if others else ""
+        to.print(f"{_label(first)}: {first['method_reason']}{more}", soft_wrap=True)
+
+
 def _label(entry: Mapping[str, Any]) -> str:
     """Return the run's name, or how many runs a joint fit has."""
     return str(entry["run"]) if len(entry["runs"]) == 1 else f"{len(entry['runs'])} runs"
@@ -242,6 +252,7 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
     columns = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
     to.print(table("", columns, merits))
     to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in rad, rate in rad/s")
+    _render_reasons(to, entries)
     for e in entries:
         if e["model"]:
             to.print(f"model: {e['model']}", soft_wrap=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.estimators.output_error import coloured_covariance
+from fieldsid.fitting.covariance.output_error_covariance import coloured_covariance
 from fieldsid.fitting.fit import model_of
 from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_marquardt, normal_equations
 from fieldsid.fitting.optimise.residual_weights import white_weights

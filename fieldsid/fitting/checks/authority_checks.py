@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fieldsid.fitting.auto_method import share_of_fin
 from fieldsid.fitting.checks.closed_loop import closed_loop_note
+from fieldsid.fitting.fin_history import share_of_fin
 from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_marquardt
 from fieldsid.fitting.problem.estimator import Solution
 from fieldsid.fitting.problem.problem import Problem

@@ -5,7 +5,9 @@ from __future__ import annotations
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES, Axis
 
-NO_WARNING = ("mapping", "noise_model", "fin_measured_used")
+METHOD_CHOSEN = "method_chosen"
+"""Code of the note that says why `auto` took a method."""
+NO_WARNING = ("mapping", "noise_model", "fin_measured_used", METHOD_CHOSEN)
 """Codes of notes that tell how it went."""
 
 

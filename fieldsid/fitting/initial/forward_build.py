@@ -59,8 +59,8 @@ def forward_build(problem: Problem, floor: Noise) -> FloatArray:
 def plausible(problem: Problem, x: FloatArray, floor: Noise) -> FloatArray:
     """Return x, or an equivalent solution with the smaller effect that the data do not exclude: a servo is faster than its hull.
 
-    At one speed a lag and the hull's own time constant are exchangeable but for what is nonlinear. Residuals of a model that is not exact are
-    coloured, and white weights make much of little, so that the two are compared under the noise that fits each of them best.
+    At one speed a lag and the hull's time constant are exchangeable but for what is nonlinear. Residuals of a model that is
+    not exact are coloured, and white weights make much of little: the two are compared under the noise that fits each best.
     """
     for effect in problem.layout.effects:
         twin = equivalent_solution(problem, x, effect)
@@ -82,9 +82,7 @@ def coloured_log_likelihood(problem: Problem, x: FloatArray) -> float:
     part = problem.first(MAX_NOISE_SAMPLES // len(problem.records))
     noise = select_noise(part, x, white_weights(part, x))[1]
     found = levenberg_marquardt(part, x, noise, max_iterations=MAX_BUILD_ITERATIONS, tolerance=RELATIVE_COST_TOLERANCE)
-    products, log_determinant = whitened_products(
-        linearise_runs(part, found.x), len(part.layout.parameters), noise_vector(noise)
-    )
+    products, log_determinant = whitened_products(linearise_runs(part, found.x), len(part.layout.parameters), noise_vector(noise))
     return -0.5 * (log_determinant + float(products[0, 0]))
 
 

@@ -54,7 +54,10 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class Estimator:
-    """One method; `takes_effects` tells whether it can estimate effects, `joint` whether several runs at once."""
+    """One method; `takes_effects` tells whether it can estimate effects, `joint` whether several runs at once.
+
+    `after` is the same as `solve` from an output-error solution, for a method that begins with one.
+    """
 
     name: str
     says: str
@@ -62,7 +65,12 @@ class Estimator:
     solve: Callable[[Problem, Options], Solution]
     takes_effects: bool = True
     joint: bool = True
+    after: Callable[[Problem, Solution], Solution] | None = None
     info: Mapping[str, str] = field(default_factory=dict)
+
+    def refined(self, problem: Problem, plain: Solution, options: Options) -> Solution:
+        """Return this method's solution, from an output-error solution where it begins with one."""
+        return self.solve(problem, options) if self.after is None else self.after(problem, plain)
 
 
 def shared_covariance(problem: Problem, full: FloatArray, free: tuple[int, ...]) -> FloatArray:

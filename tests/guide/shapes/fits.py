@@ -67,6 +67,8 @@ class Fit(Merit):
     """The speed the parameters hold at."""
     method: str
     """The estimator: `output_error`, `pem`, `svf_ls`, `svf_rls` or `srivc`."""
+    method_reason: str | None
+    """Why `auto` took it, where it had to choose; else null."""
     effects: list[str]
     """Effects in the model."""
     parameters: dict[str, Parameter]
