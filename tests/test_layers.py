@@ -18,7 +18,8 @@ PACKAGE = ROOT / "fieldsid"
 ORDER = (
     "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
-    "comparison", "planning", "diagnosis", "extension", "plant", "turning", "schedule", "exports", "figures", "views", "face",
+    "comparison", "planning", "diagnosis", "extension", "plant", "turning", "schedule", "exports",
+    "trial_folder", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""
@@ -33,7 +34,7 @@ SUB_ROOMS = {
     "planning": ("specify", "belief", "flight", "safety", "design", "discriminate", "output"),
     "plant": ("laws",),
     "turning": ("measured", "steady"),
-    "cli": ("help", "commands"),
+    "cli": ("help", "trial", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its
 entry and what its folders share: of them, as of all files, no two import each other by any way round."""

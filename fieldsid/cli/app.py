@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
+JOURNAL = "journal.jsonl"
+"""The file that marks a trial folder, as `fieldsid/trial_folder/journal.py` has it: known here without its imports."""
 GC_THRESHOLD = 50_000
 """Things made since the last look from which on Python looks for what can be given back. What is imported and compiled makes
 millions that stay: looking at Python's own pace takes a fifth of the time of compiling, a twentieth of a tour."""
@@ -70,27 +72,14 @@ def run(arguments: Sequence[str]) -> Any:
 
     Raises UsageError for an unknown command, and whatever the command raises.
     """
-    from importlib import import_module
+    from fieldsid.cli.programs import program_of
 
-    from fieldsid.cli.help.catalogue import entries
-
-    known = entries()
-    name = arguments[0]
-    if name not in known:
-        raise _unknown(name, tuple(known))
-    import typer
-
+    program, words, name = program_of(arguments)
     from fieldsid.cli.user_effects import load_own_effects
 
     if "--help" not in arguments:
         load_own_effects()
-    module = import_module(known[name].module)
-    program = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    if isinstance(module.command, typer.Typer):
-        program.add_typer(module.command, name=name)
-        return program(list(arguments), prog_name="sysid", standalone_mode=False)
-    program.command(name)(module.command)
-    return program(list(arguments[1:]), prog_name=f"sysid {name}", standalone_mode=False)
+    return program(words, prog_name=name, standalone_mode=False)
 
 
 def _dispatch(arguments: list[str]) -> int:
@@ -105,7 +94,12 @@ def _dispatch(arguments: list[str]) -> int:
 
         sys.stdout.write(f"fieldsid {__version__}\n")
         return DONE
-    result = run(arguments)
+    if os.path.isfile(JOURNAL):  # noqa: PTH113 - no import
+        from fieldsid.cli.trial.journaled import run_in_trial
+
+        result = run_in_trial(arguments, run)
+    else:
+        result = run(arguments)
     if result == INTERRUPTED:  # typer makes a number of it
         raise KeyboardInterrupt
     return result if isinstance(result, int) else DONE
@@ -122,10 +116,3 @@ def _tell_refused(raised: Exception | None) -> None:
         from fieldsid.cli.failure import tell_refused
 
         tell_refused(errors, raised)
-
-
-def _unknown(name: str, known: tuple[str, ...]) -> Exception:
-    from fieldsid.errors import UsageError
-    from fieldsid.registry import near
-
-    return UsageError(f"there is no command {name!r}", found=", ".join(known), hint=near(name, known))

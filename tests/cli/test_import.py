@@ -46,8 +46,9 @@ def with_column(name, values):
 def test_init_makes_a_trial_folder_and_never_touches_one(run_cli, tmp_path):
     folder = tmp_path / "pandan"
     answer = run_cli("init", folder, "--json").json
-    assert sorted(p.name for p in folder.iterdir()) == ["mapping.yaml", "notes.md", "vehicle.yaml"]
-    assert answer["files"] == [str(folder / n) for n in ("vehicle.yaml", "mapping.yaml", "notes.md")]
+    files = ["vehicle.yaml", "mapping.yaml", "notes.md", "journal.jsonl"]
+    assert sorted(p.name for p in folder.iterdir()) == sorted([*files, "models", "runs"])
+    assert answer["files"] == [str(folder / n) for n in files]
     assert "name: 'pandan'" in (folder / "vehicle.yaml").read_text()
     before = sha256_of(folder)
     again = run_cli("init", folder)

@@ -38,6 +38,10 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             "The vehicle's limits are stated there once; every command run in that folder finds them.", "cat pandan/vehicle.yaml"
         ),
     ),
+    "status": (
+        Example("What there is, what follows from what, and what comes next.", "sysid status demo"),
+        Example("Of a new trial.", "sysid status pandan"),
+    ),
     "plan": (
         Example(
             "What to fly at one speed, as a logger of commands takes it.",

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 SHAPES: dict[str, Any] = {
     "init": logs.Init,
+    "status": logs.Status,
     "plan": planning.Plan,
     "inspect": logs.Inspection,
     "import": logs.Import,

@@ -1,23 +1,18 @@
-"""sysid init: a trial folder from templates: vehicle.yaml, mapping.yaml, notes."""
+"""sysid init: a trial folder: vehicle.yaml, mapping.yaml, notes, runs, models, journal."""
 
 from __future__ import annotations
 
-import re
+import shlex
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fieldsid.artifacts import write_text
 from fieldsid.cli.options import JsonFlag
-from fieldsid.errors import ArtifactError, UsageError
-from fieldsid.registry import near
-from fieldsid.templates import template_path
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-_NAME = re.compile(r"^name: .*$", re.MULTILINE)
 
 
 def command(
@@ -27,42 +22,27 @@ def command(
 ) -> None:
     """Make a trial folder with a vehicle.yaml, a mapping.yaml and notes to fill in; nothing is ever replaced.
 
+    A command run in it takes from there what is not typed: the vehicle, the mapping, the runs, the models and the gains. It
+    adds a line to journal.jsonl: when, what, the hashes of what went in and came out, the result. `sysid status` reads it.
+
     Example: sysid init pandan --template torpedo
     """
     from fieldsid.cli.console import emit
+    from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, append
+    from fieldsid.trial_folder.make import new_trial
 
-    files = new_trial(Path(name), template)
+    folder = Path(name)
+    files = new_trial(folder, template)
+    hashes = Hashes(folder, ())
+    time, words = datetime.now(UTC).isoformat(timespec="seconds"), ("sysid", "init", name, "--template", template)
+    verdict = f"a trial folder for a {template} vehicle"
+    append(folder, Entry(time, words, 0, 0.0, verdict, (), tuple(hashes.stamp(f) for f in files)))
+    files = [*files, folder / JOURNAL]
 
     def render(console: Console) -> None:
         for file in files:
             console.print(str(file), markup=False, soft_wrap=True)
+        console.print(f"next: fill in vehicle.yaml, then `cd {shlex.quote(name)} && sysid status`", markup=False, soft_wrap=True)
 
     body = {"schema": "fieldsid/init/1", "folder": name, "template": template, "files": [str(f) for f in files]}
     emit(body, as_json=as_json, render=render)
-
-
-def new_trial(folder: Path, template: str = "torpedo") -> list[Path]:
-    """Make a trial folder and return its files.
-
-    Raises UsageError for an unknown template, ArtifactError when one of the files exists.
-    """
-    kinds = {p.stem: p for p in sorted(template_path("vehicle").glob("*.yaml"))}
-    if template not in kinds:
-        raise UsageError(f"there is no template {template!r} for a vehicle", found=", ".join(kinds), hint=near(template, kinds))
-    vehicle = _NAME.sub(f"name: {_yaml_name(folder)}", kinds[template].read_text(encoding="utf-8"), count=1)
-    texts = {
-        "vehicle.yaml": vehicle,
-        "mapping.yaml": template_path("mapping.yaml").read_text(encoding="utf-8"),
-        "notes.md": template_path("notes.md").read_text(encoding="utf-8"),
-    }
-    there = [n for n in texts if (folder / n).exists()]
-    if there:
-        raise ArtifactError(
-            f"`{folder / there[0]}` exists", found=", ".join(there), hint="name another folder: `sysid init NAME`"
-        )
-    return [write_text(folder / name, text) for name, text in texts.items()]
-
-
-def _yaml_name(folder: Path) -> str:
-    """Return the folder's name quoted for YAML, so that a trial called `2026` stays a name."""
-    return "'" + (folder.name or folder.resolve().name).replace("'", "''") + "'"

@@ -1,4 +1,4 @@
-"""From log to run: init, inspect, import, simulate."""
+"""From log to run: init, status, inspect, import, simulate."""
 
 from __future__ import annotations
 
@@ -17,6 +17,74 @@ class Init(Shape):
     """The kind of vehicle it was made for."""
     files: list[str]
     """The files in it."""
+
+
+class MadeFrom(Shape):
+    """A file that another one was made from."""
+
+    path: str
+    """The file as it was named then."""
+    sha256: str
+    """Its hash then."""
+
+
+class TrialFile(Shape):
+    """One file of a trial folder."""
+
+    path: str
+    """Its path from the folder."""
+    kind: str
+    """What it is: log, run, model, fit, schedule, ..."""
+    made_from: list[MadeFrom]
+    """What it was made from, as it says itself."""
+    stale: str | None
+    """Why it does not hold any more; null where it does."""
+    missing: list[str]
+    """What it was made from and is not there any more."""
+
+
+class JournalLine(Shape):
+    """One command of the journal."""
+
+    time: str
+    """When it was run, ISO 8601 in UTC."""
+    command: list[str]
+    """Its words."""
+    exit: int
+    """Its exit code."""
+    seconds: float
+    """How long it took."""
+    verdict: str
+    """The first line of what it said."""
+
+
+class NextStep(Shape):
+    """What to do next."""
+
+    why: str
+    """Because of what."""
+    command: str
+    """The command; empty where nothing is left to do."""
+
+
+class Status(Shape):
+    """What a trial folder holds."""
+
+    schema_: Literal["fieldsid/status/1"] = schema_field("fieldsid/status/1")
+    folder: str
+    """The folder."""
+    verdict: str
+    """What it holds, in one line."""
+    files: list[TrialFile]
+    """The files that the program knows."""
+    stale: list[str]
+    """Those that rest on something that has changed since."""
+    journal: list[JournalLine]
+    """The commands that were run in it, the oldest first."""
+    unreadable_journal_lines: int
+    """Lines of the journal that are none, as a power cut leaves them."""
+    next: NextStep
+    """What to do next."""
 
 
 class FieldInfo(Shape):

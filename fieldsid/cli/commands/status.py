@@ -1,0 +1,114 @@
+"""sysid status: what a trial folder holds, what follows from what, what is stale, what comes next."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.options import JsonFlag
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.trial_folder.state import FolderState, Item
+
+NAMES = {
+    "log": "log", "run": "run", "model": "model", "fit": "laws", "schedule": "gains", "turn-radius": "turning radius",
+    "plan": "plan", "vehicle": "vehicle", "mapping": "mapping",
+}  # fmt: skip
+ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "fit", "turn-radius", "schedule")
+MOST_SOURCES = 2
+LAST = 3
+
+Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The trial folder; the one it is run in if not given.")]
+
+
+def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """Say what a folder holds, what was made from what, which files are stale, and what to do next.
+
+    A file is stale where something that it was made from has changed since, by its hash, or is stale itself. Any folder will do;
+    one that `sysid init` made has a journal too, by which the command that makes a stale file again is known.
+
+    Example: sysid status
+    """
+    from fieldsid.errors import UsageError
+    from fieldsid.trial_folder.next_step import next_step
+    from fieldsid.trial_folder.state import state_of
+
+    if not folder.is_dir():
+        raise UsageError(
+            f"`{folder}` is no folder", found="a file" if folder.exists() else "nothing there", hint="`sysid init NAME`"
+        )
+    state = state_of(folder)
+    why, line = next_step(state)
+    if line and folder.resolve() != Path.cwd():
+        line = f"cd {shlex.quote(str(folder))} && {line}"
+    body = {
+        "schema": "fieldsid/status/1",
+        "folder": str(folder),
+        "verdict": _verdict(state),
+        "files": [_entry(i) for i in state.items],
+        "stale": [i.path for i in state.items if i.stale],
+        "journal": [
+            {"time": e.time, "command": list(e.command), "exit": e.exit, "seconds": e.seconds, "verdict": e.verdict}
+            for e in state.entries
+        ],
+        "unreadable_journal_lines": state.broken_lines,
+        "next": {"why": why, "command": line},
+    }
+    if state.broken_lines and not as_json:
+        say(f"warning: {state.broken_lines} lines of the journal cannot be read [journal]")
+    return emit(body, as_json=as_json, render=lambda to: _render(to, state, body))
+
+
+def _verdict(state: FolderState) -> str:
+    counts = Counter(i.kind for i in state.items)
+    held = ", ".join(_many(counts[k], NAMES[k]) for k in ORDER if counts[k] and k not in ("vehicle", "mapping")) or "nothing yet"
+    stale = sum(bool(i.stale) for i in state.items)
+    name = state.folder.resolve().name
+    return f"{name}: {held}; " + (f"{stale} stale" if stale else "nothing is stale")
+
+
+def _many(count: int, name: str) -> str:
+    return f"{count} {name}" if count == 1 or name in ("laws", "gains") else f"{count} {name}s"
+
+
+def _entry(item: Item) -> dict[str, Any]:
+    inputs = [{"path": s.named, "sha256": s.sha256} for s in item.sources]
+    return {"path": item.path, "kind": item.kind, "made_from": inputs, "stale": item.stale or None, "missing": list(item.missing)}
+
+
+def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:
+    to.print(body["verdict"], markup=False, soft_wrap=True)
+    to.print(f"because: {body['next']['why']}", markup=False, soft_wrap=True)
+    if body["next"]["command"]:
+        to.print(f"next: {body['next']['command']}", markup=False, soft_wrap=True)
+    used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that has become a run says no more
+    listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
+    shown = sorted(listed, key=lambda i: (ORDER.index(i.kind), i.path))
+    if shown:
+        to.print()
+        to.print(table("", ("file", "what", "made from", ""), [_row(i) for i in shown], left=4))
+    kept = [e for e in state.entries if e.verdict][-LAST:]
+    if kept:
+        to.print()
+    for e in kept:
+        done = "" if e.exit in (0, 1) else "failed: "
+        when = datetime.fromisoformat(e.time).astimezone().strftime("%Y-%m-%d %H:%M")
+        to.print(f"{when}  {' '.join(e.command[:2])}: {done}{e.verdict}", markup=False, soft_wrap=True)
+
+
+def _row(item: Item) -> Sequence[str]:
+    names = [Path(s.named).name for s in item.sources]
+    said = ", ".join(names[:MOST_SOURCES]) + (f" and {len(names) - MOST_SOURCES} more" if len(names) > MOST_SOURCES else "")
+    what = NAMES[item.kind]
+    effects = ", ".join((item.body or {}).get("effects", ())) if item.kind == "model" else ""
+    state = f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else ""
+    return item.path, f"{what} + {effects}" if effects else what, said, state

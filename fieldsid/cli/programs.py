@@ -1,0 +1,36 @@
+"""A command line as the program that parses it: one Typer application for the command that its first word names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import typer
+
+
+def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
+    """Return the program of a command, the words it takes, and the name it goes by; raises UsageError for an unknown command."""
+    from fieldsid.cli.help.catalogue import entries
+
+    known = entries()
+    name = arguments[0]
+    if name not in known:
+        raise _unknown(name, tuple(known))
+    import typer
+
+    module = import_module(known[name].module)
+    program = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    if isinstance(module.command, typer.Typer):
+        program.add_typer(module.command, name=name)
+        return program, list(arguments), "sysid"
+    program.command(name)(module.command)
+    return program, list(arguments[1:]), f"sysid {name}"
+
+
+def _unknown(name: str, known: tuple[str, ...]) -> Exception:
+    from fieldsid.errors import UsageError
+    from fieldsid.registry import near
+
+    return UsageError(f"there is no command {name!r}", found=", ".join(known), hint=near(name, known))

@@ -1,0 +1,101 @@
+"""What a command line leaves out and its trial folder has: runs, models, gains, the folder that takes what is written.
+
+What was typed always counts. The words are put behind it, so that the journal holds a line that can be run anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+
+from fieldsid.cli.trial.parsed import Parsed
+from fieldsid.trial_folder.make import MODELS, RUNS
+from fieldsid.trial_folder.next_step import chosen_models, run_words, trained_runs, unseen_runs
+from fieldsid.trial_folder.state import MODEL, FolderState, Item
+
+Fill = Callable[[Parsed, FolderState], list[str]]
+
+
+def filled(parsed: Parsed, state: Callable[[], FolderState]) -> list[str]:
+    """Return the words that a trial folder adds to a command line."""
+    fill = FILLS.get(parsed.name)
+    return [] if fill is None else fill(parsed, state())
+
+
+def wants(parsed: Parsed) -> bool:
+    """Whether a command takes anything from a trial folder."""
+    return parsed.name in FILLS
+
+
+def _runs(parsed: Parsed, state: FolderState) -> list[str]:
+    return [] if parsed.values.get("runs") else run_words(state)
+
+
+def _output(parsed: Parsed, folder: str) -> list[str]:
+    return [] if parsed.values.get("output") else ["-o", folder]
+
+
+def _import(parsed: Parsed, _state: FolderState) -> list[str]:
+    return _output(parsed, RUNS)
+
+
+def _identify(parsed: Parsed, state: FolderState) -> list[str]:
+    return [*_runs(parsed, state), *_output(parsed, MODELS)]
+
+
+def _of_model(fitted: Callable[[FolderState, Item], list[str]]) -> Fill:
+    """Return the filling of a command that takes a model and runs: the best model, and the runs that go with it."""
+
+    def fill(parsed: Parsed, state: FolderState) -> list[str]:
+        typed = [str(p) for p in parsed.paths("model", "runs")]
+        words = typed or chosen_models(state)[:1]
+        model = next((i for i in state.of_kind(MODEL) if [i.path] == words), None)
+        return [] if model is None else [*(() if typed else words), *fitted(state, model)]
+
+    return fill
+
+
+def _extend(parsed: Parsed, state: FolderState) -> list[str]:
+    return [] if parsed.values.get("undo") else _of_model(trained_runs)(parsed, state)
+
+
+def _model(parsed: Parsed, state: FolderState) -> list[str]:
+    return [] if parsed.values.get("model") else chosen_models(state)[:1]
+
+
+def _models(parsed: Parsed, state: FolderState) -> list[str]:
+    return [] if parsed.values.get("models") else chosen_models(state)
+
+
+def _yaw_models(parsed: Parsed, state: FolderState) -> list[str]:
+    return [] if parsed.values.get("models") else chosen_models(state, "yaw")
+
+
+def _schedule(parsed: Parsed, state: FolderState) -> list[str]:
+    return [] if parsed.values.get("schedule") else [i.path for i in state.of_kind("schedule")[-1:]]
+
+
+FILLS: Mapping[str, Fill] = MappingProxyType(
+    {
+        "import": _import,
+        "identify": _identify,
+        "compare": _of_model(unseen_runs),
+        "diagnose": _runs,
+        "extend": _extend,
+        "history": _model,
+        "simulate": _model,
+        "fit": _models,
+        "turn-radius": _yaw_models,
+        "schedule design": _models,
+        "schedule verify": _schedule,
+        "schedule export": _schedule,
+    }
+)
+"""What each command takes from the folder it is run in."""
+
+
+def in_words(added: Sequence[str]) -> str:
+    """Return what was taken from the folder, short."""
+    runs = [w for w in added if w.startswith(f"{RUNS}/")]
+    words = [w for w in added if w not in runs]
+    return " ".join([*words, *(runs if len(runs) <= 3 else [runs[0], f"... {len(runs)} runs"])])

@@ -1,0 +1,157 @@
+"""What to do next in a trial: the first command of the day that has not been done, or must be done again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.trial_folder.journal import Entry, is_trial, made_by
+from fieldsid.trial_folder.make import RUNS
+from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
+from fieldsid.vehicle import find_vehicle
+
+DONE = (0, 1)
+"""Exit codes of a command that gave a result."""
+
+
+def next_step(state: FolderState) -> tuple[str, str]:
+    """Return why, and the command to run next, ready to paste in the folder; without one where nothing is left to do."""
+    return (_again(state) or _data(state) or _model(state) or _use(state)) or ("everything rests on what is there", "")
+
+
+def _again(state: FolderState) -> tuple[str, str] | None:
+    """Return how to make the first stale file again; what only rests on a stale one comes after it."""
+    stale = [i for i in state.items if i.stale]
+    if not stale:
+        return None
+    first = min(stale, key=lambda i: i.stale.endswith(" is stale"))
+    maker = made_by(state.entries, first.path)
+    return f"{first.path}: {first.stale}", _made_again(maker) if maker is not None else _remake(state, first)
+
+
+def _made_again(entry: Entry) -> str:
+    words = [w for w in entry.command if w != "--json"]
+    return shlex.join([*words, *([] if "--force" in words else ["--force"])])
+
+
+def _remake(state: FolderState, item: Item) -> str:
+    """Return how to make a file again that the journal does not know, as far as the file says how."""
+    sources = [s.named for s in item.sources]
+    if item.kind == RUN:
+        return shlex.join(["sysid", "import", *sources, "-o", str(Path(item.path).parent), "--force"])
+    if item.kind == MODEL:
+        axis = str((item.body or {}).get("axis", "yaw"))
+        return shlex.join(["sysid", "identify", *run_words(state), "--axis", axis, "-o", str(Path(item.path).parent), "--force"])
+    return shlex.join(["sysid", "history", item.path])
+
+
+def _data(state: FolderState) -> tuple[str, str] | None:
+    runs, logs = state.of_kind(RUN), state.of_kind(LOG)
+    if runs or state.of_kind(MODEL):
+        return None
+    if logs:
+        return f"{len(logs)} logs and no run", shlex.join(
+            ["sysid", "import", *(i.path for i in logs), *_left_out(state, "-o", RUNS)]
+        )
+    return "there is no log yet", f"sysid plan --axis yaw --speeds {_speeds(state.folder)}"
+
+
+def _speeds(folder: Path) -> str:
+    vehicle = find_vehicle(folder)
+    if vehicle is None or vehicle.speed_min_m_s is None or vehicle.speed_max_m_s is None:
+        return "1.0,1.4,1.8"
+    low, high = vehicle.speed_min_m_s, vehicle.speed_max_m_s
+    return ",".join(f"{s:g}" for s in (round(low, 2), round(0.5 * (low + high), 2), round(high, 2)) if s > 0)
+
+
+def _model(state: FolderState) -> tuple[str, str] | None:
+    axis = _axis(state)
+    if not state.of_kind(MODEL):
+        runs = state.of_kind(RUN)
+        return f"{len(runs)} runs and no model", shlex.join(
+            ["sysid", "identify", *_left_out(state, *run_words(state)), "--axis", axis, *_joint(runs)]
+        )
+    diagnosis = next((e for e in reversed(state.entries) if e.command[1:2] == ("diagnose",) and e.exit in DONE), None)
+    if diagnosis is None:
+        if not (words := run_words(state)):
+            return None
+        return "no diagnosis yet", shlex.join(["sysid", "diagnose", *_left_out(state, *words), "--axis", axis])
+    best = state.models[0]
+    have = set((best.body or {}).get("effects", ()))
+    lacking = [e for e in diagnosis.named if e not in have]
+    tried = any(e.command[1:2] == ("extend",) and e.time > diagnosis.time and e.exit in DONE for e in state.entries)
+    if lacking and not tried:
+        add = [w for e in lacking for w in ("--add", e)]
+        return f"the diagnosis names {', '.join(lacking)}", shlex.join(
+            ["sysid", "extend", *_left_out(state, best.path, *trained_runs(state, best)), *add]
+        )
+    return None
+
+
+def _use(state: FolderState) -> tuple[str, str] | None:
+    schedules = state.of_kind("schedule")
+    models = chosen_models(state)
+    if not schedules:
+        return (
+            ("no gains yet", shlex.join(["sysid", "schedule", "design", *_left_out(state, *models), "-o", "gains.yaml"]))
+            if models
+            else None
+        )
+    if not any(e.command[1:3] == ("schedule", "verify") and e.exit in DONE for e in state.entries):
+        return "the gains are not verified", shlex.join(["sysid", "schedule", "verify", *_left_out(state, schedules[-1].path)])
+    return None
+
+
+def chosen_models(state: FolderState, axis: str = "") -> list[str]:
+    """Return the files that say most of one axis: the joint model that nothing was extended from, else those of single runs.
+
+    Nothing where both planes have models and none is asked for.
+    """
+    models = [i for i in state.models if not axis or (i.body or {}).get("axis") == axis]
+    if len({(i.body or {}).get("axis") for i in models}) > 1:
+        return []
+    joint = [i for i in models if len((i.body or {}).get("runs", ())) > 1]
+    if joint:
+        return [max(joint, key=lambda i: (len((i.body or {}).get("effects", ())), state.place(i).stat().st_mtime_ns)).path]
+    return [i.path for i in models]
+
+
+def unseen_runs(state: FolderState, model: Item) -> list[str]:
+    """Return the runs of a folder that a model was not fitted to, all where it was fitted to every one."""
+    fitted = set(trained_runs(state, model))
+    runs = run_words(state)
+    return [r for r in runs if r not in fitted] or runs
+
+
+def trained_runs(state: FolderState, model: Item) -> list[str]:
+    """Return the runs of a folder that a model was fitted to."""
+    fitted = {str(r) for r in (model.body or {}).get("runs", ())}
+    named = {s.path for s in model.sources if s.path is not None}
+    return [i.path for i in state.of_kind(RUN) if state.place(i).resolve() in named and Path(i.path).stem in fitted]
+
+
+def _left_out(state: FolderState, *words: str) -> tuple[str, ...]:
+    """Return words that need not be typed in a trial folder: a command takes them from there."""
+    return () if is_trial(state.folder) else words
+
+
+def run_words(state: FolderState) -> list[str]:
+    """Return the runs of a folder, as a command line names them there."""
+    return [i.path for i in state.of_kind(RUN)]
+
+
+def _joint(runs: Sequence[Item]) -> list[str]:
+    return ["--joint"] if len(runs) > 1 else []
+
+
+def _axis(state: FolderState) -> str:
+    """Return the plane of the models, else the one that the first run moved a fin in; yaw where both are there."""
+    if state.models:
+        return str((state.models[0].body or {}).get("axis", "yaw"))
+    tables = [state.place(i) for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
+    names = import_module("pyarrow.parquet").read_schema(tables[0]).names if tables else []
+    axes = [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & set(names)]
+    return axes[0].value if axes else Axis.YAW.value

@@ -1,0 +1,139 @@
+"""A trial folder: what a command takes from it, the line it leaves in the journal, and what `sysid status` makes of both."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from hashlib import sha256
+
+import pytest
+from cli import trial
+
+
+@pytest.fixture
+def folder(run_cli, tmp_path, monkeypatch):
+    """A trial folder with two runs and one log that is no run yet, as the working folder."""
+    monkeypatch.chdir(tmp_path)
+    assert run_cli("init", "pandan").code == 0
+    place = tmp_path / "pandan"
+    monkeypatch.chdir(place)
+    for speed in (1.0, 1.4):
+        trial.flown(place / "runs", speed=speed, name=f"pulses_{speed}")
+    return place
+
+
+def journal(folder):
+    return [json.loads(line) for line in (folder / "journal.jsonl").read_text().splitlines()]
+
+
+def test_runs_and_the_folder_of_models_need_not_be_typed(run_cli, folder):
+    answer = run_cli("identify", "--axis", "yaw", "--no-figures", "--json")
+    assert [f["run"] for f in answer.json["fits"]] == ["pulses_1.0", "pulses_1.4"]
+    assert "taken from the trial folder: -o models runs/pulses_1.0.parquet" in answer.err
+    assert sorted(p.name for p in (folder / "models").iterdir()) == ["pulses_1.0_yaw.yaml", "pulses_1.4_yaw.yaml"]
+
+
+def test_what_is_typed_counts(run_cli, folder):
+    body = run_cli("identify", "runs/pulses_1.4.parquet", "--axis", "yaw", "-o", "other", "--no-figures", "--json").json
+    assert [f["model"] for f in body["fits"]] == ["other/pulses_1.4_yaw.yaml"]
+    assert list((folder / "models").iterdir()) == []
+
+
+def test_the_journal_holds_a_line_that_can_be_run_again_with_the_hashes_of_its_files(run_cli, folder):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    first, line = journal(folder)
+    assert first["command"][:2] == ["sysid", "init"]
+    assert shlex.join(line["command"]) == (
+        "sysid identify --axis yaw --joint --no-figures runs/pulses_1.0.parquet runs/pulses_1.4.parquet -o models"
+    )
+    assert line["exit"] == 0
+    assert {s["path"] for s in line["inputs"]} == {"runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet", "vehicle.yaml"}
+    (made,) = line["outputs"]
+    assert made["path"] == "models/joint_yaw.yaml"
+    assert made["sha256"] == sha256((folder / "models/joint_yaw.yaml").read_bytes()).hexdigest()
+
+
+def test_a_command_that_fails_leaves_its_reason_and_bad_usage_nothing(run_cli, folder):
+    assert run_cli("history", "nothing.yaml").code == 2
+    assert run_cli("identify", "--axis", "sideways").code == 2
+    _, line = journal(folder)
+    assert (line["exit"], line["command"][1]) == (2, "history")
+    assert "nothing.yaml" in line["verdict"]
+
+
+def test_outside_a_trial_folder_nothing_is_taken_and_nothing_is_written(run_cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    trial.flown(tmp_path, name="run7")
+    assert run_cli("identify", "--axis", "yaw").code == 2
+    assert run_cli("identify", "run7.parquet", "--axis", "yaw", "--no-figures").code == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["run7.parquet"]
+
+
+def test_compare_takes_the_model_and_the_runs_that_it_was_not_fitted_to(run_cli, folder):
+    assert run_cli("identify", "runs/pulses_1.4.parquet", "--axis", "yaw", "--no-figures").code == 0
+    body = run_cli("compare", "--no-figures", "--json").json
+    assert body["model"] == "models/pulses_1.4_yaw.yaml"
+    assert [r["run"] for r in body["runs"]] == ["pulses_1.0"]
+
+
+def test_status_leads_from_an_empty_folder_to_a_diagnosis(run_cli, folder):
+    for run in sorted((folder / "runs").iterdir()):
+        run.rename(folder.parent / run.name)
+    assert run_cli("status", "--json").json["next"]["command"] == "sysid plan --axis yaw --speeds 0.8,1.4,2"
+    for run in sorted(folder.parent.glob("*.parquet")):
+        run.rename(folder / "runs" / run.name)
+    line = run_cli("status", "--json").json["next"]["command"]
+    assert line == "sysid identify --axis yaw --joint"
+    assert run_cli(*shlex.split(line)[1:], "--no-figures").code == 0
+    body = run_cli("status", "--json").json
+    assert body["next"] == {"why": "no diagnosis yet", "command": "sysid diagnose --axis yaw"}
+    assert body["verdict"] == "pandan: 2 runs, 1 model; nothing is stale"
+    assert [len(f["made_from"]) for f in body["files"] if f["kind"] == "model"] == [2]
+
+
+def test_a_changed_run_makes_its_model_stale_and_the_gains_made_of_that(run_cli, folder):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    assert run_cli("schedule", "design", "-o", "gains.yaml").code == 0
+    (folder / "runs" / "pulses_1.0.parquet").unlink()
+    trial.flown(folder / "runs", speed=1.0, seed=4, name="pulses_1.0")
+    body = run_cli("status", "--json").json
+    why = {f["path"]: f["stale"] for f in body["files"]}
+    assert why["models/joint_yaw.yaml"] == "runs/pulses_1.0.parquet has changed"
+    assert why["gains.yaml"] == "models/joint_yaw.yaml is stale"
+    again = body["next"]["command"]
+    assert again.startswith("sysid identify --axis yaw --joint --no-figures ")
+    assert run_cli(*shlex.split(again)[1:]).code == 0
+    body = run_cli("status", "--json").json
+    assert body["stale"] == ["gains.yaml"]
+    assert run_cli(*shlex.split(body["next"]["command"])[1:]).code == 0
+    assert run_cli("status", "--json").json["stale"] == []
+
+
+def test_a_run_that_is_gone_is_said_and_makes_nothing_stale(run_cli, folder):
+    assert run_cli("identify", "runs/pulses_1.4.parquet", "--axis", "yaw", "--no-figures").code == 0
+    (folder / "runs" / "pulses_1.4.parquet").unlink()
+    (model,) = (f for f in run_cli("status", "--json").json["files"] if f["kind"] == "model")
+    assert (model["missing"], model["stale"]) == (["runs/pulses_1.4.parquet"], None)
+
+
+def test_a_line_that_a_power_cut_left_is_told_and_the_next_one_stands_by_itself(run_cli, folder):
+    with (folder / "journal.jsonl").open("a") as stream:
+        stream.write('{"schema": "fieldsid/journal/1", "time": "2026-')
+    assert run_cli("history", "nothing.yaml").code == 2
+    answer = run_cli("status")
+    assert "warning: 1 lines of the journal cannot be read [journal]" in answer.err
+    assert "history: failed: " in answer.out
+
+
+def test_status_of_another_folder_says_where_to_go(run_cli, folder, monkeypatch):
+    monkeypatch.chdir(folder.parent)
+    assert run_cli("status", "pandan", "--json").json["next"]["command"].startswith("cd pandan && sysid identify")
+    answer = run_cli("status", "nowhere")
+    assert answer.code == 2
+    assert "`nowhere` is no folder" in answer.err
+
+
+def test_status_writes_nothing(run_cli, folder):
+    before = (folder / "journal.jsonl").read_bytes()
+    assert run_cli("status").code == 0
+    assert (folder / "journal.jsonl").read_bytes() == before
