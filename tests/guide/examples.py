@@ -83,6 +83,14 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             "As a gate: the exit code is 1 where a fit is below it.",
             f'sysid compare {JOINT} {CHECK[1]} --min-fit 95 --top 2; echo "exit code $?"',
         ),
+        Example(
+            "Two models over the same runs: which follows them best.",
+            f"sysid compare {JOINT} {LAGGED} demo/runs/check_*.parquet",
+        ),
+        Example(
+            "Before and after a swap. Here nothing was swapped: two runs of the same vehicle, an hour apart.",
+            "sysid compare demo/final/speeds/learn_1.4_yaw.yaml demo/models/learn_1.4_yaw.yaml",
+        ),
     ),
     "simulate": (
         Example(

@@ -6,7 +6,7 @@ import json
 from functools import cache
 from typing import Any
 
-from guide.shapes import diagnosis, fits, gains, logs, planning, rest, turning
+from guide.shapes import change, diagnosis, fits, gains, logs, planning, rest, turning
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter
 
@@ -18,7 +18,7 @@ SHAPES: dict[str, Any] = {
     "inspect": logs.Inspection,
     "import": logs.Import,
     "identify": fits.Identify,
-    "compare": fits.Compare,
+    "compare": fits.Compare | change.CompareModels | change.CompareSeveral,
     "simulate": logs.Simulation,
     "diagnose": diagnosis.Diagnose,
     "extend": fits.Extension | fits.Undone,

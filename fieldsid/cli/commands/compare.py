@@ -1,4 +1,4 @@
-"""sysid compare: a model against measurement, and where it fails."""
+"""sysid compare: a model against measurement and where it fails; before against after a swap."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
-from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, ModelFile, OutputDir, RunFiles, ToS
+from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
 from fieldsid.cli.progress import get_ready, refuse_closed
+from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +22,12 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 MOST_SHOWN = 6
+
+First = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file, or the folder of the models before a swap.")]
+Others = Annotated[
+    list[Path],
+    typer.Argument(metavar="RUN...", help="Runs or log files, more models before them; or the model or folder after a swap."),
+]
 
 MinFit = Annotated[
     float | None,
@@ -32,8 +39,8 @@ Top = Annotated[int, typer.Option("--top", min=1, help="Conditions to show for e
 
 
 def command(
-    model: ModelFile,
-    runs: RunFiles,
+    model: First,
+    runs: Others,
     start: FromS = None,
     end: ToS = None,
     mapping: MappingFile = None,
@@ -51,16 +58,39 @@ def command(
     made. The error of angle and rate is divided by phase, fin angle, rate, speed, heading, side, depth and time, that of the
     one further above its noise first. With `-o` one figure per run is drawn.
 
+    Two models, or two folders of models, and no run: what a swap has changed beyond the models' errors at the speeds that both
+    were flown at, and what that does to the gains and the turning radius. Several models and runs: which follows them best.
+
     Example: sysid compare models/run7_yaw.yaml runs/zigzag.parquet
+
+    Example: sysid compare before/models after/models -o figures/
     """
+    from fieldsid.cli.commands._before_after import before_after, is_side
+
+    sides = [p for p in (model, *runs) if is_side(p)]
+    if len(sides) == len(runs) + 1 == 2:
+        _refuse_part(start, end, mapping, min_fit)
+        return before_after(sides[0], sides[1], output, figures=figures, force=force, as_json=as_json)
     from fieldsid.cli.inputs import read_runs, refuse_swapped
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.models.model import load_model
     from fieldsid.models.record import left_out
 
-    refuse_swapped("compare", model, runs)
     refuse_closed(output)
+    if len(sides) > 1:
+        return _several(
+            sides,
+            [p for p in runs if p not in sides],
+            start,
+            end,
+            mapping,
+            min_fit,
+            output if figures else None,
+            force=force,
+            as_json=as_json,
+        )
+    refuse_swapped("compare", model, runs)
     known = load_model(model)
     skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
     effects = partial(check_effects, [(model, known)])
@@ -84,6 +114,39 @@ def command(
     emit(body, as_json=as_json, render=lambda to: _render(to, entries, top))
     _gate(entries, min_fit)
     skips.end(len(entries))
+    return body
+
+
+def _refuse_part(*given: object) -> None:
+    """Refuse options that are for runs, where there is none."""
+    if any(g is not None for g in given):
+        raise UsageError(
+            "`--from`, `--to`, `--mapping` and `--min-fit` are for runs", found="two models and no run", hint="leave them out"
+        )
+
+
+def _several(
+    models: Sequence[Path],
+    runs: Sequence[Path],
+    start: float | None,
+    end: float | None,
+    mapping: Path | None,
+    min_fit: float | None,
+    output: Path | None,
+    *,
+    force: bool,
+    as_json: bool,
+) -> Mapping[str, Any]:
+    from fieldsid.cli.commands._several_models import several_models
+    from fieldsid.cli.skipped_logs import Skips
+
+    if not runs or any(p.is_dir() for p in models):
+        found = ", ".join(str(p) for p in (*models, *runs))
+        raise UsageError("several models are compared over runs", found=found, hint="sysid compare M1.yaml M2.yaml RUN")
+    reading = {"mapping": mapping, "start": start, "end": end}
+    body = several_models(models, runs, Skips(), entry=_entry, reading=reading, output=output, force=force, as_json=as_json)
+    for m in body["models"]:
+        _gate(m["runs"], min_fit)
     return body
 
 

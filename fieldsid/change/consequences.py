@@ -1,0 +1,105 @@
+"""What a change of the vehicle means: the gain that would be designed now, the loop with the old gains, the turning radius."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.change.record import Answers, GainChange, RadiusChange
+from fieldsid.dynamics.free_run import command_record, effects_of, simulate
+from fieldsid.errors import FieldsidError
+from fieldsid.maneuvers import Limits, all_maneuvers
+from fieldsid.models.axis import NAMES
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.planning.flight.dry_run import dry_run
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.schedule.controller import least_damping
+from fieldsid.schedule.design import Wish
+from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.margins import margins
+from fieldsid.schedule.record import Row, Schedule
+from fieldsid.turning.radius import turn_radius
+
+DRAWS, SEED = 400, 20
+PULSES = "square_pulses"
+
+
+@dataclass(frozen=True, slots=True)
+class Fin:
+    """What the fin can do: largest angle (rad), and lag, delay and rate where they are stated."""
+
+    limit: float
+    stated: FinLimits
+
+
+def gain_changes(
+    old: ParameterSource, new: ParameterSource, speeds: Sequence[float], fin: Fin, before: Schedule | None
+) -> tuple[GainChange, ...]:
+    """Return the gains at each speed; `before` are those the vehicle has, designed as asked then, else P gains of the old models.
+
+    Raises ModelError where no gain holds one of the two loops.
+    """
+    wish = Wish() if before is None else Wish(before.kind, before.damping, before.phase_margin_deg)
+    was = before or design_schedule(old, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
+    now = design_schedule(new, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
+    level = 0.05 / len(speeds)  # the speeds are asked together
+    return tuple(_gain(old, new, was.at(s), now.at(s), fin, level) for s in speeds)
+
+
+def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, fin: Fin, level: float) -> GainChange:
+    speed = now.speed
+    families = [family_at(source, speed, fin.stated, DRAWS, SEED + 1000 * i) for i, source in enumerate((old, new))]
+    ratio = _formula(families[1]) / _formula(families[0])
+    change = now.gains.kp / was.gains.kp - 1.0
+    # the draws say how far the ratio may be off; what lag and delay take of the gain is in its middle
+    low, high = (float(np.quantile(ratio, q) / np.median(ratio)) for q in (0.5 * level, 1 - 0.5 * level))
+    plant = families[1].one()
+    return GainChange(
+        speed, was.gains.kp, now.gains.kp, change, (float((1 + change) * low - 1.0), float((1 + change) * high - 1.0)),
+        least_damping(plant, was.gains), float(margins(plant, was.gains).phase_deg[0]),
+    )  # fmt: skip
+
+
+def _formula(plant: LinearPlant) -> FloatArray:
+    """Return the gain that the formula gives at damping 0.7071, for each draw, (d,)."""
+    damping = plant.damping + plant.cross_rate / plant.cross_damping
+    authority = plant.authority + plant.cross_fin / plant.cross_damping
+    size = np.broadcast_to(np.abs(0.5 * damping**2 - plant.stiffness), authority.shape)
+    count = min(DRAWS, authority.size)
+    return np.asarray((size / np.abs(authority))[:count])
+
+
+def radius_changes(
+    old: ParameterSource, new: ParameterSource, speeds: Sequence[float], rudder: float
+) -> tuple[RadiusChange, ...]:
+    """Return the radius at each speed to both sides; raises UsageError and ModelError where there is no turn."""
+    both = [turn_radius(source, speeds, rudder).rows for source in (old, new)]
+    after = {(r.speed, r.side): r for r in both[1]}
+    pairs = [(r, after[r.speed, r.side]) for r in both[0]]
+    return tuple(RadiusChange(a.speed, a.side, a.radius, a.interval95, b.radius, b.interval95) for a, b in pairs)
+
+
+def answers(old: ParameterSource, new: ParameterSource, speed: float, fin_max: float) -> Answers | None:
+    """Return what both vehicles do at the same pulses of the fin, at one speed in m/s; None where a model cannot be flown so."""
+    models = [s.models[s.near(speed)[0][0]] for s in (old, new)]
+    if any(e.needs for m in models for e in effects_of(m)):
+        return None
+    maneuver, names = all_maneuvers()[PULSES], NAMES[models[0].axis]
+    try:
+        flown = dry_run(models[0], maneuver, maneuver.checked({}), speed=speed, limits=Limits(fin_max))
+        fin = flown[names.fin]
+        record = command_record(models[0].axis, flown.time, fin, speed=speed, signals={})
+        rates = [simulate(m, record, state=(0.0, 0.0, 0.0)).rate for m in models]
+    except FieldsidError:
+        return None
+    return Answers(speed, flown.time, fin, rates[0], rates[1])
+
+
+def fin_of(models: Sequence[Model]) -> float | None:
+    """Return the largest fin angle in the models' runs, rad; None where no model knows it."""
+    known = [m.trained.get("fin_max", 0.0) for m in models]
+    return max(known) if known and max(known) > 0 else None

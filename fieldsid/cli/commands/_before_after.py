@@ -1,0 +1,194 @@
+"""`sysid compare OLD NEW`: two states of a vehicle, each a model file or a folder of models."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.change.record import CHANGED, TRIM_ANGLE, shown
+from fieldsid.cli.console import emit, table, warn
+from fieldsid.errors import UsageError
+from fieldsid.logs.unknown_file import own_kind
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.change.record import Change, ParameterChange
+    from fieldsid.plant.parameter_source import ParameterSource
+
+
+LEVEL = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One state: what was given, and by axis the model files that say most of it."""
+
+    given: Path
+    files: Mapping[str, list[Path]]
+
+
+def is_side(path: Path) -> bool:
+    """Whether a path is a model, or a folder with models in it."""
+    if path.is_dir():
+        return any(own_kind(p) == "model" for p in path.rglob("*.yaml"))
+    return own_kind(path) == "model"
+
+
+def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, force: bool, as_json: bool) -> Mapping[str, Any]:
+    """Compare two states and print what has changed; return the body."""
+    sides = (_side(old), _side(new))
+    axes = [a for a in sides[0].files if a in sides[1].files]
+    if not axes:
+        there = " and ".join(", ".join(s.files) for s in sides)
+        raise UsageError("there is no axis with models on both sides", found=there, hint="give two models of one axis")
+    found = [_compared(sides, axis) for axis in axes]
+    drawn = [_drawn(c, (old, new), output if figures else None, force=force) for c in found]
+    changes = [
+        {**c.record(), "models": [[str(p) for p in s.files[c.axis.value]] for s in sides], "figure": f, "next": _next(c, sides)}
+        for c, f in zip(found, drawn, strict=True)
+    ]
+    body = {"schema": "fieldsid/compare-models/1", "before": str(old), "after": str(new), "changes": changes}
+    emit(body, as_json=as_json, render=lambda to: _render(to, found, changes))
+    if not as_json:
+        for c in found:
+            warn(c.notes, of=c.axis.value)
+    return body
+
+
+def _side(path: Path) -> Side:
+    from fieldsid.models.model import load_model
+
+    if path.is_file():
+        return Side(path, {load_model(path).axis.value: [path]})
+    from fieldsid.trial_folder.next_step import chosen_models
+    from fieldsid.trial_folder.state import state_of
+
+    state = state_of(path)
+    files = {axis: [path / name for name in chosen_models(state, axis)] for axis in ("yaw", "pitch")}
+    return Side(path, {axis: names for axis, names in files.items() if names})
+
+
+def _compared(sides: Sequence[Side], axis: str) -> Change:
+    from fieldsid.change.compare import compare_models
+    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.schedule.linear_plant import FinLimits
+    from fieldsid.vehicle import find_vehicle
+
+    sources: list[ParameterSource] = [load_parameter_source(s.files[axis]) for s in sides]
+    for source in sources:
+        check_effects(zip(source.paths, source.models, strict=False))
+    folders = [s.given if s.given.is_dir() else Path() for s in reversed(sides)]
+    vehicle = next((v for f in (*folders, Path()) if (v := find_vehicle(f)) is not None), None)
+    limit = None if vehicle is None else vehicle.fin_max_rad(axis)
+    stated = FinLimits(rate=None if vehicle is None else vehicle.fin_rate_rad_s)
+    return compare_models(sources[0], sources[1], fin_limit=limit, stated=stated)
+
+
+def _drawn(found: Change, names: tuple[Path, Path], folder: Path | None, *, force: bool) -> str | None:
+    if folder is None:
+        return None
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.change import figure
+
+    sheet = figure(found, (f"before: {names[0]}", f"after: {names[1]}"))
+    return str(save(sheet, folder / f"before_after_{found.axis.value}.png", force=force))
+
+
+def _next(found: Change, sides: Sequence[Side]) -> str | None:
+    axis = found.axis.value
+    old, new = (s.files[axis] for s in sides)
+    speeds = ",".join(f"{s:.3g}" for s in found.speeds)
+    if found.verdict == "needed":
+        return shlex.join(["sysid", "schedule", "design", *map(str, new), "-o", "gains_after.yaml"])
+    if found.verdict == "form":
+        lacking, add = (old, found.added) if found.added else (new, found.removed)
+        return shlex.join(["sysid", "extend", str(lacking[0]), *_runs(lacking[0]), *(w for e in add for w in ("--add", e))])
+    return f"sysid plan --axis {axis} --speeds {speeds}" if found.verdict == "unclear" else None
+
+
+def _runs(model: Path) -> list[str]:
+    from fieldsid.artifacts import inputs_of
+
+    return [str(p) for p in inputs_of(model)]
+
+
+def _render(to: Console, found: Sequence[Change], changes: Sequence[Mapping[str, Any]]) -> None:
+    for i, (change, body) in enumerate(zip(found, changes, strict=True)):
+        if i:
+            to.print()
+        _render_one(to, change, body)
+
+
+def _render_one(to: Console, found: Change, body: Mapping[str, Any]) -> None:
+    to.print(found.line, soft_wrap=True)
+    count = [len(names) for names in body["models"]]
+    speeds = ", ".join(f"{s:.2f}" for s in found.speeds)
+    tests = sum(1 + (len(p.speeds) if len(p.speeds) > 1 else 0) for p in found.parameters)
+    to.print(
+        f"rests on {count[0]} model file{'s' * (count[0] > 1)} before, {count[1]} after, at {speeds} m/s; {tests} tests at once",
+        soft_wrap=True,
+    )
+    if body["next"]:
+        to.print(f"next: {body['next']}", soft_wrap=True)
+    to.print()
+    to.print(table("", ("", "m/s", "before", "after", "change  "), [r for p in found.parameters for r in _rows(p)]))
+    to.print("* beyond its errors, all tests together wrong in one comparison of twenty")
+    _render_gains(to, found)
+    _render_radius(to, found)
+    if body["figure"]:
+        to.print(f"figure: {body['figure']}", soft_wrap=True)
+
+
+def _rows(p: ParameterChange) -> list[tuple[str, ...]]:
+    name = p.word if p.word == p.name else "trim, deg" if p.name == TRIM_ANGLE else f"{p.word} {p.name}"
+    scale = degrees(1.0) if p.name == TRIM_ANGLE else 1.0
+    rows: list[tuple[str, ...]] = [
+        (
+            name if i == 0 else "",
+            f"{a.speed:.2f}" if isfinite(a.speed) else "all",
+            shown(scale * a.old, scale * a.old_std_error),
+            shown(scale * a.new, scale * a.new_std_error),
+            _amount(p, a.change, a.std_error) + (" *" if a.p_adjusted < LEVEL else "  "),
+        )
+        for i, a in enumerate(p.speeds)
+    ]
+    if len(p.speeds) > 1:
+        rows.append(("", "all", "", "", _amount(p, p.change, p.std_error) + (" *" if p.state == CHANGED else "  ")))
+    return rows
+
+
+def _amount(p: ParameterChange, change: float, error: float) -> str:
+    factor = 100.0 if p.is_relative else degrees(1.0) if p.name == TRIM_ANGLE else 1.0
+    return f"{'+' if change > 0 else ''}{shown(factor * change, factor * error)}{' %' if p.is_relative else ''}"
+
+
+def _render_gains(to: Console, found: Change) -> None:
+    if not found.gains:
+        return
+    rows = [
+        (
+            f"{g.speed:.2f}", f"{g.old:.4f}", f"{g.new:.4f}", f"{100 * g.change:+.1f} %",
+            f"{100 * g.interval95[0]:+.1f} .. {100 * g.interval95[1]:+.1f}", f"{g.damping_with_old:.2f}",
+            f"{g.phase_with_old_deg:.0f}",
+        )
+        for g in found.gains
+    ]  # fmt: skip
+    to.print()
+    to.print(table("gain kp", ("m/s", "before", "after", "change", "95 %", "damping", "phase deg"), rows))
+    to.print("damping, phase: of the loop as it is now, with the gains of before")
+
+
+def _render_radius(to: Console, found: Change) -> None:
+    if not found.radius:
+        return
+    rows = [
+        (r.side, f"{r.speed:.2f}", f"{r.old:.2f}", f"{r.new:.2f}", f"{100 * (r.new / r.old - 1):+.1f} %") for r in found.radius
+    ]
+    to.print()
+    to.print(table(f"turning radius in m at {found.rudder:.3g} rad", ("side", "m/s", "before", "after", "change"), rows))

@@ -1,0 +1,128 @@
+"""`sysid compare M1 M2 ... RUN...`: several models over the same runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from math import exp, log
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fieldsid.cli.console import emit, table, warn
+from fieldsid.cli.progress import get_ready
+from fieldsid.errors import UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.cli.skipped_logs import Skips
+    from fieldsid.comparison.compare import Comparison
+    from fieldsid.models.model import Model
+
+CLOSE = 1.05
+"""A ratio of two models' errors up to which neither is called the better."""
+
+
+def several_models(
+    paths: Sequence[Path],
+    runs: Sequence[Path],
+    skips: Skips,
+    *,
+    entry: Callable[[Comparison, str | None], dict[str, Any]],
+    reading: Mapping[str, Any],
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> Mapping[str, Any]:
+    """Compare several models with the same runs and print which follows them best; return the body.
+
+    entry makes a comparison's part of the body; reading is what `read_runs` takes: mapping, start and end.
+    """
+    from fieldsid.cli.inputs import read_runs
+    from fieldsid.cli.user_effects import check_effects
+    from fieldsid.models.model import load_model
+    from fieldsid.models.record import left_out
+
+    models = [load_model(p) for p in paths]
+    if len({m.axis for m in models}) > 1:
+        found = ", ".join(f"{p.name}: {m.axis.value}" for p, m in zip(paths, models, strict=True))
+        raise UsageError("the models are not of one axis", found=found, hint="compare those of one axis")
+    effects = partial(check_effects, list(zip(paths, models, strict=True)))
+    ready = partial(get_ready, "fieldsid.comparison.compare")
+    logs = read_runs(runs, check=effects, meanwhile=ready, refused=skips.skip, **reading)
+    from fieldsid.comparison.compare import compare
+
+    found_of = [compare(m, logs, unfit=skips.skip if i == 0 else None) for i, m in enumerate(models)]
+    names = _names(paths)
+    figures = _drawn(found_of, names, output, force=force)
+    body = {
+        "schema": "fieldsid/compare-several/1",
+        "axis": models[0].axis,
+        "models": [
+            {
+                "model": str(p),
+                "over_floor": _score(found),
+                "fitted_to": _fitted(m, found),
+                "runs": [entry(c, None) for c in found],
+            }
+            for p, m, found in zip(paths, models, found_of, strict=True)
+        ],
+        "best": str(paths[min(range(len(paths)), key=lambda i: _score(found_of[i]))]),
+        "figures": figures,
+        "skipped_runs": skips.records,
+    }
+    emit(body, as_json=as_json, render=lambda to: _render(to, body, found_of, names))
+    if not as_json:
+        warn(left_out(logs, models[0].axis))
+    skips.end(len(found_of[0]))
+    return body
+
+
+def _score(found: Sequence[Comparison]) -> float:
+    """Return the geometric mean over the runs of the error over the noise, each run's worse channel."""
+    return exp(sum(log(c.leading.over_floor) for c in found) / len(found))
+
+
+def _fitted(model: Model, found: Sequence[Comparison]) -> list[str]:
+    return [c.run for c in found if c.run in model.runs]
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    stems = [p.stem for p in paths]
+    return [s if stems.count(s) == 1 else str(p) for s, p in zip(stems, paths, strict=True)]
+
+
+def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folder: Path | None, *, force: bool) -> list[str]:
+    if folder is None:
+        return []
+    from fieldsid.figures.canvas import save
+    from fieldsid.figures.several import figure
+    from fieldsid.runtime.worker_pool import await_background
+
+    with await_background():
+        return [
+            str(save(figure(of_run, names), folder / f"models_on_{of_run[0].run}.png", force=force))
+            for of_run in zip(*found_of, strict=True)
+        ]
+
+
+def _render(to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> None:
+    scores = sorted(zip((_score(f) for f in found_of), names, strict=True))
+    (least, best), (second, _) = scores[:2]
+    others = ", ".join(f"{n} at {s:.2f} x" for s, n in scores[1:])
+    if second <= CLOSE * least:
+        to.print(f"{best} follows no better than the next: {least:.2f} x the noise; {others}", soft_wrap=True)
+    else:
+        to.print(f"{best} follows best: {least:.2f} x the noise; {others}", soft_wrap=True)
+    runs = [c.run for c in found_of[0]]
+    to.print(f"rests on {len(runs)} run{'s' * (len(runs) > 1)}, geometric mean of the worse channel of each", soft_wrap=True)
+    seen = [
+        f"{n} was fitted to {', '.join(m['fitted_to'])}" for n, m in zip(names, body["models"], strict=True) if m["fitted_to"]
+    ]
+    for said in seen:
+        to.print(f"{said}: no fair judge of it", soft_wrap=True)
+    rows = [(run, *(f"{found[i].leading.over_floor:.2f}" for found in found_of)) for i, run in enumerate(runs)]
+    to.print()
+    to.print(table("error over the noise", ("run", *names), rows))
+    for path in body["figures"]:
+        to.print(f"figure: {path}", soft_wrap=True)

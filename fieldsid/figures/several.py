@@ -1,0 +1,43 @@
+"""The figure of several models over one run: what was measured, and each model's free run over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fieldsid.comparison.compare import Comparison
+from fieldsid.figures import canvas
+
+
+def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
+    """Return a sheet of one run: angle, rate, what each model leaves of the rate, and the fin."""
+    sheet = canvas.sheet(10.0, 7.5)
+    over = ", ".join(f"{n} {c.leading.over_floor:.2f} x" for n, c in zip(names, found, strict=True))
+    sheet.suptitle(f"{found[0].run}: error over the noise: {over}", x=0.01, ha="left", fontsize=11)
+    axes = sheet.subplots(4, 1, sharex=True, height_ratios=(1.2, 1.2, 0.9, 0.6))
+    record = found[0].shown.record
+    for ax, values, ok in ((axes[0], record.angle, record.angle_ok), (axes[1], record.rate, record.rate_ok)):
+        if ok.any():
+            canvas.dots(ax, record.time[ok], np.degrees(values[ok]))
+    for color, name, one in zip(canvas.SERIES * len(found), names, found, strict=False):
+        draw(one, name, color, axes[:3])
+    canvas.dress(axes[0], y="angle, deg")
+    canvas.legend_above(axes[0])
+    canvas.dress(axes[1], y="rate, deg/s")
+    canvas.dress(axes[2], y="left of the rate")
+    axes[3].step(record.time, np.degrees(record.fin), where="post", color="0.35", linewidth=1.2)
+    canvas.dress(axes[3], x="time, s", y="fin, deg")
+    sheet.align_ylabels(list(axes))
+    return sheet
+
+
+def draw(one: Comparison, name: str, color: str, axes: Sequence[Axes]) -> None:
+    """Draw one model's angle and rate, and measured less simulated rate, in degrees."""
+    shown = one.shown
+    axes[0].plot(shown.record.time, np.degrees(shown.angle), color=color, linewidth=1.3, label=name)
+    axes[1].plot(shown.record.time, np.degrees(shown.rate), color=color, linewidth=1.3)
+    ok = shown.record.rate_ok
+    axes[2].plot(shown.record.time[ok], np.degrees(shown.record.rate[ok] - shown.rate[ok]), color=color, linewidth=0.9)
