@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Never
 
+    from fieldsid.cli.session import Session
+
 # Before NumPy is loaded: the systems solved here are tiny, and threads that wait for a busy core cost ten times the work.
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
@@ -67,8 +69,8 @@ def _end(codes: list[int]) -> None:
         os._exit(code)
 
 
-def run(arguments: Sequence[str]) -> Any:
-    """Run one command in this process and return what it returns, its errors raised as they are.
+def run(arguments: Sequence[str], session: Session | None = None) -> Any:
+    """Run one command in this process and return what it returns; session: what it shares with other commands.
 
     Raises UsageError for an unknown command, and whatever the command raises.
     """
@@ -79,7 +81,7 @@ def run(arguments: Sequence[str]) -> Any:
 
     if "--help" not in arguments:
         load_own_effects()
-    return program(words, prog_name=name, standalone_mode=False)
+    return program(words, prog_name=name, standalone_mode=False, obj=session)
 
 
 def _dispatch(arguments: list[str]) -> int:

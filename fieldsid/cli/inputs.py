@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fieldsid.errors import FieldsidError, UsageError
-from fieldsid.runtime.worker_pool import dumps, fork_worker, loads
+from fieldsid.runtime.pickling import dumps, loads
+from fieldsid.runtime.worker_pool import fork_worker
 
 if TYPE_CHECKING:
     from fieldsid.logs.channels import ChannelMap
@@ -130,11 +131,11 @@ def _read_beside(
     """Return the runs as a copy of this process read them, or why not; None where it did not: what is wrong is met again here."""
     from fieldsid.logs.several.sifting import attempt
 
-    copy = fork_worker(lambda: dumps([attempt(read, path) for path in paths]))
-    if copy is None:
+    worker = fork_worker(lambda: dumps([attempt(read, path) for path in paths]))
+    if worker is None:
         return None
-    with copy:
+    with worker:
         check()
         meanwhile()
-        answer = copy.answer()
+        answer = worker.answer()
     return None if answer is None else loads(answer)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import typer
 from rich.live import Live
 
 from fieldsid.artifacts import check_output
 from fieldsid.cli.console import messages
+from fieldsid.cli.session import session_of
+
+if TYPE_CHECKING:
+    from fieldsid.fitting.jit_warmup import Warmup
 
 
 def refuse_existing(*paths: Path | None, force: bool) -> None:
@@ -48,25 +54,27 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def compiling(*besides: Callable[[], None]) -> Iterator[Callable[[Sequence[Callable[..., object]]], None]]:
-    """Be inside what fits later: the first time on a machine a copy of this process compiles, and a terminal is told.
+def compiling(context: typer.Context, *besides: Callable[[], None]) -> Iterator[Warmup]:
+    """Be inside what fits later: the first time on a machine a forked worker compiles, and a terminal shows that.
 
-    Yields what is to be called before the first fit, see `fitting.ahead.compiling_ahead`.
+    Yields the warm-up, that of the command's session where it is part of one; see `fitting.jit_warmup.warming_up`.
     """
     from fieldsid.fitting.jit_warmup import warming_up
 
+    session = session_of(context)
+    if session is not None:
+        yield session.warmup
+        return
     console = messages()
-    with warming_up(lambda text: console.print(text) if console.is_terminal else None, besides) as help_along:
-        yield help_along
+    with warming_up(lambda text: console.print(text) if console.is_terminal else None, besides) as warmup:
+        yield warmup
 
 
 @contextmanager
-def compiling_first() -> Iterator[None]:
-    """Be inside what fits at once: the first time on a machine that compiles on two cores."""
-    from fieldsid.fitting.jit_warmup import WARMUP_KERNELS
-
-    with compiling() as help_along:
-        help_along(WARMUP_KERNELS)
+def compiling_first(context: typer.Context) -> Iterator[None]:
+    """Be inside what fits at once: the first time on a machine two cores compile before it."""
+    with compiling(context) as warmup:
+        warmup.compile_now()
         yield
 
 

@@ -13,30 +13,33 @@ from typing import Any, TypeVar
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect, variant_of, with_variant
 from fieldsid.models.record import Record
-from fieldsid.runtime import evaluation_counter
-from fieldsid.runtime.worker_pool import WorkerPickler, dumps, parallel_map
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
+from fieldsid.runtime.pickling import WorkerPickler, dumps
+from fieldsid.runtime.worker_pool import parallel_map
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 class ParallelMap:
-    """The objects that two processes share: records by their place, effects by their name."""
+    """The objects that two processes share: records by their place, effects by their name, the counter of evaluations."""
 
-    def __init__(self, records: Iterable[Record], effects: Iterable[Effect]) -> None:
-        self.records = tuple(records)
+    def __init__(
+        self, records: Iterable[Record], effects: Iterable[Effect], evaluations: EvaluationCounter | None = None
+    ) -> None:
+        self.records, self.evaluations = tuple(records), evaluations or EvaluationCounter()
         self.effects = {e.name: e for e in effects}
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
         """Return a function of every item as `worker_pool.parallel_map` does, and count the worker's evaluations."""
-        before = evaluation_counter.evaluations()
+        before = self.evaluations.count
 
         def read(answer: bytes) -> dict[int, R]:
-            done, worked_out = self.loads(answer)
-            evaluation_counter.count_evaluation(worked_out)
+            done, evaluated = self.loads(answer)
+            self.evaluations.add(evaluated)
             return dict(done)
 
-        return parallel_map(function, items, lambda done: self.dumps((done, evaluation_counter.evaluations() - before)), read)
+        return parallel_map(function, items, lambda done: self.dumps((done, self.evaluations.count - before)), read)
 
     def dumps(self, value: object) -> bytes:
         """Return a value as bytes that `loads` reads."""
@@ -51,10 +54,12 @@ class _Writer(WorkerPickler):
     def __init__(self, out: BytesIO, known: ParallelMap) -> None:
         super().__init__(out)
         self.places = {id(r): i for i, r in enumerate(known.records)}
-        self.effects = known.effects
+        self.effects, self.evaluations = known.effects, known.evaluations
 
     def persistent_id(self, obj: object) -> tuple[str, object] | None:
-        """Return the reference to a shared record or effect, None for anything else."""
+        """Return the reference to a shared record, effect or counter, None for anything else."""
+        if obj is self.evaluations:
+            return "evaluations", None
         if isinstance(obj, Record) and id(obj) in self.places:
             return "record", self.places[id(obj)]
         if isinstance(obj, Effect) and obj.name in self.effects:
@@ -66,7 +71,7 @@ class _Writer(WorkerPickler):
     def reducer_override(self, obj: object) -> Any:
         """Return how a problem is built again without its cached arrays, and anything else as the base class does."""
         if isinstance(obj, Problem):
-            return Problem, (obj.records, obj.layout)
+            return Problem, (obj.records, obj.layout, obj.evaluations)
         return super().reducer_override(obj)
 
 
@@ -80,6 +85,8 @@ class _Reader(pickle.Unpickler):
         kind, what = pid
         if kind == "record":
             return self.known.records[what]
+        if kind == "evaluations":
+            return self.known.evaluations
         name, coefficients = what
         effect = with_coefficients(self.known.effects[name], coefficients)
         if effect is None:

@@ -21,7 +21,7 @@ from matplotlib.text import Text
 from fieldsid.artifacts import replacing
 from fieldsid.figures.kinds import KINDS, TOOL, kind_of
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.runtime.worker_pool import run_in_background
+from fieldsid.runtime.background_tasks import BackgroundTasks
 
 MEASURED = "0.45"
 SIMULATED = "#D55E00"
@@ -80,13 +80,16 @@ def dots(ax: Axes, x: FloatArray, y: FloatArray, label: str = "measured") -> Non
     ax.plot(x[::step], y[::step], linestyle="none", marker=".", markersize=2.6, color=MEASURED, label=label, rasterized=True)
 
 
-def save(figure: Figure, path: Path, *, force: bool = False) -> Path:
-    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all, inside `worker_pool.await_background` later.
+def save(figure: Figure, path: Path, *, force: bool = False, tasks: BackgroundTasks | None = None) -> Path:
+    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all; given background tasks, as one of them.
 
     Raises UsageError for another suffix, ArtifactError where it cannot be written.
     """
     kind_of(path)
-    run_in_background(lambda: _write(figure, path, force=force))
+    if tasks is None:
+        _write(figure, path, force=force)
+    else:
+        tasks.run(lambda: _write(figure, path, force=force))
     return path
 
 

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from fieldsid.figures import canvas
 from fieldsid.models.axis import Axis
 from fieldsid.planning.output.figure_data import LegFigure
+from fieldsid.runtime.background_tasks import BackgroundTasks
 
 LIMIT: dict[str, Any] = {"color": "#B2182B", "linewidth": 1.1, "linestyle": (0, (4, 2))}
 MOST_LEGS = 6
@@ -73,7 +74,9 @@ def draw_track(view: LegFigure, ax: Axes) -> None:
     ax.invert_yaxis()
 
 
-def save_plan_figure(views: Sequence[LegFigure], path: Path, *, force: bool = False) -> Path:
+def save_plan_figure(
+    views: Sequence[LegFigure], path: Path, *, force: bool = False, tasks: BackgroundTasks | None = None
+) -> Path:
     """Draw up to six legs, one row each, and save; raises ArtifactError."""
     shown = views[:MOST_LEGS]
     figure = canvas.sheet(13.0, 0.9 + 2.3 * len(shown))
@@ -85,7 +88,7 @@ def save_plan_figure(views: Sequence[LegFigure], path: Path, *, force: bool = Fa
     handles = [h for ax in grid[0][:2] for h in ax.get_legend_handles_labels()[0]]
     handles.append(Line2D([], [], label="limit", **LIMIT))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=9)
-    return canvas.save(figure, path, force=force)
+    return canvas.save(figure, path, force=force, tasks=tasks)
 
 
 def _errors(view: LegFigure) -> str:

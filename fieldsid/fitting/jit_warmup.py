@@ -1,4 +1,7 @@
-"""The first fit on a machine compiles for ten seconds: in a copy of this process and, once it needs the result, in this one."""
+"""The compile warm-up: the first fit on a machine compiles for ten seconds, in this process and a forked worker.
+
+Later processes load what numba has kept, in 0.04 s. A marker file of our own says that all of it is there (`warmup_marker`).
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from time import sleep
 
 import numpy as np
 
@@ -31,30 +33,13 @@ from fieldsid.noise.maximum_likelihood import estimate_noise
 from fieldsid.noise.sandwich_covariance import score_covariance, score_covariance_kernel
 from fieldsid.noise.whiten import noise_vector, whiten
 from fieldsid.numerics.first_order_lag import first_order_lag
-from fieldsid.numerics.jit import is_compiled, is_loaded
-from fieldsid.runtime.worker_pool import Worker, fork_worker, job_queue
+from fieldsid.numerics.jit import is_loaded, warmup_marker
+from fieldsid.runtime.worker_pool import fork_worker, job_queue
 
 Kernel = Callable[..., object]
 SAMPLES = 60
 WHITE = Noise(0.01, 0.01)
 DISTURBED = Noise(0.01, 0.01, disturbance=0.01, disturbance_time=1.0)
-WARMUP_KERNELS = (
-    linear_sensitivities,
-    linear_motion,
-    accumulate_normal_equations,
-    nonlinear_sensitivities,
-    nonlinear_motion,
-    first_order_lag,
-    disturbance_filter,
-    sensor_colour_filter,
-    full_filter,
-    full_filter_batched,
-    score_of_innovations,
-    score_covariance_kernel,
-)
-"""What a fit calls; JOBS compile it."""
-POLL_INTERVAL_S = 0.01
-"""Seconds from one look at what the other process has compiled to the next."""
 
 
 def a_record() -> Record:
@@ -116,82 +101,111 @@ def _effects() -> None:
         more.linearise(more.start(), 0)
 
 
-WARMUP_JOBS: tuple[Callable[[], None], ...] = (
-    _linear, lambda: _whiten(DISTURBED), _nonlinear, _lag, lambda: _estimate("disturbance"), lambda: _estimate("coloured"),
-    lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), lambda: _estimate("both"), _sandwich,
-)  # fmt: skip
-"""Each calls some of DOORS once, what is needed first before the rest."""
+@dataclass(frozen=True, slots=True)
+class WarmupJob:
+    """A call, and the kernels that it compiles."""
+
+    run: Callable[[], None]
+    kernels: tuple[Kernel, ...]
+
+
+WARMUP_JOBS = (
+    WarmupJob(_linear, (linear_sensitivities, linear_motion, accumulate_normal_equations)),
+    WarmupJob(lambda: _whiten(DISTURBED), (disturbance_filter,)),
+    WarmupJob(_nonlinear, (nonlinear_sensitivities, nonlinear_motion)),
+    WarmupJob(_lag, (first_order_lag,)),
+    WarmupJob(lambda: _estimate("disturbance"), (score_of_innovations,)),
+    WarmupJob(lambda: _estimate("coloured"), (sensor_colour_filter,)),
+    WarmupJob(lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), (full_filter,)),
+    WarmupJob(lambda: _estimate("both"), (full_filter_batched,)),
+    WarmupJob(_sandwich, (score_covariance_kernel,)),
+)
+"""What a fit calls, in the order in which it is needed."""
+WARMUP_KERNELS = tuple(kernel for job in WARMUP_JOBS for kernel in job.kernels)
 
 
 def compile_all() -> None:
-    """Call everything once that a fit and a search for what is missing use."""
-    for job in (*WARMUP_JOBS, _effects):
-        job()
+    """Call everything once that a fit and a search over effects use."""
+    for job in WARMUP_JOBS:
+        job.run()
+    _effects()
 
 
 def load_compiled() -> None:
     """Load what an earlier process compiled, once; nothing where that must still be done."""
-    if not is_loaded(nonlinear_sensitivities) and _are_compiled(WARMUP_KERNELS):
+    if not is_loaded(nonlinear_sensitivities) and warmup_marker(WARMUP_KERNELS).exists():
         compile_all()
 
 
-@dataclass(frozen=True, slots=True)
 class Warmup:
-    """Compiling under way: the jobs nobody has begun, and the copy of this process that does them one by one."""
+    """Jobs that this process and a forked worker take one by one; the worker goes on to the effects and to `besides`."""
 
-    left: int
-    copy: Worker | None
+    def __init__(self, jobs: Sequence[WarmupJob], besides: Sequence[Callable[[], None]] = ()) -> None:
+        self._jobs, self._done, self._left = jobs, set[int](), job_queue(len(jobs))
+        self._reports, target = os.pipe()
+        self._worker = fork_worker(lambda: _compiled(jobs, self._left, target, besides)) if jobs else None
+        os.close(target)
 
-    def compile_now(self, doors: Sequence[Kernel] = WARMUP_KERNELS) -> None:
-        """Do what nobody has begun until everything asked for is compiled, and wait for what the copy is at."""
-        while not _are_compiled(doors):
-            number = os.read(self.left, 1)
-            if number:
-                WARMUP_JOBS[number[0]]()
-            elif self.copy is None or not self.copy.is_at_work():
-                return
-            else:
-                sleep(POLL_INTERVAL_S)
+    def compile_now(self, kernels: Sequence[Kernel] | None = None) -> None:
+        """Do the jobs that nobody has begun until these kernels, or all, are compiled; wait for the job the worker is at."""
+        asked = None if kernels is None else {id(k) for k in kernels}
+        wanted = {i for i, job in enumerate(self._jobs) if asked is None or any(id(k) in asked for k in job.kernels)}
+        while wanted - self._done:
+            if number := os.read(self._left, 1):
+                self._run(number[0])
+            elif reports := os.read(self._reports, len(self._jobs)):
+                self._done.update(reports)
+            else:  # the worker has ended with a job undone
+                for left in sorted(wanted - self._done):
+                    self._run(left)
 
+    def _run(self, number: int) -> None:
+        self._jobs[number].run()
+        self._done.add(number)
 
-_UNDER_WAY: list[Warmup] = []
+    def end(self) -> bool:
+        """End the worker, whatever it is at, and return whether all jobs were done."""
+        if self._worker is not None:
+            self._worker.kill()
+        while reports := os.read(self._reports, len(self._jobs) + 1):
+            self._done.update(reports)
+        os.close(self._reports)
+        os.close(self._left)
+        return len(self._done) == len(self._jobs)
 
 
 @contextmanager
-def warming_up(
-    tell: Callable[[str], None] = lambda _text: None, besides: Sequence[Callable[[], None]] = ()
-) -> Iterator[Callable[[Sequence[Kernel]], None]]:
-    """Compile what fits need in a copy of this process while what is inside runs, if this machine has not done so yet.
+def warming_up(tell: Callable[[str], None] = lambda _text: None, besides: Sequence[Callable[[], None]] = ()) -> Iterator[Warmup]:
+    """Compile in a forked worker what fits need while the context runs, if this machine has not done so yet.
 
-    Yields what is to be called before the first fit, with what is needed of DOORS: it helps, and does all of it where no copy is
-    to be had. What effects add is left to the copy, and what is given as `besides`; what is inside compiles itself what it needs
-    sooner. The copy is ended with what is inside.
+    Yields the warm-up, whose `compile_now` is to be called before the first fit: it shares the jobs with the worker, and does all
+    of them where this process cannot be forked. The effects and `besides` are left to the worker; the context compiles
+    itself what it needs sooner. The worker ends with the context.
     """
-    if _UNDER_WAY or _are_compiled(WARMUP_KERNELS):
-        yield _UNDER_WAY[-1].compile_now if _UNDER_WAY else lambda _doors: None
+    if all(is_loaded(kernel) for kernel in WARMUP_KERNELS) or (marker := warmup_marker(WARMUP_KERNELS)).exists():
+        idle = Warmup(())
+        try:
+            yield idle
+        finally:
+            idle.end()
         return
     tell("first run on this machine: compiling, about ten seconds, once")
-    left = job_queue(len(WARMUP_JOBS))
-    copy = fork_worker(lambda: _compiled(left, besides))
-    _UNDER_WAY.append(Warmup(left, copy))
+    warmup, is_complete = Warmup(WARMUP_JOBS, besides), False
     try:
-        yield _UNDER_WAY[-1].compile_now
+        yield warmup
     finally:
-        _UNDER_WAY.pop()
-        os.close(left)
-        if copy is not None:
-            copy.end()
+        is_complete = warmup.end()
+    if is_complete:
+        marker.parent.mkdir(parents=True, exist_ok=True)
+        marker.touch()
 
 
-def _compiled(left: int, besides: Sequence[Callable[[], None]]) -> bytes:
-    """Compile in a copy, without looking for what could be given back: it makes millions of things, and ends."""
+def _compiled(jobs: Sequence[WarmupJob], left: int, target: int, besides: Sequence[Callable[[], None]]) -> bytes:
+    """Do jobs in the worker and report their numbers, without looking for garbage: it makes millions of objects, and ends."""
     gc.disable()
     while number := os.read(left, 1):
-        WARMUP_JOBS[number[0]]()
+        jobs[number[0]].run()
+        os.write(target, number)
     for job in (_effects, *besides):
         job()
     return b""
-
-
-def _are_compiled(doors: Sequence[Kernel]) -> bool:
-    return all(is_compiled(door) for door in doors)

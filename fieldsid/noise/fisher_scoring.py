@@ -12,7 +12,6 @@ from fieldsid.noise.kalman.dispatch import kalman_filter
 from fieldsid.noise.kalman.full_batched import LANES, full_filter_batched
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.runtime.evaluation_counter import count_evaluation
 
 LOG_STEP = 3e-4
 """Relative change of a noise's number whose effect is taken for a derivative."""
@@ -81,7 +80,6 @@ def information(
     to one and the de to -e, which gives those of the first. What has moved in `here` is used up.
     Source: Harvey 1989, Forecasting, structural time series models and the Kalman filter, section 3.4.5.
     """
-    count_evaluation()
     standardised, innovation_std = here.moved or _moved(record, a, k, noise, place, residual)
     d_innovations, d_log_std = standardised.reshape(place.size, -1), innovation_std.reshape(place.size, -1)
     score = score_of_innovations(

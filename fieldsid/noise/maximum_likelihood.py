@@ -16,6 +16,7 @@ from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.noise.whiten import NOISE_FIELDS
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MIN_NOISE_SIGNAL_SHARE = 1e-4
 MAX_SCORING_ITERATIONS, MIN_DAMPING, MIN_DAMPING_AFTER_REFUSAL = 30, 1e-3, 0.1
@@ -75,14 +76,16 @@ def estimate_noise(
     floor: Noise | None = None,
     *,
     reinitialise: bool = True,
+    evaluations: EvaluationCounter | None = None,
 ) -> tuple[Noise, float]:
     """Return the noise of a family with the highest likelihood, and that log likelihood.
 
     dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
     noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
-    default what the signals show of it; wake: whether what the start has next to none of is tried anew. Fisher scoring
-    on the logarithms of the noise's numbers (Harvey 1989, section 3.4.5); another likelihood gives its own gradient, the
-    residuals' the information. Residuals of a motion without bound have none: the start is returned, and minus infinity.
+    default what the signals show of it; reinitialise: whether components that the start has almost none of begin at their
+    rough size; evaluations counts the runs filtered. Fisher scoring on the logarithms of the noise's numbers (Harvey 1989,
+    section 3.4.5); another likelihood gives its own gradient, the residuals' the information. Residuals of a motion without
+    bound have none: the start is returned, and minus infinity.
     """
     if not all(np.isfinite(e).all() for e in residuals):
         return start, -np.inf
@@ -93,7 +96,7 @@ def estimate_noise(
     low, high = _bounds(names, floor, _resolution(records))
     place = np.array([NOISE_FIELDS.index(n) for n in names])
     known = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
-    slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, likelihood)
+    slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, likelihood, evaluations or EvaluationCounter())
     x = np.clip(np.log([max(rough[n], BELOW_ANY_BOUND) for n in names]), low, high)
     value, score, fisher = slope.at(x)
     damping = MIN_DAMPING
@@ -130,6 +133,7 @@ class _LogNoiseLikelihood:
     known: FloatArray
     place: npt.NDArray[np.int64]
     likelihood: Callable[[FloatArray], float] | None
+    evaluations: EvaluationCounter
 
     def vector(self, x: FloatArray) -> FloatArray:
         """Return the noise vector (7,) of logarithms x (P,)."""
@@ -151,6 +155,7 @@ class _LogNoiseLikelihood:
         if not (np.isfinite(total) and total > least):
             return -np.inf, np.zeros(count), np.eye(count)
         parts = [information(r, a, k, noise, self.place, e, h) for (r, a, k, e), h in zip(runs, here, strict=True)]
+        self.evaluations.add(len(parts))
         score, fisher = np.sum([s for s, _ in parts], axis=0), np.sum([f for _, f in parts], axis=0)
         if self.likelihood is not None:
             score = np.array(

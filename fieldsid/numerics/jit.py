@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
@@ -34,12 +36,14 @@ def is_loaded(function: Callable[..., object]) -> bool:
     return not hasattr(function, "py_func") or bool(cast("Any", function).signatures)
 
 
-def is_compiled(function: Callable[..., object]) -> bool:
-    """Whether a function is compiled in this process, or by an earlier one that left it on the disk, newer than its source."""
-    if is_loaded(function):
-        return True
-    door: Any = function
-    code = door.py_func.__code__
-    source = Path(code.co_filename)
-    kept = Path(door.stats.cache_path).glob(f"{source.stem}.{door.py_func.__qualname__}-{code.co_firstlineno}.*.nbi")
-    return any(file.stat().st_mtime >= source.stat().st_mtime for file in kept)
+def warmup_marker(functions: Sequence[Callable[..., object]]) -> Path:
+    """Return the file that stands beside what numba keeps of compiled functions once all of these are compiled on this machine.
+
+    Its name changes with what numba compiles anew for: the source files, numba's and Python's version, the processor.
+    """
+    parts = [import_module("numba").__version__, sys.version, import_module("llvmlite.binding").get_host_cpu_name()]
+    for source in sorted({cast("Any", f).py_func.__code__.co_filename for f in functions}):
+        known = Path(source).stat()
+        parts.append(f"{source} {known.st_mtime_ns} {known.st_size}")
+    stamp = sha256("\n".join(parts).encode()).hexdigest()[:16]
+    return Path(cast("Any", functions[0]).stats.cache_path) / f"fieldsid-{stamp}.nbm"

@@ -1,1 +1,1 @@
-"""How work is run: the pool of worker processes and the count of evaluations."""
+"""How work is run: forked workers, background tasks, and the count of evaluations."""

@@ -1,18 +1,19 @@
-"""How much this process has worked out: runs flown, linearised or filtered. The same count on every machine.
+"""The count of evaluations of a search: runs simulated, linearised or filtered. It is the same on every machine.
 
-What is given up for lack of time is to be given up by this count, not by the clock: one log then has one answer.
+A search that ends for lack of effort ends by this count and not by the clock: one log then has one answer.
 """
 
 from __future__ import annotations
 
-_DONE = [0]
+from dataclasses import dataclass
 
 
-def evaluations() -> int:
-    """Return how many runs have been worked out since the process began, in the copies of it that have answered as well."""
-    return _DONE[0]
+@dataclass(slots=True, eq=False)
+class EvaluationCounter:
+    """Evaluations so far, those of the forked workers that have answered included; passed to whatever evaluates."""
 
+    count: int = 0
 
-def count_evaluation(runs: int = 1) -> None:
-    """Count runs that were worked out."""
-    _DONE[0] += runs
+    def add(self, runs: int = 1) -> None:
+        """Count runs that were evaluated."""
+        self.count += runs

@@ -147,7 +147,7 @@ def test_white_noise_is_of_the_first_kind_whatever_the_last_bit_says(monkeypatch
         noise_kind, "fit_maximum_likelihood", lambda *of: SimpleNamespace(noise_kind=of[-1], log_likelihood=likelihoods[of[-1]])
     )
     monkeypatch.setattr(noise_kind, "has_sensor_colour", lambda _judged: False)
-    monkeypatch.setenv("FIELDSID_IS_COPY", "1")
+    monkeypatch.setenv("FIELDSID_IS_WORKER", "1")
     start = SimpleNamespace(problem=None, x=None)
     assert noise_kind.fit_base(start, FLOOR, FLOOR, "", ParallelMap((), ())).noise_kind == kind
 

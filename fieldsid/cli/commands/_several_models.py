@@ -97,11 +97,11 @@ def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folde
         return []
     from fieldsid.figures.canvas import save
     from fieldsid.figures.several import figure
-    from fieldsid.runtime.worker_pool import await_background
+    from fieldsid.runtime.background_tasks import BackgroundTasks
 
-    with await_background():
+    with BackgroundTasks() as own:
         return [
-            str(save(figure(of_run, names), folder / f"models_on_{of_run[0].run}.png", force=force))
+            str(save(figure(of_run, names), folder / f"models_on_{of_run[0].run}.png", force=force, tasks=own))
             for of_run in zip(*found_of, strict=True)
         ]
 

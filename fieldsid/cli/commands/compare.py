@@ -12,6 +12,7 @@ import typer
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
 from fieldsid.cli.progress import get_ready, refuse_closed
+from fieldsid.cli.session import drawing
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ Top = Annotated[int, typer.Option("--top", min=1, help="Conditions to show for e
 
 
 def command(
+    context: typer.Context,
     model: First,
     runs: Others,
     start: FromS = None,
@@ -98,7 +100,7 @@ def command(
     from fieldsid.comparison.compare import compare
 
     found = compare(known, logs, unfit=skips.skip)
-    drawn = _drawn(known, model, found, output if figures else None, force=force)
+    drawn = _drawn(known, model, found, output if figures else None, context, force=force)
     entries = [_entry(c, figure) for c, figure in zip(found, drawn, strict=True)]
     notes = left_out(logs, known.axis)
     body = {
@@ -159,15 +161,18 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
         raise typer.Exit(1)
 
 
-def _drawn(model: Model, name: Path, found: Sequence[Comparison], folder: Path | None, *, force: bool) -> list[str | None]:
+def _drawn(
+    model: Model, name: Path, found: Sequence[Comparison], folder: Path | None, context: typer.Context, *, force: bool
+) -> list[str | None]:
     if folder is None:
         return [None] * len(found)
     from fieldsid.figures.canvas import save
     from fieldsid.figures.compare import figure
-    from fieldsid.runtime.worker_pool import await_background
 
-    with await_background():
-        return [str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force)) for c in found]
+    with drawing(context) as own:
+        return [
+            str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force, tasks=own)) for c in found
+        ]
 
 
 def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:

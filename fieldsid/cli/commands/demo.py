@@ -17,14 +17,16 @@ from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
 from fieldsid.cli.options import Force, JsonFlag, OutputDir
 from fieldsid.cli.progress import compiling
+from fieldsid.cli.session import Session
 from fieldsid.errors import ArtifactError
-from fieldsid.runtime.worker_pool import await_background
+from fieldsid.runtime.background_tasks import BackgroundTasks
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.demo.steps import Step
     from fieldsid.demo.trial import Trial
+    from fieldsid.fitting.jit_warmup import Warmup
     from fieldsid.planning.design.leg import Leg
 
 HIDDEN = "servo_lag"
@@ -39,7 +41,7 @@ EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The e
 
 
 def command(
-    effect: EffectName = HIDDEN, output: OutputDir = None, force: Force = False, as_json: JsonFlag = False
+    context: typer.Context, effect: EffectName = HIDDEN, output: OutputDir = None, force: Force = False, as_json: JsonFlag = False
 ) -> Mapping[str, Any]:
     """Take a tour: the command of each step as you would type it, with its result and what it means.
 
@@ -47,12 +49,12 @@ def command(
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
     """
     began = perf_counter()
-    with compiling(_compile_loops):
-        body = _tour(effect, output, began, force=force, quiet=as_json)
+    with compiling(context, _compile_loops) as warmup:
+        body = _tour(effect, output, began, warmup, force=force, quiet=as_json)
     return emit(body, as_json=as_json, render=lambda to: _render(to, body))
 
 
-def _tour(effect: str, output: Path | None, began: float, *, force: bool, quiet: bool) -> dict[str, Any]:
+def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, quiet: bool) -> dict[str, Any]:
     from fieldsid.demo.steps import PLAN, STEPS, places
     from fieldsid.demo.trial import make_trial
     from fieldsid.demo.vehicle import hidden_vehicle
@@ -62,14 +64,15 @@ def _tour(effect: str, output: Path | None, began: float, *, force: bool, quiet:
     vehicle = hidden_vehicle(effect)
     known = dict(places(folder, vehicle.axis))
     _told(OPENING, quiet=quiet)
-    with await_background():
-        done = [_taken(1, PLAN, known, force=force, quiet=quiet)]
+    with BackgroundTasks() as tasks:
+        session = Session(warmup, tasks)
+        done = [_taken(1, PLAN, known, session, force=force, quiet=quiet)]
         (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
         trial = make_trial(vehicle, folder / "trial", leg, force=force)
         _told(_flown(trial, folder, leg), quiet=quiet)
         for step in (s for s in STEPS if vehicle.axis in s.axes):
             if step.possible(known):
-                done.append(_taken(len(done) + 1, step, known, force=force, quiet=quiet))
+                done.append(_taken(len(done) + 1, step, known, session, force=force, quiet=quiet))
                 known |= step.learns(done[-1]["result"])
     return {
         "schema": "fieldsid/demo/1",
@@ -102,7 +105,7 @@ def _folder(asked: Path | None, *, force: bool) -> Path:
     return asked
 
 
-def _taken(place: int, step: Step, known: Mapping[str, str], *, force: bool, quiet: bool) -> dict[str, Any]:
+def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, quiet: bool) -> dict[str, Any]:
     from fieldsid.demo.steps import expanded, words_of
 
     words = words_of(step.line, known)
@@ -110,7 +113,7 @@ def _taken(place: int, step: Step, known: Mapping[str, str], *, force: bool, qui
         sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
     began = perf_counter()
     with _silence() if quiet else _aloud():
-        result = run([*expanded(words), *(["--force"] if force else [])])
+        result = run([*expanded(words), *(["--force"] if force else [])], session)
     meaning = step.means(result)
     if not quiet:
         sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")

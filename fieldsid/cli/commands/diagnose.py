@@ -14,6 +14,7 @@ import typer
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
+from fieldsid.cli.session import tasks_of
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ Thorough = Annotated[
 
 
 def command(
+    context: typer.Context,
     runs: RunFiles,
     axis: AxisOption,
     validate: ValidateRuns = None,
@@ -68,13 +70,13 @@ def command(
     from fieldsid.models.definition import NONE
 
     effects = known.effects if known else ()
-    with compiling_first(), trying("diagnosing") as report:
+    with compiling_first(context), trying("diagnosing") as report:
         own = known.own if known else NONE
         found = diagnose(training, axis, unseen, known=effects, own=own, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
     body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
-    body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, force=force)}
+    body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, context, force=force)}
     if not as_json:
         warn(found.notes)
     emit(body, as_json=as_json, render=lambda to: _render(to, found, body))
@@ -117,13 +119,13 @@ def _saved(body: Mapping[str, Any], path: Path | None, inputs: Sequence[Path], *
     return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
 
 
-def _drawn(found: Diagnosis, path: Path | None, *, force: bool) -> str | None:
+def _drawn(found: Diagnosis, path: Path | None, context: typer.Context, *, force: bool) -> str | None:
     if path is None:
         return None
     from fieldsid.figures.canvas import save
     from fieldsid.figures.diagnose import figure
 
-    return str(save(figure(found), path, force=force))
+    return str(save(figure(found), path, force=force, tasks=tasks_of(context)))
 
 
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:

@@ -47,6 +47,7 @@ Undo = Annotated[bool, typer.Option("--undo", help="Go back: give the model that
 
 
 def command(
+    context: typer.Context,
     model: ModelFile,
     runs: LearnedRuns = None,
     add: Added = None,
@@ -74,7 +75,7 @@ def command(
         return _undone(model, output, force=force, as_json=as_json)
     skips = Skips()
     body, notes = _extended(
-        model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
+        context, model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
     )
     if not as_json:
         warn(notes)
@@ -89,6 +90,7 @@ def _names(given: Sequence[str] | None) -> list[str]:
 
 
 def _extended(
+    context: typer.Context,
     path: Path,
     runs: Sequence[Path],
     names: Sequence[str],
@@ -115,7 +117,7 @@ def _extended(
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
     from fieldsid.extension import extend, save_extension
 
-    with compiling_first(), trying("extending") as report:
+    with compiling_first(context), trying("extending") as report:
         found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep

@@ -11,6 +11,7 @@ import typer
 
 from fieldsid.cli.console import emit, messages, table, warn
 from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile
+from fieldsid.cli.session import tasks_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,6 +24,7 @@ WORDS = {"through_zero": "through zero", "power": "power law"}
 
 
 def command(
+    context: typer.Context,
     models: ModelFiles,
     unweighted: Unweighted = False,
     output: OutputFile = None,
@@ -51,17 +53,17 @@ def command(
         there = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
         if figures:
-            body["figure"] = str(_draw(laws, output.with_suffix(".png"), force=force))
+            body["figure"] = str(_draw(laws, output.with_suffix(".png"), context, force=force))
     if not as_json:
         warn(law_notes(laws))
     return emit(body, as_json=as_json, render=lambda to: _render(to, laws, body))
 
 
-def _draw(laws: Laws, path: Path, *, force: bool) -> Path:
+def _draw(laws: Laws, path: Path, context: typer.Context, *, force: bool) -> Path:
     from fieldsid.figures.canvas import save
     from fieldsid.figures.law import figure
 
-    return save(figure(laws), path, force=force)
+    return save(figure(laws), path, force=force, tasks=tasks_of(context))
 
 
 def _render(to: Console, laws: Laws, body: Mapping[str, Any]) -> None:

@@ -7,9 +7,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
 from fieldsid.cli.progress import refuse_figure
+from fieldsid.cli.session import tasks_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,7 +22,9 @@ if TYPE_CHECKING:
 KEPT = {"unseen": "unseen data are predicted better", "evidence": "the evidence pays for it", "--keep": "kept because of --keep"}
 
 
-def command(model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
+def command(
+    context: typer.Context, model: ModelFile, figure: FigureFile = None, force: Force = False, as_json: JsonFlag = False
+) -> Mapping[str, Any]:
     """Show how a model came about: its parents, the effects added, and how the error fell towards the noise floor.
 
     Every file's hash is checked against what its child and its data were when it was made.
@@ -39,7 +44,7 @@ def command(model: ModelFile, figure: FigureFile = None, force: Force = False, a
         "axis": known.axis.value,
         "generations": [_entry(g) for g in line],
         "intact": all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
-        "figure": _drawn(line, model, figure, force=force),
+        "figure": _drawn(line, model, figure, context, force=force),
     }
     if not as_json:
         _warn(line)
@@ -55,7 +60,7 @@ def _entry(g: Generation) -> dict[str, Any]:
     return body | gain_body(g.step.gain) | {"kept_by": g.step.kept_by, "changed_data": list(g.step.changed_data)}
 
 
-def _drawn(line: Sequence[Generation], model: Path, path: Path | None, *, force: bool) -> str | None:
+def _drawn(line: Sequence[Generation], model: Path, path: Path | None, context: typer.Context, *, force: bool) -> str | None:
     if path is None:
         return None
     if not any(g.step for g in line):
@@ -64,7 +69,7 @@ def _drawn(line: Sequence[Generation], model: Path, path: Path | None, *, force:
     from fieldsid.figures.canvas import save
     from fieldsid.figures.history import figure
 
-    return str(save(figure(line, model.name), path, force=force))
+    return str(save(figure(line, model.name), path, force=force, tasks=tasks_of(context)))
 
 
 def _warn(line: Sequence[Generation]) -> None:

@@ -25,6 +25,7 @@ from fieldsid.cli.options import (
     names_of,
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
+from fieldsid.cli.session import drawing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.fitting.predict.predict import Prediction
     from fieldsid.logs import Run
+    from fieldsid.runtime.background_tasks import BackgroundTasks
 
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
 Joint = Annotated[bool, typer.Option("--joint", help="One model for all runs: damping and trim shared, authority by speed.")]
@@ -42,6 +44,7 @@ Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, hel
 
 
 def command(
+    context: typer.Context,
     runs: RunFiles,
     axis: AxisOption,
     method: Method = "auto",
@@ -79,7 +82,7 @@ def command(
 
     if joint:
         check_joint([run.name for run in known], len(runs))
-    with compiling_first(), progress("fitting", 1 if joint else len(known)) as step:
+    with compiling_first(context), progress("fitting", 1 if joint else len(known)) as step:
         fits = identify(
             known,
             axis,
@@ -94,7 +97,7 @@ def command(
         )
     used = skips.left_of(known)
     groups = [used] if joint else [[run] for run in used]
-    models = _written(fits, [files_of(group) for group in groups], output, figures=figures, force=force)
+    models = _written(fits, [files_of(group) for group in groups], output, context, figures=figures, force=force)
     entries = [_entry(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True)]
     body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries, "skipped_runs": skips.records}
     emit(body, as_json=as_json, render=lambda to: _render(to, entries))
@@ -103,32 +106,37 @@ def command(
 
 
 def _written(
-    fits: Sequence[Fit], sources: Sequence[list[Path]], folder: Path | None, *, figures: bool, force: bool
+    fits: Sequence[Fit],
+    sources: Sequence[list[Path]],
+    folder: Path | None,
+    context: typer.Context,
+    *,
+    figures: bool,
+    force: bool,
 ) -> list[Path | None]:
     if folder is None:
         return [None] * len(fits)
     from fieldsid.models.model import save_model
-    from fieldsid.runtime.worker_pool import await_background
 
     paths: list[Path | None] = []
-    with await_background():
+    with drawing(context) as own:
         for fit, inputs in zip(fits, sources, strict=True):
             stem = _stem(fit)
             paths.append(save_model(fit.model, folder / f"{stem}.yaml", inputs=inputs, force=force))
             if figures:
-                _draw(fit, folder, stem, force=force)
+                _draw(fit, folder, stem, own, force=force)
     return paths
 
 
-def _draw(fit: Fit, folder: Path, stem: str, *, force: bool) -> None:
+def _draw(fit: Fit, folder: Path, stem: str, tasks: BackgroundTasks, *, force: bool) -> None:
     from fieldsid.figures.canvas import save
     from fieldsid.figures.identify import figure, history_figure
 
     for i, shown in enumerate(fit.predictions):
         name = stem if len(fit.predictions) == 1 else f"{stem}_{shown.record.name}"
-        save(figure(fit, i), folder / f"{name}.png", force=force)
+        save(figure(fit, i), folder / f"{name}.png", force=force, tasks=tasks)
     if fit.history is not None:
-        save(history_figure(fit, fit.history), folder / f"{stem}_over_time.png", force=force)
+        save(history_figure(fit, fit.history), folder / f"{stem}_over_time.png", force=force, tasks=tasks)
 
 
 def _stem(fit: Fit) -> str:

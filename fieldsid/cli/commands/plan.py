@@ -12,6 +12,7 @@ import typer
 from fieldsid.cli.console import emit, progress, say
 from fieldsid.cli.options import Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
 from fieldsid.cli.progress import compiling
+from fieldsid.cli.session import tasks_of
 from fieldsid.models.axis import Axis
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the sear
 
 
 def command(
+    context: typer.Context,
     axis: PlannedAxis = None,
     speeds: Speeds = None,
     vehicle: VehicleFile = None,
@@ -114,16 +116,16 @@ def command(
         axis, speeds, vehicle, model, prior, want, minutes, limiting, window, run_up, rate, radius,
         names_of(separate), diagnosis, seed, open_loop, course,
     )  # fmt: skip
-    with compiling() as help_along, progress("planning", asked.legs) as step:
+    with compiling(context) as warmup, progress("planning", asked.legs) as step:
 
         def ready() -> None:
             compile_planning()
-            help_along(SHARED_KERNELS)
+            warmup.compile_now(SHARED_KERNELS)
 
         made = planned(asked, step, ready)
     if model is not None:
         check_effects([(model, made.model)])
-    files = [] if output is None else _written(made.plan, made.model, asked, output, write, figures=figures, force=force)
+    files = [] if output is None else _written(made.plan, made.model, asked, output, write, context, figures=figures, force=force)
     body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
     result = emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body))
     if output is None:
@@ -142,7 +144,15 @@ def _check_write(write: str | None, output: Path | None) -> None:
 
 
 def _written(
-    plan: Plan, model: Model, asked: PlanRequest, folder: Path, write: str | None, *, figures: bool, force: bool
+    plan: Plan,
+    model: Model,
+    asked: PlanRequest,
+    folder: Path,
+    write: str | None,
+    context: typer.Context,
+    *,
+    figures: bool,
+    force: bool,
 ) -> list[Path]:
     from fieldsid.planning.output.command_files import unwritten, write_all
     from fieldsid.planning.output.plan_file import save_plan
@@ -156,7 +166,8 @@ def _written(
         from fieldsid.figures.plan import save_plan_figure
         from fieldsid.planning.output.figure_data import figure_data
 
-        files.append(save_plan_figure([figure_data(plan, leg, model) for leg in plan.legs], folder / "plan.png", force=force))
+        views = [figure_data(plan, leg, model) for leg in plan.legs]
+        files.append(save_plan_figure(views, folder / "plan.png", force=force, tasks=tasks_of(context)))
     return files
 
 

@@ -11,6 +11,7 @@ import typer
 from fieldsid.cli.console import emit, messages, say, table
 from fieldsid.cli.options import Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
+from fieldsid.cli.session import tasks_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -126,6 +127,7 @@ def design(
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
 def verify(
+    context: typer.Context,
     schedule: ScheduleFile,
     models: Models = None,
     require_phase_margin: NeedPhase = None,
@@ -170,7 +172,7 @@ def verify(
         "constant": [c.record() for c in checked.constant],
         "gates": [g.record() for g in gates],
         "passed": all(g.passed for g in gates),
-        "figure": None if output is None else _draw(known, checked, output, force=force),
+        "figure": None if output is None else _draw(known, checked, output, context, force=force),
     }
     emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body))
     if not body["passed"]:
@@ -243,11 +245,11 @@ def _limits(
     return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, messages().print)
 
 
-def _draw(schedule: Schedule, checked: Verification, path: Path, *, force: bool) -> str:
+def _draw(schedule: Schedule, checked: Verification, path: Path, context: typer.Context, *, force: bool) -> str:
     from fieldsid.figures.canvas import save
     from fieldsid.figures.schedule import figure
 
-    return str(save(figure(schedule, checked), path, force=force))
+    return str(save(figure(schedule, checked), path, force=force, tasks=tasks_of(context)))
 
 
 def _render_design(to: Console, schedule: Schedule, source: ParameterSource, body: Mapping[str, Any]) -> None:

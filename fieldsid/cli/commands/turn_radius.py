@@ -11,6 +11,7 @@ import typer
 from fieldsid.cli.console import emit, say, table, warn
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
 from fieldsid.cli.progress import refuse_closed
+from fieldsid.cli.session import tasks_of
 from fieldsid.cli.skipped_logs import Skips
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ FinZero = Annotated[
 
 
 def command(
+    context: typer.Context,
     models: ModelFiles,
     speeds: Speeds = None,
     rudder_max: RudderMax = None,
@@ -95,7 +97,7 @@ def command(
     body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
     body["skipped_runs"] = skips.records
     if output is not None:
-        body["figures"] = _written(prediction, body, output, source, figures=figures, force=force)
+        body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
     if not as_json:
         warn(prediction.notes)
     emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body))
@@ -138,7 +140,14 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
 
 
 def _written(
-    prediction: TurnPrediction, body: Mapping[str, Any], folder: Path, source: ParameterSource, *, figures: bool, force: bool
+    prediction: TurnPrediction,
+    body: Mapping[str, Any],
+    folder: Path,
+    source: ParameterSource,
+    context: typer.Context,
+    *,
+    figures: bool,
+    force: bool,
 ) -> list[str]:
     from fieldsid.artifacts import save_record
     from fieldsid.figures.canvas import save
@@ -149,9 +158,8 @@ def _written(
     save_record(folder / "turn_radius.yaml", "fieldsid/turn-radius/1", rest, inputs=inputs, force=force)
     if not figures:
         return []
-    drawn = [save(figure(prediction), folder / "turn_radius.png", force=force)]
-    drawn += [save(track_figure(m.turn), folder / f"circle_{m.turn.run}.png", force=force) for m in prediction.measured]
-    return [str(p) for p in drawn]
+    drawn = {"turn_radius": figure(prediction)} | {f"circle_{m.turn.run}": track_figure(m.turn) for m in prediction.measured}
+    return [str(save(f, folder / f"{name}.png", force=force, tasks=tasks_of(context))) for name, f in drawn.items()]
 
 
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:

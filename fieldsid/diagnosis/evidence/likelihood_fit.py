@@ -110,7 +110,9 @@ def _noise_at(
     problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, wake: bool = True
 ) -> tuple[Noise, float]:  # fmt: skip
     residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
-    return estimate_noise(problem.records, dynamics, residuals, noise_kind, start, floor=floor, reinitialise=wake)
+    return estimate_noise(
+        problem.records, dynamics, residuals, noise_kind, start, floor=floor, reinitialise=wake, evaluations=problem.evaluations
+    )
 
 
 def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> LikelihoodFit:

@@ -63,13 +63,15 @@ def log_predictive_density(ml_fit: LikelihoodFit, runs: Sequence[ValidationRun],
     would penalise a model the more for a small error, the better it fitted there.
     """
     dynamics = [(b.damping, b.stiffness) for b in (r.problem.base_of(r.x, 0) for r in runs)]
-    known = precision(ml_fit)
+    known, evaluations = precision(ml_fit), ml_fit.fitted.problem.evaluations
 
     plain = [r.residual for r in runs]
     _, led = _under(ml_fit.noise, runs, dynamics, known)
     found = []
     for residuals in (plain, led) if _differ(plain, led, ml_fit.floor) else (plain,):
-        noise, _ = estimate_noise(records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, floor=ml_fit.floor)
+        noise, _ = estimate_noise(
+            records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, floor=ml_fit.floor, evaluations=evaluations
+        )
         found.append(_under(noise, runs, dynamics, known)[0])
     return max(found, key=lambda v: float(v.sum()))
 

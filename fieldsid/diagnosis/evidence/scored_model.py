@@ -139,7 +139,9 @@ def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredMo
 
 def validation_fits(model: Model, fitted: FittedProblem, validation: Sequence[Record]) -> ValidationFits:
     """Return the one-run problems of the validation runs: the model's values fixed, each run's nuisances fitted."""
-    return tuple(with_command_timing(*frozen_problem(model, record, fitted.effects), model.noise) for record in validation)
+    evaluations = fitted.problem.evaluations
+    problems = (frozen_problem(model, record, fitted.effects, evaluations) for record in validation)
+    return tuple(with_command_timing(*p, model.noise) for p in problems)
 
 
 def validation_log_density(ml_fit: LikelihoodFit, validation: Sequence[Record], flown: ValidationFits) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fieldsid.runtime.evaluation_counter import evaluations
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_EVALUATIONS_PER_RUN = 3500
 """Simulations, linearisations and filter passes of each run, on average, after which no further move is evaluated."""
@@ -17,10 +17,10 @@ class Budget:
     runs: int
     most: float
     is_exhausted: bool = False
-    evaluations_before: int = field(default_factory=evaluations)
+    evaluations: EvaluationCounter = field(default_factory=EvaluationCounter)
 
     def remaining(self) -> bool:
         """Whether evaluations are left; if not, the budget is marked as exhausted."""
-        lasts = evaluations() - self.evaluations_before < self.most * self.runs
+        lasts = self.evaluations.count < self.most * self.runs
         self.is_exhausted = self.is_exhausted or not lasts
         return lasts

@@ -83,8 +83,8 @@ class SearchState:
         """Compare models down to the sensors' noise until the error of the base model is known."""
         both = (*self.records, *self.validation)
         self.resolution_floor = self.floor = white_noise_floor(both)
-        self.parallel = ParallelMap(both, self.catalogue)
         self.budget = Budget(len(both), np.inf if self.thorough else MAX_EVALUATIONS_PER_RUN)
+        self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations)
 
     @property
     def root(self) -> frozenset[str]:
@@ -98,7 +98,8 @@ class SearchState:
             laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
             known = [e for e in self.catalogue if e.name in self.known]
             fits = self.parallel.map(
-                lambda groups: fit_base_output_error(self.records, self.axis, known, groups, self.floor), laws
+                lambda groups: fit_base_output_error(self.records, self.axis, known, groups, self.floor, self.budget.evaluations),
+                laws,
             )
             fitted = min(fits, key=lambda t: error_product(t, self.axis))
             refuse_unbounded_motion(fitted.problem, fitted.x, "diagnose", instead="leave effects out of the model it starts from")

@@ -28,6 +28,7 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import TRIM_OF_FIN
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 T = TypeVar("T")
 
@@ -60,11 +61,12 @@ def speed_laws(records: Sequence[Record], *, trim_of_fin: bool | None) -> tuple[
 
 
 def fit_base_output_error(
-    records: tuple[Record, ...], axis: Axis, known: Sequence[Effect], groups: SpeedGroups, floor: Noise
-) -> FittedProblem:
+    records: tuple[Record, ...], axis: Axis, known: Sequence[Effect], groups: SpeedGroups, floor: Noise,
+    evaluations: EvaluationCounter,
+) -> FittedProblem:  # fmt: skip
     """Return the output-error fit of the base model with its known effects, under a speed law."""
     layout = layout_of(records, axis, (), groups)
-    fitted = fit_output_error(Problem(records, layout), equation_error_start(records, layout), floor)
+    fitted = fit_output_error(Problem(records, layout, evaluations), equation_error_start(records, layout), floor)
     for effect in known:
         linearisation = linearise_at(fitted.problem, fitted.x, fitted.weights)
         screened = backtrack(linearisation, screen_effect(linearisation, effect))
@@ -181,7 +183,7 @@ def other_trim_law(h: ScoredModel, resolution_floor: Noise) -> ScoredModel | Non
     records, varying = fitted.problem.records, any(e.terms is not None for e in h.effects)
     for trim in possible_trims(speed_groups(records, width=FINE_GROUP_WIDTH), varying=varying):
         if trim != layout.groups.trim_of_fin:
-            other = Problem(records, replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
+            other = replace(fitted.problem, layout=replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
             fit = score_model(
                 fit_maximum_likelihood(other, fitted.x, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation
             )

@@ -104,6 +104,7 @@ def reml_noise(problem: Problem, lines: list[LinearisedRun], noise_kind: str, st
         noise_kind,
         start,
         lambda noise: reml_likelihood(lines, count, noise),
+        evaluations=problem.evaluations,
     )
 
 

@@ -102,7 +102,7 @@ def under_speed_groups(problem: Problem, x: FloatArray, groups: SpeedGroups) -> 
     authority = NAMES[old.axis].authority
     shared = float(x[old.names.index(authority)])
     lifted = {group_name(authority, groups, g): shared * groups.over_reference(g) ** 2 for g in range(len(groups.speeds))}
-    return Problem(problem.records, new), transfer_parameters(old, x, new, lifted)
+    return replace(problem, layout=new), transfer_parameters(old, x, new, lifted)
 
 
 def overlay_parameters(old: ParameterLayout, x: FloatArray, new: ParameterLayout, own: FloatArray) -> FloatArray:

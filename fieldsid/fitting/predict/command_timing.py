@@ -123,12 +123,12 @@ class _CommandTiming:
 
     def residual(self, times: FloatArray) -> FloatArray:
         """Return measured minus simulated, (2, n)."""
-        return Problem((self.record_with(times),), self.problem.layout).residual(self.x, 0)[0]
+        return replace(self.problem, records=(self.record_with(times),)).residual(self.x, 0)[0]
 
     def slopes(self) -> FloatArray:
         """Return the change of the residual by each time, (K + 1, 2, n), to first order in what half an interval does."""
         half, record = 0.5 * self.most, self.problem.records[0]
-        logged = Problem((self.record_with(0.0 * half),), self.problem.layout)
+        logged = replace(self.problem, records=(self.record_with(0.0 * half),))
         moved = logged.command_sensitivities(self.x, 0, [record.path_with_lead(self.command_lead(t)) for t in np.diag(half)])
         return -moved * record.ok / half[:, None, None]
 
@@ -174,7 +174,9 @@ class _CommandTiming:
         record, base = self.problem.records[0], self.problem.base_of(self.x, 0)
         noise, best = self.floor, -np.inf
         for _ in range(MAX_ALTERNATIONS):
-            noise, _ = estimate_noise([record], [(base.damping, base.stiffness)], [residual], "disturbance", noise)
+            noise, _ = estimate_noise(
+                [record], [(base.damping, base.stiffness)], [residual], "disturbance", noise, evaluations=self.problem.evaluations
+            )
             white, logs = whiten(record, noise, base.damping, base.stiffness, np.concatenate([residual[None], self.starts]))
             flat = white.reshape(white.shape[0], -1)
             move = gram_least_squares(flat[1:], flat[0])

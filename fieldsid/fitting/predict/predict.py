@@ -27,6 +27,7 @@ from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import is_white
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
 """Iterations for a run's nuisances, and the share of the sum of squares that an iteration must gain."""
@@ -99,7 +100,9 @@ def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:
     return tuple(notes)
 
 
-def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> tuple[Problem, FloatArray]:
+def frozen_problem(
+    model: Model, record: Record, effects: Sequence[Effect], evaluations: EvaluationCounter | None = None
+) -> tuple[Problem, FloatArray]:
     """Return a problem of one record whose shared parameters have the model's values at the record's speed, and its start."""
     layout = layout_of([record], model.axis, effects)
     of_fin = model.law.trim_of_fin
@@ -108,7 +111,7 @@ def frozen_problem(model: Model, record: Record, effects: Sequence[Effect]) -> t
     layout = replace(layout, groups=groups)
     values = values_at_speed(model.law, model.values, model.axis, record.speed)
     x = np.array([values[s.name] if i < layout.shared else s.start for i, s in enumerate(layout.parameters)])
-    return Problem((record,), layout), x
+    return Problem((record,), layout, evaluations or EvaluationCounter()), x
 
 
 def values_at_speed(law: SpeedLaw, values: Mapping[str, float], axis: Axis, speed: float) -> dict[str, float]:
@@ -139,7 +142,7 @@ def with_command_timing(problem: Problem, x: FloatArray, noise: Noise) -> tuple[
     better = command_timing.command_timing(problem, x, white_noise_floor([record]))
     if better is None:
         return problem, x
-    problem = Problem((better,), problem.layout)
+    problem = replace(problem, records=(better,))
     return problem, refit_nuisances(problem, x, 0, noise, rescan=False)
 
 
@@ -152,7 +155,7 @@ def refit_nuisances(problem: Problem, x: FloatArray, run: int, noise: Noise, *, 
     initial state cannot hide an error of the model.
     """
     own = problem.layout.nuisances_of(run)
-    alone = Problem((problem.records[run],), _layout_of_one(problem.layout, run))
+    alone = replace(problem, records=(problem.records[run],), layout=_layout_of_one(problem.layout, run))
     keep = [*range(problem.layout.shared), *own]
     free = range(problem.layout.shared, len(keep))
     starts = scanned_starts(alone, x[keep]) if rescan else [x[keep]]

@@ -96,7 +96,7 @@ def speed_note(record: Record, faster: float) -> Note | None:
 def _at_speed_share(problem: Problem, share: float) -> Problem:
     groups = problem.layout.groups
     speeds = (groups.run_speeds[0] * (1.0 + share),)
-    return Problem(problem.records, replace(problem.layout, groups=replace(groups, run_speeds=speeds)))
+    return replace(problem, layout=replace(problem.layout, groups=replace(groups, run_speeds=speeds)))
 
 
 def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> FloatArray | None:

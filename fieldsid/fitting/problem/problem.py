@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from math import isfinite
 
 import numpy as np
 
 from fieldsid.dynamics.assemble import Base, KernelInputs, assemble, combined_core, integrate_record, measured, with_moments
+from fieldsid.fitting.problem.kernel_input_cache import KernelInputCache
 from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout, group_name, layout_of
 from fieldsid.fitting.problem.sensitivities import Sensitivities
 from fieldsid.models.axis import NAMES
@@ -17,7 +19,7 @@ from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record, first_part
 from fieldsid.models.speed_law import over_reference
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.runtime.evaluation_counter import count_evaluation
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_CACHED_SAMPLES = 20_000
 """Samples of the longest run whose arrays are kept for the next call."""
@@ -49,21 +51,25 @@ class RunResult:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Records and the parameters estimated from them; `known` caches each run's kernel inputs of the last call."""
+    """Records and the parameters estimated from them.
+
+    `evaluations` counts what is evaluated of it; `replace` gives a problem that counts on the same counter, with a new cache.
+    """
 
     records: tuple[Record, ...]
     layout: ParameterLayout
-    known: dict[int, tuple[tuple[object, ...], KernelInputs]] = field(default_factory=dict, compare=False, repr=False)
+    evaluations: EvaluationCounter = field(default_factory=EvaluationCounter, compare=False, repr=False)
+    cache: KernelInputCache = field(default_factory=KernelInputCache, init=False, compare=False, repr=False)
 
     def first(self, samples: int) -> Problem:
         """Return the problem on the first samples of every run; itself where none is longer."""
         if all(len(r) <= samples for r in self.records):
             return self
-        return Problem(tuple(first_part(r, samples) for r in self.records), self.layout)
+        return replace(self, records=tuple(first_part(r, samples) for r in self.records))
 
     def with_effects(self, effects: Sequence[Effect]) -> Problem:
         """Return the problem of the same records and speed groups with other effects."""
-        return Problem(self.records, layout_of(self.records, self.layout.axis, effects, self.layout.groups))
+        return replace(self, layout=layout_of(self.records, self.layout.axis, effects, self.layout.groups))
 
     def base_of(self, x: FloatArray, run: int) -> Base:
         """Return a run's base parameters."""
@@ -110,19 +116,14 @@ class Problem:
         )
 
     def _arrays(self, base: Base, values: Values, run: int) -> KernelInputs:
-        """Return the core's arrays, those of the last call where nothing but the run's start has changed."""
-        key = (base, *(v for name, v in values.items() if name not in START_NAMES))
-        last, record = self.known.get(run), self.records[run]
-        if last is not None and last[0] == key:
-            return last[1]
-        arrays = assemble(record, self.layout.effects, base, values, self.scales(run)[0])
-        if len(record) <= MAX_CACHED_SAMPLES:
-            self.known[run] = key, arrays
-        return arrays
+        """Return the kernel inputs of a run: those of the last call where nothing but the run's initial state has changed."""
+        key, record = (base, *(v for name, v in values.items() if name not in START_NAMES)), self.records[run]
+        make = partial(assemble, record, self.layout.effects, base, values, self.scales(run)[0])
+        return self.cache.get(run, key, make) if len(record) <= MAX_CACHED_SAMPLES else make()
 
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
-        count_evaluation()
+        self.evaluations.add()
         record, effects = self.records[run], self.layout.effects
         values = self.values_of(x, run)
         base, start = self._base(values, run), self._start_of(values, run)
@@ -137,7 +138,7 @@ class Problem:
 
     def linearise(self, x: FloatArray, run: int, free: Sequence[int] | None = None) -> RunResult:
         """Return one run's free run with its sensitivities to the free parameters that affect it."""
-        count_evaluation()
+        self.evaluations.add()
         slots, pushes = self._sensitivities(x, run, free)
         out, stack = pushes.integrate(slots)
         shown = pushes.through_sensors(Motion(out[:, 0], out[:, 1]), slots, stack[1:])

@@ -6,14 +6,14 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from fieldsid.fitting import jit_warmup
-from fieldsid.numerics.jit import is_compiled, plain_of
+from fieldsid.fitting.jit_warmup import Warmup, WarmupJob
+from fieldsid.numerics.jit import is_loaded, jit, plain_of, warmup_marker
 from fieldsid.runtime.worker_pool import can_fork
 
 needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
@@ -53,87 +53,105 @@ def test_a_fit_compiles_nothing_more():
 
 
 @pytest.mark.parametrize("function", jit_warmup.WARMUP_KERNELS, ids=lambda door: door.__name__)
-def test_a_function_counts_as_compiled_once_it_was_called(function):
+def test_a_function_counts_as_loaded_once_it_was_called(function):
     jit_warmup.compile_all()
-    assert is_compiled(function)
-    assert is_compiled(plain_of(function))
+    assert is_loaded(function)
+    assert is_loaded(plain_of(function))
 
 
-def test_what_was_never_called_is_not_compiled(tmp_path, monkeypatch):
+def test_the_marker_of_kernels_changes_with_their_source(tmp_path, monkeypatch):
     source = tmp_path / "fresh.py"
     source.write_text("from fieldsid.numerics.jit import jit\n\n\n@jit\ndef twice(x):\n    return 2.0 * x\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     import fresh
 
-    assert not is_compiled(fresh.twice)
-    assert fresh.twice(1.5) == 3.0
-    assert is_compiled(fresh.twice)
+    assert not is_loaded(fresh.twice)
+    before = warmup_marker([fresh.twice])
+    assert warmup_marker([fresh.twice]) == before
+    assert warmup_marker([fresh.twice, jit(jit_warmup.first_order_lag.py_func)]) != before
+    source.write_text(source.read_text().replace("2.0", "3.00"), encoding="utf-8")
+    assert warmup_marker([fresh.twice]) != before
 
 
 @pytest.fixture
-def jobs(monkeypatch):
-    """Stand-ins for what is compiled: a job's door is open once the job is done, in whichever process."""
-    folder: list[Path] = []
+def jobs(monkeypatch, tmp_path):
+    """Stand-ins for what is compiled: a job leaves a file that says which process has done it."""
 
-    def made(tmp_path: Path, seconds: Sequence[float]) -> list[Path]:
-        def job(door: Path, length: float) -> None:
+    def made(*seconds: float) -> list[Path]:
+        def run(done: Path, length: float) -> None:
             time.sleep(length)
-            door.write_text(str(os.getpid()))
+            done.write_text(str(os.getpid()))
 
-        folder[:] = [tmp_path / str(i) for i in range(len(seconds))]
-        monkeypatch.setattr(jit_warmup, "WARMUP_KERNELS", tuple(folder))
-        monkeypatch.setattr(jit_warmup, "WARMUP_JOBS", tuple(partial(job, *of) for of in zip(folder, seconds, strict=True)))
-        monkeypatch.setattr(jit_warmup, "is_compiled", lambda door: door.exists())
-        return folder
+        files = [tmp_path / str(i) for i in range(len(seconds))]
+        stand_ins = tuple(WarmupJob(partial(run, *of), (of[0],)) for of in zip(files, seconds, strict=True))
+        monkeypatch.setattr(jit_warmup, "WARMUP_JOBS", stand_ins)
+        monkeypatch.setattr(jit_warmup, "WARMUP_KERNELS", tuple(files))
+        monkeypatch.setattr(jit_warmup, "is_loaded", lambda _kernel: False)
+        monkeypatch.setattr(jit_warmup, "warmup_marker", lambda _kernels: tmp_path / "cache" / "marker")
+        return files
 
     return made
 
 
 @needs_copies
-def test_a_copy_compiles_only_where_something_is_not_compiled_and_ends_with_the_work(jobs, monkeypatch, tmp_path):
-    made, told = [], []
+def test_a_worker_compiles_only_where_there_is_no_marker_and_ends_with_the_context(jobs, monkeypatch, tmp_path):
+    made, said = [], []
     real = jit_warmup.fork_worker
     monkeypatch.setattr(jit_warmup, "fork_worker", lambda work: made.append(real(work)) or made[-1])
-    jobs(tmp_path, [])
-    with jit_warmup.warming_up(told.append):
-        pass
-    assert made == told == []
-    jobs(tmp_path, [60.0])
-    with jit_warmup.warming_up(told.append), jit_warmup.warming_up(told.append):
-        (copy,) = made
-        assert copy.is_at_work()
+    jobs(60.0)
+    with jit_warmup.warming_up(said.append):
+        (worker,) = made
+        assert worker.is_running()
     with pytest.raises(ChildProcessError):
-        os.waitpid(copy.process, 0)
-    (said,) = told
-    assert said.startswith("first run")
+        os.waitpid(worker.process, 0)
+    assert [text.partition(":")[0] for text in said] == ["first run on this machine"]
+    assert not (tmp_path / "cache" / "marker").exists()
+    (tmp_path / "cache").mkdir()
+    (tmp_path / "cache" / "marker").touch()
+    with jit_warmup.warming_up(said.append) as warmup:
+        warmup.compile_now()
+    assert len(made) == len(said) == 1
 
 
 @needs_copies
-def test_what_is_left_is_shared_with_the_copy_until_what_is_asked_for_is_there(jobs, tmp_path):
-    doors = jobs(tmp_path, [0.5, 0.0, 0.0])
-    with jit_warmup.warming_up() as help_along:
-        time.sleep(0.2)  # the copy is at the first
-        help_along(doors[1:2])
-        assert [door.exists() for door in doors] == [False, True, False]
-        help_along(doors[:1])
-        assert [door.exists() for door in doors] == [True, True, True]
-    assert doors[0].read_text() != doors[1].read_text() == doors[2].read_text() == str(os.getpid())
+def test_jobs_are_shared_with_the_worker_until_the_kernels_asked_for_are_there(jobs, tmp_path):
+    files = jobs(0.5, 0.0, 0.0)
+    with jit_warmup.warming_up() as warmup:
+        time.sleep(0.2)  # the worker is at the first
+        warmup.compile_now(files[1:2])
+        assert [file.exists() for file in files] == [False, True, False]
+        warmup.compile_now(files[:1])
+        assert files[0].exists()
+        warmup.compile_now()
+        assert all(file.exists() for file in files)
+    assert files[0].read_text() != files[1].read_text() == str(os.getpid())
+    assert (tmp_path / "cache" / "marker").exists()
 
 
-def test_without_a_copy_all_of_it_is_done_here(jobs, monkeypatch, tmp_path):
+def test_without_a_worker_all_of_it_is_done_here(jobs, monkeypatch, tmp_path):
     monkeypatch.setattr(jit_warmup, "fork_worker", lambda _work: None)
-    doors = jobs(tmp_path, [0.0, 0.0])
-    with jit_warmup.warming_up() as help_along:
-        assert not any(door.exists() for door in doors)
-        help_along(doors)
-    assert {door.read_text() for door in doors} == {str(os.getpid())}
+    files = jobs(0.0, 0.0)
+    with jit_warmup.warming_up() as warmup:
+        assert not any(file.exists() for file in files)
+        warmup.compile_now()
+    assert {file.read_text() for file in files} == {str(os.getpid())}
+    assert (tmp_path / "cache" / "marker").exists()
 
 
-def test_what_no_job_compiles_is_not_waited_for(jobs, tmp_path):
-    doors = jobs(tmp_path, [0.0])
-    with jit_warmup.warming_up() as help_along:
-        help_along([*doors, tmp_path / "never"])
-    assert doors[0].exists()
+@needs_copies
+def test_what_the_worker_died_of_is_done_here():
+    here, done, kernel = os.getpid(), [], plain_of(jit_warmup.first_order_lag)
+    warmup = Warmup([WarmupJob(lambda: done.append(1) if os.getpid() == here else os._exit(9), (kernel,))])
+    time.sleep(0.2)  # the worker has taken it
+    warmup.compile_now([kernel])
+    assert done == [1]
+    assert warmup.end()
+
+
+def test_a_kernel_of_no_job_is_not_waited_for(jobs, tmp_path):
+    jobs(60.0)
+    with jit_warmup.warming_up() as warmup:
+        warmup.compile_now([tmp_path / "never"])
 
 
 def test_every_job_calls_what_it_is_there_for():

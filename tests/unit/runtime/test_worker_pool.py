@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
-from types import MappingProxyType
 
-import numpy as np
 import pytest
 
 from fieldsid.runtime import worker_pool
-from fieldsid.runtime.worker_pool import MAX_WORKERS, await_background, can_fork, dumps, fork_worker, loads, run_in_background
+from fieldsid.runtime.worker_pool import can_fork, fork_worker, parallel_map
 
 needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
 
@@ -50,15 +51,57 @@ def test_an_error_beside_a_copy_ends_it():
 
 
 @needs_copies
-def test_copies_that_have_answered_are_seen_off_by_the_next():
-    for _ in range(5):
-        answer_of(lambda: b"")
-    assert len(worker_pool._ENDING) == 1
-    last = worker_pool._ENDING[0]
-    answer_of(lambda: b"")
-    assert last not in worker_pool._ENDING
+def test_a_worker_that_has_answered_is_gone():
+    with fork_worker(lambda: b"") as worker:
+        worker.answer()
     with pytest.raises(ChildProcessError):
-        os.waitpid(last, os.WNOHANG)
+        os.waitpid(worker.process, os.WNOHANG)
+
+
+KILLED = """
+import os, signal, sys, time
+from fieldsid.runtime.worker_pool import fork_worker
+worker = fork_worker(lambda: [time.sleep(60.0), b""][1])
+print(worker.process, flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@needs_copies
+def test_a_worker_ends_with_a_process_that_is_killed():
+    killed = subprocess.run([sys.executable, "-c", KILLED], capture_output=True, text=True, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    worker = Path(f"/proc/{int(killed.stdout)}/stat")
+    assert in_time(lambda: not worker.exists() or worker.read_text().rpartition(")")[2].split()[0] in "ZX", 5.0)
+
+
+def in_time(is_so, seconds):
+    """Whether something comes to be so within some seconds."""
+    end = time.monotonic() + seconds
+    while not (done := is_so()) and time.monotonic() < end:
+        time.sleep(0.01)
+    return done
+
+
+@needs_copies
+def test_an_error_of_the_function_is_raised_and_leaves_no_process():
+    with pytest.raises(ZeroDivisionError):
+        parallel_map(lambda i: 1 // (i - 3), range(8))
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+@needs_copies
+def test_what_a_worker_died_of_is_done_here():
+    here = os.getpid()
+
+    def dies_elsewhere(item):
+        if os.getpid() != here:
+            os._exit(9)
+        time.sleep(0.01)
+        return item
+
+    assert parallel_map(dies_elsewhere, range(12)) == list(range(12))
 
 
 @needs_copies
@@ -95,71 +138,5 @@ def test_nothing_is_copied_elsewhere_than_on_linux(monkeypatch):
 
 
 def test_nothing_is_copied_where_python_would_warn_of_it(monkeypatch):
-    monkeypatch.setattr(worker_pool, "_warns", lambda: True)
+    monkeypatch.setattr(worker_pool, "_fork_warns", lambda: True)
     assert fork_worker(lambda: b"") is None
-
-
-def test_mappings_that_are_read_only_are_read_back_as_such():
-    value = {"signals": MappingProxyType({"yaw_rad": np.arange(3.0)}), "name": "run7"}
-    again = loads(dumps(value))
-    assert isinstance(again["signals"], MappingProxyType)
-    np.testing.assert_array_equal(again["signals"]["yaw_rad"], np.arange(3.0))
-    assert again["name"] == "run7"
-
-
-def signed(path, seconds=0.0):
-    """Return work that takes so long and leaves who has done it."""
-    return lambda: (time.sleep(seconds), path.write_text(str(os.getpid())))
-
-
-def test_what_could_be_put_off_is_done_at_once_outside_of_a_tour(tmp_path):
-    run_in_background(signed(tmp_path / "a"))
-    assert (tmp_path / "a").read_text() == str(os.getpid())
-
-
-@needs_copies
-def test_what_is_put_off_is_done_in_copies_and_waited_for(tmp_path):
-    files = [tmp_path / str(i) for i in range(MAX_WORKERS + 1)]
-    with await_background():
-        with await_background():
-            run_in_background(signed(files[0], 0.3))
-        assert not files[0].exists()  # an inner one leaves it to the outer one
-        for file in files[1:]:
-            run_in_background(signed(file, 0.3))
-        assert files[-1].read_text() == str(os.getpid())  # no more copies than there may be
-    assert len({file.read_text() for file in files}) == len(files)
-
-
-@needs_copies
-def test_what_went_wrong_in_a_copy_is_met_again_here(tmp_path):
-    def refused():
-        raise PermissionError("no")
-
-    def tour():
-        with await_background():
-            run_in_background(refused)
-            run_in_background(signed(tmp_path / "after"))
-
-    with pytest.raises(PermissionError, match="no"):
-        tour()
-    with await_background():  # and leaves nothing behind
-        run_in_background(signed(tmp_path / "again"))
-    assert (tmp_path / "again").exists()
-
-
-@needs_copies
-def test_after_an_error_nothing_that_was_put_off_is_done_again():
-    done = []
-
-    def failing():
-        done.append(os.getpid())
-        raise PermissionError("no")
-
-    def tour():
-        with await_background():
-            run_in_background(failing)
-            raise ValueError("the tour")
-
-    with pytest.raises(ValueError, match="the tour"):
-        tour()
-    assert done == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 
 import hidden_lag
@@ -14,9 +15,11 @@ from fieldsid.diagnosis.search import move_evaluation, search, search_state
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
+from fieldsid.fitting.problem.parameters import layout_of
+from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
-from fieldsid.runtime import evaluation_counter
+from fieldsid.runtime.evaluation_counter import EvaluationCounter
 from fieldsid.runtime.worker_pool import can_fork
 
 
@@ -33,19 +36,30 @@ EFFECTS = all_effects(Axis.YAW)
 
 def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
     allowance = Budget(2, 10.0)
-    evaluation_counter.count_evaluation(19)
+    allowance.evaluations.add(19)
     assert allowance.remaining()
     assert not allowance.is_exhausted
-    evaluation_counter.count_evaluation()
+    allowance.evaluations.add()
     assert not allowance.remaining()
     assert allowance.is_exhausted
     assert Budget(2, np.inf).remaining()
 
 
 def test_what_a_copy_has_worked_out_counts():
-    before = evaluation_counter.evaluations()
-    ParallelMap((), ()).map(lambda _item: evaluation_counter.count_evaluation(3), range(6))
-    assert evaluation_counter.evaluations() - before == 18
+    counter = EvaluationCounter()
+    ParallelMap((), (), counter).map(lambda _item: counter.add(3), range(6))
+    assert counter.count == 18
+
+
+@pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
+def test_a_problem_from_a_worker_counts_on_the_counter_of_the_search():
+    record = record_of(UNSEEN, Axis.YAW)
+    shared = ParallelMap([record], [])
+    problem = Problem((record,), layout_of((record,), Axis.YAW, ()), shared.evaluations)
+    for back in shared.map(lambda _item: replace(problem, records=problem.records), range(6)):
+        assert back.evaluations is shared.evaluations
+    problem.with_effects((EFFECTS["servo_lag"],)).residual(np.append(problem.start(), 0.1), 0)
+    assert shared.evaluations.count == 1
 
 
 def a_search(*, thorough: bool) -> Search:
@@ -80,9 +94,8 @@ def test_a_copy_changes_neither_the_count_nor_the_answer(monkeypatch):
     answers, counts = [], []
     for alone in (False, True):
         if alone:
-            monkeypatch.setenv("FIELDSID_IS_COPY", "1")
-        before = evaluation_counter.evaluations()
+            monkeypatch.setenv("FIELDSID_IS_WORKER", "1")
         answers.append(body_of(diagnose(RUNS, Axis.YAW, [UNSEEN])))
-        counts.append(evaluation_counter.evaluations() - before)
-    assert counts[0] == counts[1]
+        counts.append(a_search(thorough=False).budget.evaluations.count)
+    assert counts[0] == counts[1] > 0
     assert answers[0] == answers[1]

@@ -34,7 +34,7 @@ def asked(monkeypatch):
 
     monkeypatch.setattr(speed_law_search, "other_trim_law", better)
     monkeypatch.setattr(speed_law_search, "leaves_error", lambda _h, _floor: True)
-    monkeypatch.setenv("FIELDSID_IS_COPY", "1")  # all in this process, where the calls are counted
+    monkeypatch.setenv("FIELDSID_IS_WORKER", "1")  # all in this process, where the calls are counted
     return names
 
 
