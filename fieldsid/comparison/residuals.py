@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.fitting.predict.predict import Prediction
-from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.block_means import block_means, block_width
 
 BLOCK_S = 0.25
 FEWEST_BLOCKS = 20
@@ -32,7 +32,7 @@ def missing_moment(shown: Prediction, damping: float) -> tuple[FloatArray, Float
     if not record.rate_ok.all() or len(record) < 3:
         return np.zeros(0), np.zeros(0)
     residual = record.rate - shown.rate
-    width = _width(record)
+    width = block_width(record.steps, BLOCK_S)
     time, slow = block_means(record.time, width), block_means(residual, width)
     if time.size < FEWEST_BLOCKS:
         return np.zeros(0), np.zeros(0)
@@ -44,19 +44,9 @@ def companions(shown: Prediction, damping: float) -> tuple[Companion, ...]:
     _, moment = missing_moment(shown, damping)
     if moment.size == 0 or float(np.var(moment)) == 0.0:
         return ()
-    width = _width(shown.record)
+    width = block_width(shown.record.steps, BLOCK_S)
     found = [Companion(name, _explained(moment, block_means(values, width))) for name, values in _signals(shown).items()]
     return tuple(sorted(found, key=lambda c: -c.explained))
-
-
-def block_means(values: FloatArray, width: int) -> FloatArray:
-    """Return the means of successive blocks of `width` samples, (n // width,)."""
-    count = values.size // width
-    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
-
-
-def _width(record: Record) -> int:
-    return max(1, round(BLOCK_S / float(np.median(record.steps))))
 
 
 def _signals(shown: Prediction) -> Mapping[str, FloatArray]:

@@ -32,7 +32,7 @@ from fieldsid.noise.kalman.sensor_colour import sensor_colour_filter
 from fieldsid.noise.maximum_likelihood import estimate_noise
 from fieldsid.noise.sandwich_covariance import score_covariance, score_covariance_kernel
 from fieldsid.noise.whiten import noise_vector, whiten
-from fieldsid.numerics.first_order_lag import first_order_lag
+from fieldsid.numerics.first_order_lag import first_order_lag, held_first_order_lag
 from fieldsid.numerics.jit import is_loaded, warmup_marker
 from fieldsid.runtime.worker_pool import fork_worker, job_queue
 
@@ -79,6 +79,7 @@ def _whiten(noise: Noise) -> None:
 def _lag() -> None:
     record = a_record()
     first_order_lag(record.steps, record.rate, 1.0)
+    held_first_order_lag(record.rate, record.angle, 0.0)
 
 
 def _sandwich() -> None:
@@ -113,7 +114,7 @@ WARMUP_JOBS = (
     WarmupJob(_linear, (linear_sensitivities, linear_motion, accumulate_normal_equations)),
     WarmupJob(lambda: _whiten(DISTURBED), (disturbance_filter,)),
     WarmupJob(_nonlinear, (nonlinear_sensitivities, nonlinear_motion)),
-    WarmupJob(_lag, (first_order_lag,)),
+    WarmupJob(_lag, (first_order_lag, held_first_order_lag)),
     WarmupJob(lambda: _estimate("disturbance"), (score_of_innovations,)),
     WarmupJob(lambda: _estimate("coloured"), (sensor_colour_filter,)),
     WarmupJob(lambda: _whiten(replace(DISTURBED, coloured_rate=0.01)), (full_filter,)),

@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldsid.fitting.covariance.output_error_covariance import coloured_covariance
 from fieldsid.fitting.covariance.reml import MAX_NOISE_SAMPLES
-from fieldsid.fitting.fin_history import BLOCK_S, block_means, columns_of
+from fieldsid.fitting.fin_history import blocks_of, columns_of
 from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_marquardt
 from fieldsid.fitting.optimise.residual_weights import white_weights
 from fieldsid.fitting.problem.problem import Problem
@@ -69,7 +69,7 @@ def independence(problem: Problem, x: FloatArray, noise: Noise) -> float:
 
 def _explained(white: FloatArray, record: Record, columns: FloatArray) -> tuple[float, float, float, float]:
     """Return what columns (m, p) explain of a run's innovations, what they leave, and the degrees of freedom of both."""
-    e = block_means(white, record, BLOCK_S)[1:]
+    e = blocks_of(white, record)[1:]
     if e.size <= 2 * columns.shape[1]:
         return 0.0, 0.0, 0.0, 0.0
     # the constant is among the columns, and is no relation

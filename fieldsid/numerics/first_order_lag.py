@@ -1,4 +1,4 @@
-"""A signal behind a first-order lag, exact where it is straight between samples."""
+"""A signal behind a first-order lag, x' = (u - x) / tau: exact where u is straight, or held, between samples."""
 
 from __future__ import annotations
 
@@ -18,4 +18,17 @@ def first_order_lag(steps: FloatArray, values: FloatArray, lag: float) -> FloatA
         slope = (values[i + 1] - values[i]) / h
         line = values[i] - slope * lag
         out[i + 1] = line + slope * h + (out[i] - line) * np.exp(-h / lag)
+    return out
+
+
+@jit
+def held_first_order_lag(values: FloatArray, kept: FloatArray, start: float) -> FloatArray:
+    """Return a held signal (m,) seen through a first-order lag, (m + 1,): x[i + 1] = kept[i] x[i] + (1 - kept[i]) values[i].
+
+    kept (m,) is exp(-step / lag) of each interval; start is x[0].
+    """
+    out = np.empty(values.shape[0] + 1)
+    out[0] = start
+    for i in range(values.shape[0]):
+        out[i + 1] = kept[i] * out[i] + (1.0 - kept[i]) * values[i]
     return out

@@ -18,8 +18,8 @@ from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.first_order_lag import held_first_order_lag
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
-from fieldsid.numerics.jit import jit
 from fieldsid.numerics.tail_probabilities import chi_square_tail
 
 MEMORY_TIME_CONSTANTS_S = (1.5, 5.0, 12.0)
@@ -35,16 +35,7 @@ class ScoreTest:
 
 def fading_mean(values: FloatArray, record: Record, memory: float) -> FloatArray:
     """Return the exponentially fading mean (n,) of values (n,) over a memory in s, started at their first value."""
-    return _faded(values, np.exp(-record.steps / memory))
-
-
-@jit
-def _faded(values: FloatArray, kept: FloatArray) -> FloatArray:
-    out = np.empty(values.shape[0])
-    out[0] = values[0]
-    for i in range(kept.shape[0]):
-        out[i + 1] = kept[i] * out[i] + (1.0 - kept[i]) * values[i]
-    return out
+    return held_first_order_lag(values[:-1], np.exp(-record.steps / memory), float(values[0]))
 
 
 def features(record: Record) -> dict[str, FloatArray]:

@@ -23,6 +23,7 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.whiten import whiten
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.block_means import block_means
 from fieldsid.numerics.ljung_box import ljung_box_p
 from fieldsid.numerics.tail_probabilities import chi_square_tail, f_tail, pearson3_tail
 
@@ -111,8 +112,8 @@ def _features(run: Innovations, width: int) -> dict[str, FloatArray]:
     lags = max(1, round(HISTORY_SPAN_S / ENERGY_WINDOW_S * 4))
     parts: dict[str, FloatArray] = {"rate x |rate|": rate * np.abs(rate), "rate cubed": rate**3, "fin x rate": fin * rate}
     parts |= {"rate": rate, "fin x |fin|": fin * np.abs(fin), "fin squared": fin**2, "rate squared": rate**2}
-    blocks = {name: _blocks(v, width) for name, v in parts.items()}
-    mean = _blocks(fin, width)
+    blocks = {name: block_means(v, width) for name, v in parts.items()}
+    mean = block_means(fin, width)
     for lag in range(lags):
         blocks[f"fin {lag} blocks before"] = np.concatenate([np.zeros(lag), mean[: mean.size - lag]])
     return blocks
@@ -139,7 +140,7 @@ def _slow(run: Innovations, seconds: float) -> tuple[FloatArray, int]:
     """
     width = max(1, round(seconds / float(np.median(run.record.steps))))
     channel = 1 if run.record.rate_ok.any() else 0
-    return _blocks(run.white[channel], width) * np.sqrt(width), width
+    return block_means(run.white[channel], width) * np.sqrt(width), width
 
 
 def _breusch_pagan(runs: Sequence[Innovations]) -> tuple[float, str]:
@@ -154,7 +155,7 @@ def _breusch_pagan(runs: Sequence[Innovations]) -> tuple[float, str]:
         slow, width = _slow(run, BREUSCH_PAGAN_BLOCK_S)
         fin, rate = run.record.fin - run.record.fin.mean(), run.rate
         size.append(slow**2)
-        parts.append([_blocks(v, width) for v in (rate**2, fin**2, np.abs(fin * rate))])
+        parts.append([block_means(v, width) for v in (rate**2, fin**2, np.abs(fin * rate))])
     y = np.concatenate(size)
     best, name = 1.0, ""
     for what, blocks in zip(("rate squared", "fin squared", "|fin x rate|"), zip(*parts, strict=True), strict=True):
@@ -207,7 +208,7 @@ def _homoscedasticity(runs: Sequence[Innovations]) -> float:
     Of w blocks with variance one the mean square X has the cumulants (r-1)! (2/w)^(r-1); the sum of (X - 1)^2 over windows is
     tested by its first three moments (Pearson's type III).
     """
-    squared = [_blocks(_slow(run, HOMOSCEDASTICITY_BLOCK_S)[0] ** 2, BLOCKS_PER_WINDOW) for run in runs]
+    squared = [block_means(_slow(run, HOMOSCEDASTICITY_BLOCK_S)[0] ** 2, BLOCKS_PER_WINDOW) for run in runs]
     y = np.concatenate([(x / x.mean() - 1.0) ** 2 for x in squared if x.size > 1 and x.mean() > 0.0] or [np.zeros(0)])
     if y.size < MIN_BLOCKS:
         return 1.0
@@ -224,12 +225,7 @@ def _energy(run: Innovations, channel: int, *, slow: bool) -> tuple[int, FloatAr
         return None
     sample = float(np.median(run.record.steps))
     block = max(1, round(ENERGY_WINDOW_S / 8 / sample)) if slow else 1
-    e = _blocks(run.white[channel], block) * np.sqrt(block)
+    e = block_means(run.white[channel], block) * np.sqrt(block)
     width = max(4, round(ENERGY_WINDOW_S / sample / block))
-    energy = _blocks(e**2, width) * width
+    energy = block_means(e**2, width) * width
     return (width, energy) if energy.size else None
-
-
-def _blocks(values: FloatArray, width: int) -> FloatArray:
-    count = values.size // width
-    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))

@@ -13,8 +13,8 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
-from fieldsid.noise.white_floor import white_floor
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.white_noise import white_noise_std
 
 MIN_TIME_CONSTANTS = 5.0
 MAX_SPEED_RANGE = 0.10
@@ -126,7 +126,7 @@ def _filtered(record: Record) -> Iterator[Note]:
     for name, values, ok in _channels(record):
         if not ok.any():
             continue
-        floor, size = white_floor(values, ok), float(np.std(values[ok]))
+        floor, size = white_noise_std(values, ok), float(np.std(values[ok]))
         if floor < MAX_FILTERED_NOISE * size:
             yield Note(
                 "filtered_sensor",

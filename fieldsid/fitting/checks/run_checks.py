@@ -12,7 +12,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.models.record import SPEED_LIMITS_M_S, fin_holes, knows_speed
-from fieldsid.noise.white_floor import white_floor
+from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.vehicle import Vehicle
 
 MAX_OTHER_AXIS_SHARE = 0.3
@@ -91,7 +91,7 @@ def _motion(run: Run, name: str) -> float:
     """Return the standard deviation of a rate with its white noise taken out."""
     ok = np.isfinite(run[name])
     values = run[name][ok]
-    floor = white_floor(np.where(ok, run[name], 0.0), ok)
+    floor = white_noise_std(np.where(ok, run[name], 0.0), ok)
     return float(np.sqrt(max(float(np.var(values)) - (floor**2 if np.isfinite(floor) else 0.0), 0.0)))
 
 

@@ -25,6 +25,7 @@ from fieldsid.logs.convert.frames import unwrapped
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
+from fieldsid.numerics.white_noise import robust_white_noise_std
 
 TURN = 2.0 * math.pi
 FASTEST_RAD_S = 3.0
@@ -146,7 +147,7 @@ def _noise(turned: FloatArray) -> float:
     some = bends[bends > 1e-9]
     if some.size <= RARE * bends.size:
         return 0.0
-    return float(np.median(some)) / (0.6745 * math.sqrt(6.0 if some.size > HELD * bends.size else 2.0))
+    return robust_white_noise_std(some, 2 if some.size > HELD * bends.size else 1)
 
 
 def _swept(time: FloatArray, turned: FloatArray, calm: npt.NDArray[np.intp], rate: Track | None) -> FloatArray | None:

@@ -15,6 +15,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import shifted_correlations
 from fieldsid.numerics.trapezoid import trapezoid_integral
+from fieldsid.numerics.white_noise import robust_white_noise_std
 
 PAIR_WINDOW_S = 1.0
 TRUSTED = 0.8
@@ -72,14 +73,9 @@ def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, f
     if time.size <= 3 * width:
         return None
     a, b = turned[width:] - turned[:-width], swept[width:] - swept[:-width]
-    floor = MIN_NOISE_RATIO * math.sqrt(2.0) * _noise(turned)
-    drift = MIN_NOISE_RATIO * _noise(run[rate][both]) * math.sqrt(PAIR_WINDOW_S * step)
+    floor = MIN_NOISE_RATIO * math.sqrt(2.0) * robust_white_noise_std(np.diff(turned, 2), 2)
+    drift = MIN_NOISE_RATIO * robust_white_noise_std(np.diff(run[rate][both], 2), 2) * math.sqrt(PAIR_WINDOW_S * step)
     return (a, b, step) if float(np.std(a)) > floor and float(np.std(b)) > drift else None
-
-
-def _noise(values: FloatArray) -> float:
-    """Return the standard deviation of white noise on a smooth signal, from its second differences."""
-    return float(np.median(np.abs(np.diff(values, 2)))) / (0.6745 * math.sqrt(6.0))
 
 
 def _swapped(run: Run) -> list[Note]:

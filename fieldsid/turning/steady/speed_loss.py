@@ -18,6 +18,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.block_means import block_means, block_width
 
 BLOCK_S = 0.2
 LEAST_SAMPLES = 40
@@ -147,14 +148,14 @@ def _case(run: Run) -> _Case | None:
         if angle_only
         else np.interp(record.time, record.time[record.rate_ok], record.rate[record.rate_ok])
     )
-    width = max(1, round(BLOCK_S / float(np.median(record.steps))))
+    width = block_width(record.steps, BLOCK_S)
     none = np.full(len(record), np.nan)
     thrust = record.signals.get("thrust")
     start = float(np.median(thrust[: max(10, thrust.size // 20)])) if thrust is not None else 0.0
     ratio = thrust / start if thrust is not None and start > 0 else np.ones(len(record))
     surge = _filled(run, "surge_m_s", none) if knows_speed(run) else none
     columns = (record.time, surge, _filled(run, "sway_m_s", none), rate, record.fin, ratio)
-    blocks = [_blocks(c, width) for c in columns]
+    blocks = [block_means(c, width) for c in columns]
     if blocks[0].size < LEAST_SAMPLES or float(np.max(np.abs(blocks[3]))) < LEAST_TURN_RAD_S:
         return None
     return _Case(*blocks)
@@ -166,11 +167,6 @@ def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:
     values = run[name]
     ok = np.isfinite(values)
     return np.interp(run.time, run.time[ok], values[ok])
-
-
-def _blocks(values: FloatArray, width: int) -> FloatArray:
-    count = values.size // width
-    return np.asarray(values[: count * width].reshape(count, width).mean(axis=1))
 
 
 def _simulated(case: _Case, drag: float, turn: float, fin: float, straight: float, first: float) -> FloatArray:

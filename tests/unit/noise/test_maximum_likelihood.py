@@ -16,8 +16,9 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.maximum_likelihood import NOISE_KINDS, estimate_noise
-from fieldsid.noise.white_floor import lowered_noise_floor, white_floor, white_noise_floor
+from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.noise.whiten import NOISE_FIELDS, noise_vector
+from fieldsid.numerics.white_noise import white_noise_std
 
 SIGMA = 0.005
 TRUTH = np.array([YAW[1].a22, YAW[1].b2, YAW[1].C0])
@@ -27,7 +28,7 @@ TRUTH = np.array([YAW[1].a22, YAW[1].b2, YAW[1].C0])
 def test_the_floor_of_a_smooth_signal_is_its_white_noise(size):
     rng, t = np.random.default_rng(1), np.arange(size) * 0.05
     values = 0.3 * np.sin(0.4 * t) + 0.002 * t + SIGMA * rng.standard_normal(size)
-    assert white_floor(values, np.ones(size, dtype=bool)) == pytest.approx(SIGMA, rel=0.1)
+    assert white_noise_std(values, np.ones(size, dtype=bool)) == pytest.approx(SIGMA, rel=0.1)
 
 
 def test_kinks_and_gaps_do_not_count_as_noise():
@@ -35,11 +36,11 @@ def test_kinks_and_gaps_do_not_count_as_noise():
     ok = np.ones(660, dtype=bool)
     ok[200:240] = False
     values = np.where(ok, 0.2 * np.abs((t % 8.0) - 4.0) + SIGMA * rng.standard_normal(660), 0.0)
-    assert white_floor(values, ok) == pytest.approx(SIGMA, rel=0.15)
+    assert white_noise_std(values, ok) == pytest.approx(SIGMA, rel=0.15)
 
 
 def test_too_few_samples_in_a_row_give_no_floor():
-    assert np.isnan(white_floor(np.zeros(15), np.ones(15, dtype=bool)))
+    assert np.isnan(white_noise_std(np.zeros(15), np.ones(15, dtype=bool)))
 
 
 def test_the_floor_behind_a_fast_vehicles_motion_is_its_sensors_noise():
