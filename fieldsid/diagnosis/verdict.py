@@ -9,11 +9,12 @@ import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, validation_error_ratio
-from fieldsid.diagnosis.evidence.likelihood_fit import JOINT_NOISE, LikelihoodFit
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.residual_tests.residual_tests import MIN_P_VALUE, ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.models.model import Noise
+from fieldsid.noise.noise_kinds import JOINT_NOISE
 
 EVIDENCE_TEMPERATURE = 2.0
 """Divisor of the log evidence before it becomes a probability: the evidence of models that are never exact is overstated."""

@@ -21,7 +21,7 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.fitting.specification import agreement, independence
 from fieldsid.logs.run import Note
 from fieldsid.models.model import Noise
-from fieldsid.noise.maximum_likelihood import LOWER_BOUNDS, UPPER_BOUNDS
+from fieldsid.noise.noise_kinds import NOISE_PARAMETERS
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import MIN_WHITENESS_P
 
@@ -89,8 +89,8 @@ def choose(problem: Problem, plain: Solution, refine: Callable[[], Solution]) ->
 
 def _has_own_time(noise: Noise) -> bool:
     """Whether the correlation time of the disturbance is inside the range looked through, not at its end."""
-    low, high = (bounds["disturbance_time"] for bounds in (LOWER_BOUNDS, UPPER_BOUNDS))
-    return low * (1.0 + EDGE) < noise.disturbance_time < high * (1.0 - EDGE)
+    bounds = NOISE_PARAMETERS["disturbance_time"]
+    return bounds.low * (1.0 + EDGE) < noise.disturbance_time < bounds.high * (1.0 - EDGE)
 
 
 def best_start(problem: Problem, x: FloatArray, weights: Noise) -> FloatArray:

@@ -8,16 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.models.record import Record
-from fieldsid.noise.kalman.dispatch import kalman_filter
+from fieldsid.noise.innovations import kalman_filter
 from fieldsid.noise.kalman.full_batched import LANES, full_filter_batched
+from fieldsid.noise.noise_kinds import IS_STANDARD_DEVIATION
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
 LOG_STEP = 3e-4
 """Relative change of a noise's number whose effect is taken for a derivative."""
 STEP_FACTOR, PER_STEP = float(np.exp(LOG_STEP)), 1.0 / LOG_STEP
-IS_STANDARD_DEVIATION = np.array([True, True, True, False, True, True, False])
-"""Places in a noise's vector of its standard deviations, the others being correlation times."""
 
 
 @dataclass(frozen=True, slots=True)

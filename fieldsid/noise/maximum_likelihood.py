@@ -11,9 +11,9 @@ import numpy.typing as npt
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.fisher_scoring import information, innovations_of
-from fieldsid.noise.kalman.dispatch import innovations
+from fieldsid.noise.innovations import innovations
+from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
-from fieldsid.noise.whiten import NOISE_FIELDS
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
@@ -31,22 +31,6 @@ BELOW_ANY_BOUND = 1e-12
 MIN_SCORING_GAIN = 0.02
 """Log likelihood below which another iteration is not worth its cost."""
 GRADIENT_STEP = 1e-4
-
-
-NOISE_KINDS: dict[str, tuple[str, ...]] = {
-    "white": ("angle", "rate"),
-    "disturbance": ("angle", "rate", "disturbance", "disturbance_time"),
-    "coloured": ("angle", "rate", "coloured_angle", "coloured_rate", "coloured_time"),
-    "both": NOISE_FIELDS,
-}
-LOWER_BOUNDS = {
-    "angle": MIN_ANGLE_NOISE_RAD, "rate": MIN_RATE_NOISE_RAD_S, "disturbance": 1e-7, "disturbance_time": 0.1,
-    "coloured_angle": 1e-7, "coloured_rate": 1e-7, "coloured_time": 0.05,
-}  # fmt: skip
-UPPER_BOUNDS = {
-    "angle": 1.0, "rate": 1.0, "disturbance": 10.0, "disturbance_time": 30.0,
-    "coloured_angle": 1.0, "coloured_rate": 1.0, "coloured_time": 30.0,
-}  # fmt: skip
 
 
 def log_likelihood(
@@ -89,15 +73,14 @@ def estimate_noise(
     """
     if not all(np.isfinite(e).all() for e in residuals):
         return start, -np.inf
-    names = NOISE_KINDS[noise_kind]
+    names = NOISE_KINDS[noise_kind].fields
     floor = floor or white_noise_floor(records)
     rough = _rough_start(records, dynamics, residuals, floor, start) if reinitialise else {n: getattr(start, n) for n in names}
-    off = {"disturbance": 0.0, "coloured_angle": 0.0, "coloured_rate": 0.0, "disturbance_time": 1.0, "coloured_time": 1.0}
     low, high = _bounds(names, floor, _resolution(records))
     place = np.array([NOISE_FIELDS.index(n) for n in names])
-    known = np.array([off.get(n, 0.0) for n in NOISE_FIELDS])
+    known = np.array([p.absent for p in NOISE_PARAMETERS.values()])
     slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, likelihood, evaluations or EvaluationCounter())
-    x = np.clip(np.log([max(rough[n], BELOW_ANY_BOUND) for n in names]), low, high)
+    x = np.clip(np.log([max(rough.get(n, getattr(start, n)), BELOW_ANY_BOUND) for n in names]), low, high)
     value, score, fisher = slope.at(x)
     damping = MIN_DAMPING
     for _ in range(MAX_SCORING_ITERATIONS):
@@ -173,8 +156,11 @@ def _bounds(names: tuple[str, ...], floor: Noise, least: tuple[float, float]) ->
     shown = (
         MIN_WHITE_SHARE * seen if seen > bound else bound for seen, bound in zip((floor.angle, floor.rate), least, strict=True)
     )
-    low = LOWER_BOUNDS | dict(zip(("angle", "rate"), shown, strict=True))
-    high = {**UPPER_BOUNDS, "angle": max(2.0 * floor.angle, 2.5 * least[0]), "rate": max(2.0 * floor.rate, 2.5 * least[1])}
+    low = {n: p.low for n, p in NOISE_PARAMETERS.items()} | dict(zip(("angle", "rate"), shown, strict=True))
+    high = {n: p.high for n, p in NOISE_PARAMETERS.items()} | {
+        "angle": max(2.0 * floor.angle, 2.5 * least[0]),
+        "rate": max(2.0 * floor.rate, 2.5 * least[1]),
+    }
     return np.log([low[n] for n in names]), np.log([high[n] for n in names])
 
 

@@ -12,12 +12,9 @@ import numpy as np
 
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.kalman.dispatch import innovations
+from fieldsid.noise.innovations import innovations
+from fieldsid.noise.noise_kinds import NOISE_FIELDS
 from fieldsid.numerics.arrays import FloatArray
-
-NOISE_FIELDS = (
-    "angle", "rate", "disturbance", "disturbance_time", "coloured_angle", "coloured_rate", "coloured_time",
-)  # fmt: skip
 
 
 def noise_vector(noise: Noise) -> FloatArray:

@@ -25,8 +25,6 @@ from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
 
-SINGLE_NOISE_KINDS, JOINT_NOISE = ("disturbance", "coloured"), "both"
-"""Kinds of noise that models are compared under, and both together."""
 MAX_ALTERNATIONS = 3
 MAX_GLS_ITERATIONS = 8
 MIN_LIKELIHOOD_GAIN = 0.5

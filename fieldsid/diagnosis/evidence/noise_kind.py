@@ -12,9 +12,7 @@ from collections.abc import Collection
 from fieldsid.diagnosis.data.noise_floor import MIN_COLOUR_RATIO, reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import ALTERNATIVE_LOG_ODDS
 from fieldsid.diagnosis.evidence.likelihood_fit import (
-    JOINT_NOISE,
     MIN_LIKELIHOOD_GAIN,
-    SINGLE_NOISE_KINDS,
     FittedProblem,
     LikelihoodFit,
     fit_maximum_likelihood,
@@ -22,6 +20,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.models.model import Noise
+from fieldsid.noise.noise_kinds import JOINT_NOISE, SINGLE_NOISE_KINDS
 
 
 def fit_base(

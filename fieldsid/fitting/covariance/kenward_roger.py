@@ -13,8 +13,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import stdtrit
 
-from fieldsid.noise.maximum_likelihood import NOISE_KINDS
-from fieldsid.noise.whiten import NOISE_FIELDS
+from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS
 from fieldsid.numerics.arrays import FloatArray
 
 LOG_NOISE_STEP = 0.05
@@ -30,7 +29,7 @@ KNOWN_NOISE_SAMPLES = 20_000
 
 def noise_covariance(likelihood: Callable[[FloatArray], float], noise: FloatArray, noise_kind: str) -> FloatArray:
     """Return the covariance (p, p) of the logs of a family's noise numbers, at a noise vector (7,)."""
-    names = NOISE_KINDS[noise_kind]
+    names = NOISE_KINDS[noise_kind].fields
 
     def at(*moves: tuple[int, float]) -> float:
         return likelihood(with_log_steps(noise, names, moves))
@@ -65,7 +64,7 @@ def kenward_roger(
     `found(noise vector)` gives the estimate (F,) under that noise and its covariance (F, F); `spread` is the covariance of the
     logs of the noise parameters; `fewest` the least degrees of freedom of a variance.
     """
-    names = NOISE_KINDS[noise_kind]
+    names = NOISE_KINDS[noise_kind].fields
     slopes, gradients = [], []
     for i in range(len(names)):
         (x_up, c_up), (x_down, c_down) = (

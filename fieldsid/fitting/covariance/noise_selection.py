@@ -6,6 +6,7 @@ from fieldsid.fitting.covariance.reml import select_noise
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
 from fieldsid.models.model import Noise
+from fieldsid.noise.noise_kinds import NOISE_KINDS
 from fieldsid.noise.whiten import is_white, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import MIN_WHITENESS_P, ljung_box_p
@@ -41,13 +42,8 @@ def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, 
 
 
 def _words(noise_kind: str, p: float) -> str:
-    kinds = {
-        "white": "no coloured noise fits them better than white noise",
-        "disturbance": "of the noises compared a disturbance moment fits them best",
-        "coloured": "of the noises compared coloured sensor noise fits them best",
-        "both": "of the noises compared a disturbance moment with coloured sensor noise fits them best",
-    }
+    says = NOISE_KINDS[noise_kind].says
     return (
-        f"residuals are not white (p = {p:.2g}): {kinds[noise_kind]}, and the standard errors are those of that noise; "
+        f"residuals are not white (p = {p:.2g}): {says}, and the standard errors are those of that noise; "
         "an effect that the model lacks leaves such residuals too: `sysid diagnose`"
     )

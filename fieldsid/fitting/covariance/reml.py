@@ -11,8 +11,9 @@ from fieldsid.fitting.optimise.levenberg_marquardt import covariance
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.kalman.dispatch import innovations
-from fieldsid.noise.maximum_likelihood import NOISE_KINDS, estimate_noise
+from fieldsid.noise.innovations import innovations
+from fieldsid.noise.maximum_likelihood import estimate_noise
+from fieldsid.noise.noise_kinds import JOINT_NOISE, NOISE_KINDS
 from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import MIN_WHITENESS_P, ljung_box_p
@@ -118,10 +119,10 @@ def select_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, No
     found: dict[str, tuple[Noise, float]] = {}
 
     def worth(noise_kind: str) -> float:
-        return found[noise_kind][1] - PENALTY_PER_PARAMETER * len(NOISE_KINDS[noise_kind])
+        return found[noise_kind][1] - PENALTY_PER_PARAMETER * len(NOISE_KINDS[noise_kind].fields)
 
     for noise_kind in NOISE_KINDS:
-        if noise_kind == "both" and innovations_are_white(lines, max(found, key=worth), found):
+        if noise_kind == JOINT_NOISE and innovations_are_white(lines, max(found, key=worth), found):
             continue
         found[noise_kind] = reml_noise(problem, lines, noise_kind, start)
     best = max(found, key=worth)

@@ -25,7 +25,7 @@ def full_filter_batched(
 ) -> None:  # fmt: skip
     """Fill errors (8, 2, n) with the standardised innovations of a residual (2, n), and spreads with their deviations.
 
-    noises is (8, 7) in the order of whitening.NOISE_FIELDS, no standard deviation nil. Samples not measured give zero and one.
+    noises is (8, 7) in the order of NOISE_FIELDS, no standard deviation nil. Samples not measured give zero and one.
     """
     n = steps.shape[0] + 1
     # one flat array of rows of eight at known places: only so is the compiler sure that no lane writes what another reads

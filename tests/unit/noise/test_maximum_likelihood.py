@@ -15,9 +15,10 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
-from fieldsid.noise.maximum_likelihood import NOISE_KINDS, estimate_noise
+from fieldsid.noise.maximum_likelihood import estimate_noise
+from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS
 from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
-from fieldsid.noise.whiten import NOISE_FIELDS, noise_vector
+from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.white_noise import white_noise_std
 
 SIGMA = 0.005
@@ -158,8 +159,8 @@ def test_a_variance_known_from_ten_samples_widens_the_interval_to_students():
 @pytest.mark.parametrize("family", NOISE_KINDS)
 def test_moving_a_number_moves_that_one_alone(family):
     vector = np.arange(1.0, 8.0)
-    for i, name in enumerate(NOISE_KINDS[family]):
-        there = with_log_steps(vector, NOISE_KINDS[family], ((i, np.log(2.0)),))
+    for i, name in enumerate(NOISE_KINDS[family].fields):
+        there = with_log_steps(vector, NOISE_KINDS[family].fields, ((i, np.log(2.0)),))
         at = NOISE_FIELDS.index(name)
         assert there[at] == pytest.approx(2 * vector[at])
         assert np.delete(there, at) == pytest.approx(np.delete(vector, at))

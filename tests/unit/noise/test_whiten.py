@@ -9,9 +9,9 @@ from scipy.linalg import expm
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
+from fieldsid.noise import innovations, noise_kinds
 from fieldsid.noise.fisher_scoring import information, innovations_of
-from fieldsid.noise.kalman import dispatch
-from fieldsid.noise.kalman.dispatch import kalman_filter
+from fieldsid.noise.innovations import kalman_filter
 from fieldsid.noise.kalman.full_batched import full_filter_batched
 from fieldsid.noise.kalman.transition import transition
 from fieldsid.noise.maximum_likelihood import log_likelihood
@@ -107,8 +107,8 @@ def test_a_compiled_filter_gives_the_numbers_of_its_python_source(family, monkey
     found = []
     for plain in (False, True):
         if plain:
-            for name in ("disturbance_filter", "sensor_colour_filter", "full_filter"):
-                monkeypatch.setattr(dispatch, name, plain_of(getattr(dispatch, name)))
+            monkeypatch.setattr(noise_kinds, "sensor_colour_filter", plain_of(noise_kinds.sensor_colour_filter))
+            monkeypatch.setattr(innovations, "FILTERS", tuple((plain_of(f), absent) for f, absent in innovations.FILTERS))
         out, spreads = np.empty_like(series), np.empty((2, len(log)))
         found.append((kalman_filter(log.nominal_steps, log.ok, A, K, noise, series, out, spreads), out, spreads))
     for fast, slow in zip(*found, strict=True):

@@ -9,7 +9,7 @@ import pytest
 import runaway
 from in_time import in_time
 
-from fieldsid.diagnosis.evidence.likelihood_fit import SINGLE_NOISE_KINDS, fit_maximum_likelihood
+from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.errors import DivergenceError
@@ -23,7 +23,8 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
-from fieldsid.noise.maximum_likelihood import NOISE_KINDS, estimate_noise, log_likelihood
+from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
+from fieldsid.noise.noise_kinds import NOISE_KINDS, SINGLE_NOISE_KINDS
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import noise_vector
 

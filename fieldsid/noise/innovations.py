@@ -1,7 +1,7 @@
-"""The Kalman filter of the motion that disturbances and coloured sensor noise cause: which of three a noise asks for.
+"""Innovations of a residual: the Kalman filter of the motion that disturbances and coloured sensor noise cause.
 
-State (y, p, w, n_y, n_p), see noise/whiten.py; a noise is a vector (7,) in the order of whitening.NOISE_FIELDS. What is
-zero for good is left out, and each filter is compiled only once it is asked for.
+State (y, p, w, n_y, n_p), see noise/whiten.py; a noise is a vector (7,) in the order of NOISE_FIELDS. The filter is that of the
+first kind in NOISE_KINDS that holds all of the noise; each is compiled only once it is called.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.noise.kalman.disturbance import disturbance_filter
-from fieldsid.noise.kalman.full import full_filter
-from fieldsid.noise.kalman.sensor_colour import sensor_colour_filter
+from fieldsid.noise.noise_kinds import NOISE_KINDS
 from fieldsid.numerics.arrays import FloatArray
+
+FILTERS = tuple((kind.filter, kind.absent) for kind in NOISE_KINDS.values())
 
 
 def kalman_filter(
@@ -26,11 +26,7 @@ def kalman_filter(
     spreads: FloatArray,
 ) -> float:
     """Do what `innovations` does, and fill spreads (2, n) with their standard deviations, one where not measured."""
-    if noise[4] == 0.0 and noise[5] == 0.0:
-        return disturbance_filter(steps, ok, a, k, noise, series, out, spreads)
-    if noise[2] == 0.0:
-        return sensor_colour_filter(steps, ok, noise, series, out, spreads)
-    return full_filter(steps, ok, a, k, noise, series, out, spreads)
+    return next(f for f, absent in FILTERS if not any(noise[i] for i in absent))(steps, ok, a, k, noise, series, out, spreads)
 
 
 def innovations(

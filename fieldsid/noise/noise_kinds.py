@@ -1,0 +1,86 @@
+"""The kinds of noise: which processes each holds, the filter that whitens it, and the bounds of each parameter.
+
+To add a kind of the processes that are here, add a `NoiseKind`. To add a process, add its parameters to `models.model.Noise` and
+to NOISE_PARAMETERS, and write its filter in `kalman/`, which takes the same arguments as `full_filter`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.noise.kalman.disturbance import disturbance_filter
+from fieldsid.noise.kalman.full import full_filter
+from fieldsid.noise.kalman.sensor_colour import sensor_colour_filter
+from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
+from fieldsid.numerics.arrays import BoolArray, FloatArray
+
+Filter = Callable[[FloatArray, BoolArray, float, float, FloatArray, FloatArray, FloatArray, FloatArray], float]
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseParameter:
+    """Bounds of a field of `Noise`, and its value where a kind does not have it; a standard deviation (SI) or a time in s."""
+
+    low: float
+    high: float
+    absent: float = 0.0
+    is_standard_deviation: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseKind:
+    """Fields of `Noise` that are estimated, the filter of this noise, and what residuals of this kind are said to be."""
+
+    fields: tuple[str, ...]
+    filter: Filter
+    says: str
+
+    @property
+    def absent(self) -> tuple[int, ...]:
+        """The places in the noise vector of the standard deviations that are zero."""
+        return tuple(i for i, (n, p) in enumerate(NOISE_PARAMETERS.items()) if p.is_standard_deviation and n not in self.fields)
+
+
+def _without_motion(
+    steps: FloatArray, ok: BoolArray, _a: float, _k: float, noise: FloatArray,
+    series: FloatArray, out: FloatArray, innovation_std: FloatArray,
+) -> float:  # fmt: skip
+    return sensor_colour_filter(steps, ok, noise, series, out, innovation_std)
+
+
+NOISE_PARAMETERS = {
+    "angle": NoiseParameter(MIN_ANGLE_NOISE_RAD, 1.0),
+    "rate": NoiseParameter(MIN_RATE_NOISE_RAD_S, 1.0),
+    "disturbance": NoiseParameter(1e-7, 10.0),
+    "disturbance_time": NoiseParameter(0.1, 30.0, absent=1.0, is_standard_deviation=False),
+    "coloured_angle": NoiseParameter(1e-7, 1.0),
+    "coloured_rate": NoiseParameter(1e-7, 1.0),
+    "coloured_time": NoiseParameter(0.05, 30.0, absent=1.0, is_standard_deviation=False),
+}
+NOISE_FIELDS = tuple(NOISE_PARAMETERS)
+"""The order of a noise vector."""
+IS_STANDARD_DEVIATION: npt.NDArray[np.bool_] = np.array([p.is_standard_deviation for p in NOISE_PARAMETERS.values()])
+
+NOISE_KINDS = {
+    "white": NoiseKind(("angle", "rate"), disturbance_filter, "no coloured noise fits them better than white noise"),
+    "disturbance": NoiseKind(
+        ("angle", "rate", "disturbance", "disturbance_time"),
+        disturbance_filter,
+        "of the noises compared a disturbance moment fits them best",
+    ),
+    "coloured": NoiseKind(
+        ("angle", "rate", "coloured_angle", "coloured_rate", "coloured_time"),
+        _without_motion,
+        "of the noises compared coloured sensor noise fits them best",
+    ),
+    "both": NoiseKind(
+        NOISE_FIELDS, full_filter, "of the noises compared a disturbance moment with coloured sensor noise fits them best"
+    ),
+}
+"""The kinds that a fit compares, simple ones first: the first that holds all of a noise filters it."""
+SINGLE_NOISE_KINDS, JOINT_NOISE = ("disturbance", "coloured"), "both"
+"""The kinds that models are compared under, and all of them together."""
