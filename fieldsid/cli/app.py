@@ -23,8 +23,8 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 JOURNAL = "journal.jsonl"
 """The file that marks a trial folder, as `fieldsid/trial_folder/journal.py` has it: known here without its imports."""
 GC_THRESHOLD = 50_000
-"""Things made since the last look from which on Python looks for what can be given back. What is imported and compiled makes
-millions that stay: looking at Python's own pace takes a fifth of the time of compiling, a twentieth of a tour."""
+"""Objects allocated between two runs of the garbage collector. Imports and compilation allocate millions that stay: at Python's own
+threshold the collector takes a fifth of the time of compiling, a twentieth of a tour."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,7 +59,7 @@ def entry() -> Never:
 
 
 def _end(codes: list[int]) -> None:
-    """End without giving back piece by piece what the system takes as a whole: for compiled code half a second."""
+    """End the process without freeing its memory piece by piece, which takes half a second for compiled code."""
     try:
         sys.stdout.flush()
         sys.stderr.flush()

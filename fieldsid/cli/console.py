@@ -22,7 +22,7 @@ WIDTH = 80
 
 
 def out() -> Console:
-    """Return the console of the data; made anew so that it follows a redirected stdout."""
+    """Return the console of the data; made at each call so that it follows a redirected stdout."""
     return _console(stderr=False)
 
 

@@ -1,4 +1,4 @@
-"""What the user reads when something went wrong: three parts on stderr, or where the trace of our bug is."""
+"""What the user reads after an error: its three parts on stderr, or, for a bug of ours, where the trace is."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from fieldsid.cli.exit_codes import BAD_INPUT, INTERRUPTED, OUR_BUG
 from fieldsid.errors import FieldsidError, UsageError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""What the system answers where a disk, or a user's share of it, is full."""
+"""Error numbers of the system where a disk, or a user's quota, is full."""
 
 CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EISDIR, errno.EIO)
-"""What it answers where a path leads nowhere that may be read or written."""
+"""Error numbers of the system where a path cannot be read or written."""
 
 
 def explain(error: Exception, arguments: Sequence[str]) -> int:
@@ -48,13 +48,13 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
 
 def tell_refused(errors: Sequence[FieldsidError], raised: Exception | None) -> None:
     """Print on stderr why parts that are not built in took none, but for the one that an error was raised for."""
-    told: list[BaseException] = []
+    printed: list[BaseException] = []
     cause: BaseException | None = raised
     while cause is not None:
-        told.append(cause)
+        printed.append(cause)
         cause = cause.__cause__
     for error in errors:
-        if not any(error is one for one in told):
+        if not any(error is one for one in printed):
             found, hint = (f"\n  {word}: {said}" if said else "" for word, said in (("found", error.found), ("hint", error.hint)))
             sys.stderr.write(f"warning: {error.what}; it takes no part{found}{hint}\n")
 

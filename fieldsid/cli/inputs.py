@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 STDIN = Path("-")
 READING = ("pandas", "pyarrow")
-"""What takes most of the time of reading the first log. Once it is here a copy of the process has nothing to save."""
+"""Libraries whose import takes most of the time of reading the first log; once they are loaded, a worker saves nothing."""
 
 
 def read_runs(
@@ -37,10 +37,10 @@ def read_runs(
 ) -> list[Run]:
     """Return the runs of the files, each with a name of its own, cut to `start` .. `end` s where given.
 
-    check: what can be wrong with all else that was given: what it raises waits for no file, and comes before what is wrong with
-    one. meanwhile: what this process does while a copy of it reads the files, where there can be one and this process has not
-    read any before. refused is told of each of several files that cannot be read; without it, and where none can, raises
-    LogError, MappingError, and DataError where the cut leaves nothing. Raises UsageError where two files hold the same data.
+    check validates all other arguments; its errors come before those of a file. meanwhile is what this process does while a forked
+    worker reads the files, where it can be forked and has not read any before. refused is called with each of several files that
+    cannot be read, and the error; without it, and where no file can be read, raises LogError, MappingError, and DataError where
+    the cut leaves nothing. Raises UsageError where two files hold the same data.
     """
     (runs,) = read_groups([paths], mapping=mapping, start=start, end=end, check=check, meanwhile=meanwhile, refused=refused)
     return runs
@@ -64,8 +64,8 @@ def read_groups(
     if paths.count(STDIN) > 1:
         raise UsageError("standard input can be read once", found="`-` twice", hint="save the second log to a file")
     read = partial(_read, mapping=mapping_of(mapping), part=between(start, end))
-    pays = STDIN not in paths and not any(library in sys.modules for library in READING)
-    known = _read_beside(read, paths, check, meanwhile) if meanwhile is not None and pays else None
+    is_worth_forking = STDIN not in paths and not any(library in sys.modules for library in READING)
+    known = _read_in_worker(read, paths, check, meanwhile) if meanwhile is not None and is_worth_forking else None
     if known is None:
         check()
     outcomes = iter(known or (attempt(read, path) for path in paths))
@@ -90,7 +90,7 @@ def read_run(path: Path, *, mapping: Path | None = None) -> Run:
 
 
 def mapping_of(path: Path | None) -> ChannelMap | None:
-    """Return what a mapping file says: what is wrong with it is wrong for all logs."""
+    """Return the mapping of a file; its errors are raised before any log is read."""
     if path is None:
         return None
     from fieldsid.logs.mapping.mapping_file import load_mapping
@@ -125,10 +125,10 @@ def _read(path: Path, mapping: ChannelMap | None, part: tuple[float, float]) -> 
     return load_run(path, mapping, part=part)
 
 
-def _read_beside(
+def _read_in_worker(
     read: Callable[[Path], Run], paths: Sequence[Path], check: Callable[[], None], meanwhile: Callable[[], None]
 ) -> list[Run | FieldsidError] | None:
-    """Return the runs as a copy of this process read them, or why not; None where it did not: what is wrong is met again here."""
+    """Return the runs, or errors, that a forked worker read; None where it gave no answer: the files are then read here."""
     from fieldsid.logs.several.sifting import attempt
 
     worker = fork_worker(lambda: dumps([attempt(read, path) for path in paths]))

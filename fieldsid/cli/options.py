@@ -47,7 +47,7 @@ OutputDir = Annotated[
 OutputFile = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False)]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures beside what is written.")]
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures next to the files that are written.")]
 
 
 def names_of(text: str | None) -> tuple[str, ...]:

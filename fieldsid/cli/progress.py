@@ -1,4 +1,4 @@
-"""What a command that takes seconds does for who waits: refuse an output that exists at once, show what is being tried."""
+"""For commands that take seconds: an output that exists is refused before the work, and a terminal shows the progress."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def trying(says: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def compiling(context: typer.Context, *besides: Callable[[], None]) -> Iterator[Warmup]:
-    """Be inside what fits later: the first time on a machine a forked worker compiles, and a terminal shows that.
+    """Compile the kernels in a forked worker while the context runs, the first time on a machine; a terminal shows that.
 
     Yields the warm-up, that of the command's session where it is part of one; see `fitting.jit_warmup.warming_up`.
     """
@@ -72,14 +72,14 @@ def compiling(context: typer.Context, *besides: Callable[[], None]) -> Iterator[
 
 @contextmanager
 def compiling_first(context: typer.Context) -> Iterator[None]:
-    """Be inside what fits at once: the first time on a machine two cores compile before it."""
+    """Compile the kernels on two cores before the context runs, the first time on a machine."""
     with compiling(context) as warmup:
         warmup.compile_now()
         yield
 
 
 def get_ready(*modules: str) -> None:
-    """Import what a command needs and load what it compiled: what can be done while its logs are read."""
+    """Import the modules of a command and load its compiled kernels, while a worker reads its logs."""
     for module in modules:
         import_module(module)
     from fieldsid.fitting.jit_warmup import load_compiled

@@ -1,4 +1,4 @@
-"""Logs that a command could not use: told on stderr one by one, listed in its JSON, and the exit code says it too."""
+"""Logs that a command could not use: each is named on stderr and listed in the JSON, and the exit code is 1."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 class Skips:
-    """What one command skips; `skip` is what a step is given to tell of each log that it cannot use."""
+    """The logs that one command skips; a step calls `skip` for each log that it cannot use."""
 
     def __init__(self) -> None:
         self.records: list[dict[str, Any]] = []
         self._runs: set[str] = set()
 
     def skip(self, log: Path | Run, error: FieldsidError) -> None:
-        """Keep in mind that a log cannot be used, and say so with the reason."""
+        """Record that a log cannot be used, and print the reason on stderr."""
         from fieldsid.logs.several.run_names import stem_of
 
         file = log if isinstance(log, Path) else log.source

@@ -16,7 +16,7 @@ from fieldsid.models.effect import Coefficient, Core, Values, Variant
 def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
     """Return the two numbers of a cross state, `cross` its name and builds_up what drives it and where to, in words.
 
-    A state slower than ten seconds cannot be told from a drift in runs of a minute.
+    A state slower than ten seconds cannot be distinguished from a drift in runs of a minute.
     """
     return (
         Coefficient(

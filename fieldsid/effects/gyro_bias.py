@@ -1,7 +1,7 @@
 """The rate gyro has an offset: rate_measured = rate + bias, rad/s; the angle is right.
 
 In its other form it wanders off as the gyro warms up: rate_measured = rate + bias + bias_drift t, t in minutes from the first
-sample. Shows only where the angle is measured beside the rate, or where the trim is known. Source: Fossen 2011, chapter 11
+sample. It shows only where the angle is measured as well as the rate, or where the trim is known. Source: Fossen 2011, chapter 11
 (strapdown sensors); Groves 2013, chapter 4.
 """
 

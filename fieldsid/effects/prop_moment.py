@@ -1,6 +1,6 @@
 """The propeller turns the hull: moment = prop_moment thrust, in rad/s^2 per unit of the logged thrust.
 
-Swirl over the fins and a thrust line beside the centre of gravity both do this; the trim is then that at zero
+Swirl over the fins, or a thrust line that misses the centre of gravity, does this; the trim is then that at zero
 thrust. Positive turns toward positive angle. In its other forms it has a part with the square of the thrust; in yaw it may
 build up behind it with a first-order lag, as swirl and inflow do, or be trimmed away by the rudder: the trim then has a part
 that goes with the square of the run's speed beside one that stays, counted from 1 m/s, so that with either the two make up

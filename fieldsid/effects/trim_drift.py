@@ -1,6 +1,6 @@
 """The trim moment drifts: moment = drift (t - t_first) / 60, drift in rad/s^2 per minute, t_first the run's first sample.
 
-Flooding, a shifting battery or a cooling servo does this; the trim itself is that of the run's start. Positive
+Flooding, a shifting battery or a cooling servo causes it; the trim parameter is that of the run's start. Positive
 drift turns toward positive angle. In its other form it levels off: drift (1 - exp(-levelling t)) / levelling, or gathers
 pace where levelling is negative. Source: Fossen 2011, section 4.1 (restoring moment of a moving centre of gravity).
 """

@@ -39,7 +39,11 @@ def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
         shown = channel.where[: MOST_BARS // len(failing)]
         where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in shown], ax)
         says = f"where the error of the {channel.name} falls"
-        ax.set_title(f"{says}\n({channel.over_floor:.1f} x its noise; label: rms there over this)", loc="left", fontsize=10)
+        ax.set_title(
+            f"{says}\n({channel.over_floor:.1f} x its noise; label: rms there over the whole run's)",
+            loc="left",
+            fontsize=10,
+        )
 
 
 def view_of(found: Comparison) -> motion.MotionView:
@@ -50,7 +54,7 @@ def view_of(found: Comparison) -> motion.MotionView:
 
 
 def facts(found: Comparison) -> str:
-    """Return the line of facts: speed, rms beside the noise, fit."""
+    """Return the line of facts: speed, rms against the noise, fit."""
     m, floor = found.merit, found.floor
     parts = [f"{found.shown.record.speed:.2f} m/s"] if isfinite(found.shown.record.speed) else []
     for name, unit, rms, noise, fit in (

@@ -42,7 +42,9 @@ def figure(found: Diagnosis) -> Figure:
     sheet.suptitle(fill(f"{found.axis.value}, {found.verdict}: {found.says}", TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
     draw(bars_of(found), left)
     where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in found.where[:MOST_BARS]], right)
-    right.set_title("where the model as it is fails\n(label: rms there over the whole run's)", loc="left", fontsize=10)
+    right.set_title(
+        "share of the base model's error by condition\n(label: rms there over the whole run's)", loc="left", fontsize=10
+    )
     return sheet
 
 
@@ -91,7 +93,7 @@ def draw(bars: list[Bar], ax: Axes) -> None:
 
 
 def words_of(b: Bar, error: float) -> str:
-    """Return what stands beside a bar: the error over the floor, the share of the excess explained if any, the probability."""
+    """Return the label of a bar: the error over the floor, the share of the excess explained if any, the probability."""
     if b.probability is None:
         return f"{error:.2f} x"
     does = "worse" if b.worse else f"{100 * b.explained:.0f} % explained"

@@ -1,4 +1,4 @@
-"""The kinds of files a figure is written as, told by the suffix. Nothing heavy is imported: a command asks before it works."""
+"""The kinds of files a figure is written as, by the suffix. It imports nothing heavy: a command checks before its work."""
 
 from __future__ import annotations
 

@@ -56,12 +56,12 @@ def draw(view: MotionView, axes: Sequence[Axes]) -> None:
         ax.set_xlim(view.record.time[0], view.record.time[-1])
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
-    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlabel("time, s")
 
 
 def draw_angle(view: MotionView, ax: Axes) -> None:
     """Draw the angle in deg."""
-    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][0]} [deg]")
+    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][0]}, deg")
     canvas.dots(ax, view.record.time, view.measured_angle)
     ax.plot(view.record.time, np.degrees(view.angle), color=canvas.SIMULATED, linewidth=1.3, label="simulated")
     canvas.legend_above(ax)
@@ -69,7 +69,7 @@ def draw_angle(view: MotionView, ax: Axes) -> None:
 
 def draw_rate(view: MotionView, ax: Axes) -> None:
     """Draw the rate in deg/s."""
-    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][1]} [deg/s]")
+    canvas.dress(ax, y=f"{SYMBOLS[view.record.axis][1]}, deg/s")
     canvas.dots(ax, view.record.time, view.measured_rate)
     ax.plot(view.record.time, np.degrees(view.rate), color=canvas.SIMULATED, linewidth=1.3)
 
@@ -77,7 +77,7 @@ def draw_rate(view: MotionView, ax: Axes) -> None:
 def draw_fin(view: MotionView, ax: Axes) -> None:
     """Draw the logged fin in deg, and the fin angle that the model makes of it where the two differ."""
     record, logged = view.record, np.degrees(view.record.fin)
-    canvas.dress(ax, y=f"{SYMBOLS[record.axis][2]} [deg]")
+    canvas.dress(ax, y=f"{SYMBOLS[record.axis][2]}, deg")
     name = "measured fin" if record.fin_is_measured else "command"
     style = "steps-post" if record.fin_is_held else "default"
     ax.plot(record.time, logged, color="0.2", linewidth=1.1, drawstyle=style, label=name)

@@ -28,7 +28,7 @@ def draw(view: LegFigure, axes: Sequence[Axes]) -> None:
 
 def draw_command(view: LegFigure, ax: Axes) -> None:
     """Draw the fin in deg, solid where it is commanded, thin where the autopilot is expected to have it."""
-    canvas.dress(ax, y=f"{'rudder' if view.axis is Axis.YAW else 'elevator'} [deg]", title=view.title)
+    canvas.dress(ax, y=f"{'rudder' if view.axis is Axis.YAW else 'elevator'}, deg", title=view.title)
     fin, ours = np.degrees(view.fin), view.autopilot < 0.5
     ax.step(view.time, fin, where="post", color="0.6", linewidth=0.9, label="autopilot")
     ax.step(view.time, np.where(ours, fin, np.nan), where="post", color=canvas.SECOND, linewidth=1.6, label="commanded")
@@ -42,7 +42,7 @@ def draw_command(view: LegFigure, ax: Axes) -> None:
 def draw_angle(view: LegFigure, ax: Axes) -> None:
     """Draw the predicted angle in deg with the 68 and 95 % bands over the prior, and the envelope."""
     yaw = view.axis is Axis.YAW
-    canvas.dress(ax, y=f"{'heading' if yaw else 'pitch'} [deg]", title=_errors(view))
+    canvas.dress(ax, y=f"{'heading' if yaw else 'pitch'}, deg", title=_errors(view))
     low, inner_low, inner_high, high = np.degrees(view.band)
     ax.fill_between(view.time, low, high, color=canvas.SIMULATED, alpha=0.15, linewidth=0, label="95 %")
     ax.fill_between(view.time, inner_low, inner_high, color=canvas.SIMULATED, alpha=0.3, linewidth=0, label="68 %")
@@ -59,7 +59,7 @@ def draw_angle(view: LegFigure, ax: Axes) -> None:
 def draw_track(view: LegFigure, ax: Axes) -> None:
     """Draw the track in m, seen from above for yaw and from the side for pitch, with draws of the prior behind it."""
     yaw = view.axis is Axis.YAW
-    canvas.dress(ax, y="across [m]" if yaw else "depth change [m]")
+    canvas.dress(ax, y="across, m" if yaw else "depth change, m")
     for along, across in zip(view.tracks[0], view.tracks[1], strict=True):
         ax.plot(along, across, color=canvas.QUIET, linewidth=0.6)
     ax.plot(view.along, view.across, color=canvas.SIMULATED, linewidth=1.5)
@@ -83,7 +83,7 @@ def save_plan_figure(
     grid = figure.subplots(len(shown), 3, squeeze=False, width_ratios=(1.15, 1.15, 1.0))
     for view, row in zip(shown, grid, strict=True):
         draw(view, row)
-    for ax, label in zip(grid[-1], ("time [s]", "time [s]", "along [m]"), strict=True):
+    for ax, label in zip(grid[-1], ("time, s", "time, s", "along, m"), strict=True):
         ax.set_xlabel(label)
     handles = [h for ax in grid[0][:2] for h in ax.get_legend_handles_labels()[0]]
     handles.append(Line2D([], [], label="limit", **LIMIT))

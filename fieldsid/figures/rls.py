@@ -37,7 +37,7 @@ def draw(view: TrackView, ax: Axes, index: int) -> None:
     name = view.names[index]
     value, band = view.values[:, index], BAND * view.std_errors[:, index]
     unit = view.units.get(name, "")
-    canvas.dress(ax, y=f"{name} [{unit}]" if unit else name)
+    canvas.dress(ax, y=f"{name}, {unit}" if unit else name)
     ax.fill_between(view.time, value - band, value + band, color=canvas.SECOND, alpha=0.2, linewidth=0, label="95 % band")
     ax.plot(view.time, value, color=canvas.SECOND, linewidth=1.3, label="estimate")
     ax.axhline(float(value[-1]), color="0.3", linewidth=0.8, linestyle=":", label="last value")
@@ -64,7 +64,7 @@ def panels(view: TrackView, title: str) -> Figure:
     for i, ax in enumerate(axes):
         draw(view, ax, i)
     canvas.legend_above(axes[0])
-    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlabel("time, s")
     figure.align_ylabels(list(axes))
     return figure
 

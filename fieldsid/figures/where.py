@@ -24,7 +24,7 @@ class Bar:
 
 def draw(bars: Sequence[Bar], ax: Axes) -> None:
     """Draw one bar per condition, the largest share at the top; bars worse than the run as a whole stand out."""
-    canvas.dress(ax, x="share of the squared error [%]")
+    canvas.dress(ax, x="share of the squared error, %")
     ordered = sorted(bars, key=lambda b: b.share)
     colours = [canvas.SIMULATED if b.ratio > WORSE else canvas.QUIET for b in ordered]
     ax.barh(range(len(ordered)), [100 * b.share for b in ordered], color=colours, height=0.66)

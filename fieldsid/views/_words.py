@@ -1,4 +1,4 @@
-"""Words that several views share: numbers with their errors, errors beside the noise, warnings, rows as tables."""
+"""Blocks that several views share: numbers with their errors, errors against the noise, warnings, rows as tables."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def parameter_rows(model: Model) -> list[dict[str, Any]]:
 
 
 def error_facts(m: GoodnessOfFit, floor: Noise) -> list[tuple[str, str]]:
-    """Return the free-run error of angle and rate beside the noise, nothing of a channel that was not measured."""
+    """Return the free-run error of angle and rate against the noise, nothing of a channel that was not measured."""
     channels = (
         ("angle error", "rad", m.angle_rms, floor.angle, m.angle_fit),
         ("rate error", "rad/s", m.rate_rms, floor.rate, m.rate_fit),

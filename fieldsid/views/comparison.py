@@ -65,7 +65,7 @@ def frames(found: Comparison) -> Mapping[str, Callable[[], DataFrame]]:
 
 
 def figures(found: Comparison) -> Mapping[str, Callable[[], Any]]:
-    """Return the free run against its measurement beside where the error falls."""
+    """Return the free run against its measurement, and where the error falls."""
     from fieldsid.figures.compare import figure
 
     return {"motion": lambda: figure(found, found.model, "the model")}

@@ -67,7 +67,7 @@ def frames(found: Diagnosis) -> Mapping[str, Callable[[], DataFrame]]:
 
 
 def figures(found: Diagnosis) -> Mapping[str, Callable[[], Any]]:
-    """Return the candidates' errors beside where the model fails."""
+    """Return the candidates' errors, and where the model fails."""
     from fieldsid.figures.diagnose import figure
 
     return {"candidates": lambda: figure(found)}

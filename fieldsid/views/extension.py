@@ -1,4 +1,4 @@
-"""An extension: the effects added, the error before and after beside the noise floor, and the model with them."""
+"""An extension: the effects added, the error before and after against the noise floor, and the model with them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def line(found: Extension) -> str:
-    """Return what was added, what that did to the error, and whether it pays."""
+    """Return the effects added, the error before and after, and whether the addition is kept."""
     return f"{'+'.join(found.gain.added)}: {_fall(found)}, {_verdict(found)}"
 
 

@@ -1,4 +1,4 @@
-"""A measured circle beside its prediction, in one line."""
+"""A measured circle and its prediction, in one line."""
 
 from __future__ import annotations
 

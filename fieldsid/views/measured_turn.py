@@ -1,4 +1,4 @@
-"""A measured circle: its radius with error, what it was flown with, and the track."""
+"""A measured circle: its radius with error, the speed and fin of the turn, and the track."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def line(turn: MeasuredTurn) -> str:
 
 
 def page(turn: MeasuredTurn) -> Page:
-    """Return the circle and what it was flown with."""
+    """Return the circle, and the speed and fin of the turn."""
     circle = turn.circle
     known = facts(
         "Statistics",

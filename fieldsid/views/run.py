@@ -45,8 +45,8 @@ def page(run: Run) -> Page:
         ),
     )
     signals = Block("Signals", tuple(rows), ("", "unit", "measured", "least", "largest"), left=2)
-    told = tuple(n.message for n in run.notes if n.code in QUIET)
-    return Page(f"Run {cut(run.name, 60)}", warned(n for n in run.notes if n.code not in QUIET), (known, signals), told)
+    quiet = tuple(n.message for n in run.notes if n.code in QUIET)
+    return Page(f"Run {cut(run.name, 60)}", warned(n for n in run.notes if n.code not in QUIET), (known, signals), quiet)
 
 
 def frames(run: Run) -> Mapping[str, Callable[[], DataFrame]]:

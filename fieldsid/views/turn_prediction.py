@@ -1,4 +1,4 @@
-"""A prediction of turns: radius over speed to both sides with bands, beside the measured circles."""
+"""A prediction of turns: radius over speed to both sides with bands, and the measured circles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A verification: margins and steps of a schedule over the identified set, beside one constant gain."""
+"""A verification: margins and steps of a schedule over the identified set, against those of one constant gain."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def line(found: Verification) -> str:
 
 
 def page(found: Verification) -> Page:
-    """Return a row for each speed, the settling of one constant gain beside it."""
+    """Return a row for each speed, with the settling time of one constant gain."""
     rows = tuple(
         (
             number(a.speed, 3),
@@ -64,7 +64,7 @@ def frames(found: Verification) -> Mapping[str, Callable[[], DataFrame]]:
 
 
 def figures(found: Verification) -> Mapping[str, Callable[[], Any]]:
-    """Return gains and margins over speed beside the steps."""
+    """Return gains and margins over speed, with the steps."""
     from fieldsid.figures.schedule import figure
 
     return {"steps": lambda: figure(found.schedule, found)}

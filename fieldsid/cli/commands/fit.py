@@ -36,7 +36,7 @@ def command(
 
     Takes model files of one axis, or one CSV table with speed_m_s and any of a22,b2,C0,c22,c23,d2,Cb (`<name>_std_error` where
     known; `-` is standard input). With `-o FILE` the laws are written for `turn-radius` and `schedule`, the models with their
-    effects and errors inside, a figure beside them.
+    effects and errors inside, and a figure next to them.
 
     Example: sysid fit models/*.yaml -o law.yaml
     """

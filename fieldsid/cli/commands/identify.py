@@ -64,7 +64,7 @@ def command(
 ) -> Mapping[str, Any]:
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
-    With `-o` each model is written to DIR/RUN_AXIS.yaml with its figure beside it. `auto` is output error, and prediction error
+    With `-o` each model is written to DIR/RUN_AXIS.yaml, with its figure. `auto` is output error, and prediction error
     (pem) where a disturbance, and no missing effect, explains the residuals; it says why. Of several runs one that cannot be used
     is skipped with its reason, and the exit code is 1.
 

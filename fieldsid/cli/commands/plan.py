@@ -31,7 +31,7 @@ def _option(name: str, metavar: str, says: str) -> Any:
 
 
 Speeds = Annotated[Text, _option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.")]
-Believed = Annotated[Path | None, _option("--model", "YAML", "What is believed: a model or a prior file.")]
+Believed = Annotated[Path | None, _option("--model", "YAML", "What is known before: a model or a prior file.")]
 PlannedAxis = Annotated[Axis | None, _option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.")]
 PriorName = Annotated[Text, _option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.")]
 Want = Annotated[
@@ -99,7 +99,7 @@ def command(
 ) -> Mapping[str, Any]:
     """Plan maneuvers: the fin commands that buy the accuracy you want inside your limits, in the fewest minutes.
 
-    The best of the catalogue and of optimised switching signals is tried on hundreds of draws of what is believed;
+    The best of the catalogue and of optimised switching signals is flown by hundreds of draws of the prior;
     each leg says the standard error of every parameter, minutes, metres and the risk. With `-o` the plan, fin
     commands, mission snippets and a figure are written. Every limit is printed, NOT LIMITED where there is none. With
     `--separate` or `--from` there is one leg at every speed, the maneuver that tells the effects apart best.

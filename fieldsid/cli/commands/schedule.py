@@ -196,7 +196,7 @@ def export(
     """Write a schedule as plain YAML, ROS 2 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
 
     `--into FILE --key A.B.C` shows how an existing YAML file would change, comments and order kept, and changes it only with
-    `--write`; the file as it was stays beside it as .bak.
+    `--write`; the file as it was is kept as .bak.
 
     Example: sysid schedule export gains.yaml --to ros2 -o heading.yaml
     """

@@ -33,8 +33,8 @@ def lines(ax):
 def test_panels_show_degrees_with_units_on_every_axis(view):
     figure = motion.panels(view, "run7", "1.5 m/s")
     angle, rate, fin, residual = figure.axes
-    assert [ax.get_ylabel() for ax in figure.axes] == ["yaw [deg]", "yaw rate [deg/s]", "rudder [deg]", "residual / noise"]
-    assert residual.get_xlabel() == "time [s]"
+    assert [ax.get_ylabel() for ax in figure.axes] == ["yaw, deg", "yaw rate, deg/s", "rudder, deg", "residual / noise"]
+    assert residual.get_xlabel() == "time, s"
     np.testing.assert_allclose(lines(angle)["simulated"].get_ydata(), np.degrees(view.angle))
     np.testing.assert_allclose(lines(fin)["command"].get_ydata(), np.degrees(view.record.fin))
     assert rate.get_xlim() == (view.record.time[0], view.record.time[-1])

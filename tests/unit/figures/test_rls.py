@@ -18,7 +18,7 @@ def view():
 
 def test_each_parameter_has_a_panel_with_its_unit_and_settle_time():
     first, second = rls.panels(view(), "run7").axes
-    assert (first.get_ylabel(), second.get_ylabel()) == ("a22 [1/s]", "b2 [1/s^2]")
+    assert (first.get_ylabel(), second.get_ylabel()) == ("a22, 1/s", "b2, 1/s^2")
     assert [t.get_text() for t in first.texts] == ["after 17.5 s"]
     assert [line.get_xdata()[0] for line in first.lines if line.get_label() == "settled"] == [117.5]
     assert [t.get_text() for t in second.texts] == ["not settled"]
