@@ -23,8 +23,8 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 JOURNAL = "journal.jsonl"
 """The file that marks a trial folder, as `fieldsid/trial_folder/journal.py` has it: known here without its imports."""
 GC_THRESHOLD = 50_000
-"""Objects allocated between two runs of the garbage collector. Imports and compilation allocate millions that stay: at Python's own
-threshold the collector takes a fifth of the time of compiling, a twentieth of a tour."""
+"""Objects allocated between two runs of the garbage collector. Imports and compilation allocate millions that stay: at
+Python's own threshold the collector takes a fifth of the time of compiling, a twentieth of a tour."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

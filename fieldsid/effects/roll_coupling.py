@@ -1,7 +1,7 @@
 """A rolled hull yaws: r' += roll_moment phi, roll angle phi in rad (positive starboard down), roll_moment in 1/s^2.
 
-When the hull is rolled, the elevators, and the weight away from the buoyancy, act in the yaw plane too. In its other forms the roll
-rate adds a moment roll_rate_moment phi', or the moment bends with the angle, roll_cubic phi^3.
+When the hull is rolled, the elevators, and the weight away from the buoyancy, act in the yaw plane too. In its other forms the
+roll rate adds a moment roll_rate_moment phi', or the moment bends with the angle, roll_cubic phi^3.
 Source: Fossen 2011, section 7.5 (6-DOF underwater vehicle, coupled terms linearised in phi).
 """
 

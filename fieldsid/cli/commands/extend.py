@@ -62,7 +62,7 @@ def command(
     """Add an effect to a model, refit everything, and watch the error fall.
 
     Before and after are both refitted to the runs and judged by their free run on the `--validate` runs; without them a part of
-    the runs is held back. The extended model is written to its parent's folder, or to `-o FILE`, only where the error on unseen runs
+    the runs is held back. The extended model is written to its parent's folder, or to `-o FILE`, where the error on unseen runs
     falls, or with `--keep`. `--undo` gives the parent back; `sysid history MODEL` shows the whole line.
 
     Example: sysid extend model.yaml runs/pulses_*.parquet --add servo_lag --validate runs/zigzag.parquet
