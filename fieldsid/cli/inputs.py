@@ -38,9 +38,9 @@ def read_runs(
     """Return the runs of the files, each with a name of its own, cut to `start` .. `end` s where given.
 
     check validates all other arguments; its errors come before those of a file. meanwhile is what this process does while a
-    forked worker reads the files, where it can be forked and has not read any before. refused is called with each of several files that
-    cannot be read, and the error; without it, and where no file can be read, raises LogError, MappingError, and DataError where
-    the cut leaves nothing. Raises UsageError where two files hold the same data.
+    forked worker reads the files, where it can be forked and has not read any before. refused is called with each of several
+    files that cannot be read, and the error; without it, and where no file can be read, raises LogError, MappingError, and
+    DataError where the cut leaves nothing. Raises UsageError where two files hold the same data.
     """
     (runs,) = read_groups([paths], mapping=mapping, start=start, end=end, check=check, meanwhile=meanwhile, refused=refused)
     return runs
