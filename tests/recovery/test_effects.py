@@ -5,14 +5,14 @@ No noise: what is left is the difference between two ways to write the same phys
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from truth import maneuvers
 from truth.logbook import flown
 from truth.noise import Clock
-from truth.physics import Physics
+from truth.physics import HIDDEN_EFFECTS, HiddenEffect, Physics
 
 from fieldsid.dynamics.free_run import simulate
 from fieldsid.effects import all_effects
@@ -28,50 +28,10 @@ BASE = {
 }
 
 
-@dataclass(frozen=True)
-class Hidden:
-    """An effect, what the truth is told, what the fit must say, the maneuver, and how near it must come."""
-
-    name: str
-    physics: dict[str, float]
-    expected: dict[str, float]
-    maneuver: str = "pulses"
-    axis: Axis = Axis.YAW
-    near: float = 0.02
+CASES = tuple(replace(case, axis=Axis(case.axis)) for case in HIDDEN_EFFECTS)
 
 
-CASES = (
-    Hidden("delay", {"delay": 0.17}, {"delay": 0.17}),
-    Hidden("rate_limit", {"max_rate": 0.6}, {"max_rate": 0.6}),
-    Hidden("servo_lag", {"servo_tau": 0.22}, {"lag": 0.22}),
-    Hidden("backlash", {"backlash_gap": 0.06}, {"gap": 0.06}, "multisine", near=0.05),
-    Hidden("deadband", {"deadband_width": 0.04}, {"width": 0.04}, "multisine", near=0.05),
-    Hidden("asymmetric_fin", {"asymmetry": 0.2}, {"asymmetry": 0.2}),
-    Hidden("stall", {"stall_angle": 0.15, "stall_slope": 0.2}, {"stall_angle": 0.15, "slope_after": 0.2}, "multisine", near=0.05),
-    Hidden("quadratic_damping", {"quadratic": 2.0}, {"quadratic": 2.0}, "zigzag"),
-    Hidden("speed_varying", {"speed_varying": 1.0, "surge_loss": 6.0}, {"speed_share": 1.0}, "circle", near=0.1),
-    Hidden("trim_drift", {"drift": 0.0015}, {"drift": 0.09}),
-    Hidden("step_change", {"step_time": 20.0, "step_loss": 0.3, "step_moment": 0.03}, {"loss": 0.3, "moment_step": 0.03}),
-    Hidden("wave", {"wave_amplitude": 0.05, "wave_period": 6.3, "wave_phase": 0.6}, {"amplitude": 0.05, "period": 6.3}),
-    Hidden("sway_coupling", {"cross_damping": 0.7, "cross_rate": 0.9, "cross_moment": -0.5},
-           {"cross_damping": 0.7, "cross_rate": 0.45}, "multisine", near=0.05),
-    Hidden("current", {"current_sin": 0.03, "current_cos": -0.02},
-           {"current_sin": 0.03, "current_cos": -0.02}, "circle", near=0.05),
-    Hidden("compass_deviation", {"compass_sin": 0.05, "compass_cos": 0.08},
-           {"deviation_sin": 0.05, "deviation_cos": 0.08}, "circle"),
-    Hidden("gyro_bias", {"gyro_bias": 0.02}, {"bias": 0.02}),
-    Hidden("gyro_scale", {"gyro_scale": 0.15}, {"scale_error": 0.15}),
-    Hidden("clock_offset", {"clock_offset": -0.2}, {"offset": 0.2}, near=0.03),
-    Hidden("quadratic_damping", {"quadratic": 2.0}, {"quadratic": 2.0}, "stairs", Axis.PITCH),
-    Hidden("servo_lag", {"servo_tau": 0.22}, {"lag": 0.22}, axis=Axis.PITCH),
-    Hidden("heave_coupling", {"cross_damping": 0.7, "cross_rate": 0.9, "cross_moment": -0.5},
-           {"cross_damping": 0.7, "cross_rate": 0.45}, "multisine", Axis.PITCH, 0.05),
-    Hidden("large_angle_righting", {"righting": 1.0}, {"righting_sin": 0.4, "righting_cos": -0.02}, "stairs", Axis.PITCH, 0.1),
-    Hidden("depth_buoyancy", {"depth_moment": 0.01}, {"depth_moment": 0.01}, "stairs", Axis.PITCH),
-)  # fmt: skip
-
-
-def flight(case: Hidden) -> dict[str, np.ndarray]:
+def flight(case: HiddenEffect) -> dict[str, np.ndarray]:
     rng, time = np.random.default_rng(12), CLOCK.time
     plan = {
         "pulses": lambda: maneuvers.pulses(time, 0.26, 0.15, recovery=6.0),
@@ -83,7 +43,7 @@ def flight(case: Hidden) -> dict[str, np.ndarray]:
     return flown(BASE[case.axis]._replace(**case.physics), CLOCK, plan, pitching=case.axis is Axis.PITCH)
 
 
-def record(case: Hidden):
+def record(case: HiddenEffect):
     log = flight(case)
     return record_of(Run(case.name, log.pop("time_s"), log), case.axis)
 

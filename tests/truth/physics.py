@@ -7,6 +7,7 @@ Every field is zero (or infinite) where its effect is absent.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 
@@ -103,3 +104,48 @@ class Physics(NamedTuple):
     fin_trim: float = 0.0
     zigzag_fin: float = 0.17
     zigzag_angle: float = 0.17
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect: its coefficients here, those that a fit must give back, the maneuver, and within which share."""
+
+    name: str
+    physics: dict[str, float]
+    expected: dict[str, float]
+    maneuver: str = "pulses"
+    axis: str = "yaw"
+    near: float = 0.02
+
+
+HIDDEN_EFFECTS = (
+    HiddenEffect("delay", {"delay": 0.17}, {"delay": 0.17}),
+    HiddenEffect("rate_limit", {"max_rate": 0.6}, {"max_rate": 0.6}),
+    HiddenEffect("servo_lag", {"servo_tau": 0.22}, {"lag": 0.22}),
+    HiddenEffect("backlash", {"backlash_gap": 0.06}, {"gap": 0.06}, "multisine", near=0.05),
+    HiddenEffect("deadband", {"deadband_width": 0.04}, {"width": 0.04}, "multisine", near=0.05),
+    HiddenEffect("asymmetric_fin", {"asymmetry": 0.2}, {"asymmetry": 0.2}),
+    HiddenEffect("stall", {"stall_angle": 0.15, "stall_slope": 0.2}, 
+        {"stall_angle": 0.15, "slope_after": 0.2}, "multisine", near=0.05),
+    HiddenEffect("quadratic_damping", {"quadratic": 2.0}, {"quadratic": 2.0}, "zigzag"),
+    HiddenEffect("speed_varying", {"speed_varying": 1.0, "surge_loss": 6.0}, {"speed_share": 1.0}, "circle", near=0.1),
+    HiddenEffect("trim_drift", {"drift": 0.0015}, {"drift": 0.09}),
+    HiddenEffect("step_change", {"step_time": 20.0, "step_loss": 0.3, "step_moment": 0.03}, {"loss": 0.3, "moment_step": 0.03}),
+    HiddenEffect("wave", {"wave_amplitude": 0.05, "wave_period": 6.3, "wave_phase": 0.6}, {"amplitude": 0.05, "period": 6.3}),
+    HiddenEffect("sway_coupling", {"cross_damping": 0.7, "cross_rate": 0.9, "cross_moment": -0.5},
+           {"cross_damping": 0.7, "cross_rate": 0.45}, "multisine", near=0.05),
+    HiddenEffect("current", {"current_sin": 0.03, "current_cos": -0.02},
+           {"current_sin": 0.03, "current_cos": -0.02}, "circle", near=0.05),
+    HiddenEffect("compass_deviation", {"compass_sin": 0.05, "compass_cos": 0.08},
+           {"deviation_sin": 0.05, "deviation_cos": 0.08}, "circle"),
+    HiddenEffect("gyro_bias", {"gyro_bias": 0.02}, {"bias": 0.02}),
+    HiddenEffect("gyro_scale", {"gyro_scale": 0.15}, {"scale_error": 0.15}),
+    HiddenEffect("clock_offset", {"clock_offset": -0.2}, {"offset": 0.2}, near=0.03),
+    HiddenEffect("quadratic_damping", {"quadratic": 2.0}, {"quadratic": 2.0}, "stairs", "pitch"),
+    HiddenEffect("servo_lag", {"servo_tau": 0.22}, {"lag": 0.22}, axis="pitch"),
+    HiddenEffect("heave_coupling", {"cross_damping": 0.7, "cross_rate": 0.9, "cross_moment": -0.5},
+           {"cross_damping": 0.7, "cross_rate": 0.45}, "multisine", "pitch", 0.05),
+    HiddenEffect("large_angle_righting", {"righting": 1.0}, {"righting_sin": 0.4, "righting_cos": -0.02}, "stairs", "pitch", 0.1),
+    HiddenEffect("depth_buoyancy", {"depth_moment": 0.01}, {"depth_moment": 0.01}, "stairs", "pitch"),
+)  # fmt: skip
+"""What each effect of the catalogue is recovered from; tests/recovery flies and fits them."""
