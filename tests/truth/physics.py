@@ -125,7 +125,7 @@ HIDDEN_EFFECTS = (
     HiddenEffect("backlash", {"backlash_gap": 0.06}, {"gap": 0.06}, "multisine", near=0.05),
     HiddenEffect("deadband", {"deadband_width": 0.04}, {"width": 0.04}, "multisine", near=0.05),
     HiddenEffect("asymmetric_fin", {"asymmetry": 0.2}, {"asymmetry": 0.2}),
-    HiddenEffect("stall", {"stall_angle": 0.15, "stall_slope": 0.2}, 
+    HiddenEffect("stall", {"stall_angle": 0.15, "stall_slope": 0.2},
         {"stall_angle": 0.15, "slope_after": 0.2}, "multisine", near=0.05),
     HiddenEffect("quadratic_damping", {"quadratic": 2.0}, {"quadratic": 2.0}, "zigzag"),
     HiddenEffect("speed_varying", {"speed_varying": 1.0, "surge_loss": 6.0}, {"speed_share": 1.0}, "circle", near=0.1),

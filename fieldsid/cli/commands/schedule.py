@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -59,7 +60,8 @@ NeedPhase = Annotated[float | None, typer.Option("--require-phase-margin", metav
 NeedGain = Annotated[float | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less.")]
 NeedDelay = Annotated[float | None, typer.Option("--require-delay-margin", metavar="S", help="Exit 1 when any speed has less.")]
 MostOvershoot = Annotated[float | None, typer.Option("--max-overshoot", metavar="PERCENT", help="Exit 1 when any step has more.")]
-To = Annotated[str, typer.Option("--to", metavar="TARGET", help="yaml, ros2, dune, ardupilot or moos.")]
+TARGETS = ", ".join(m.name for m in iter_modules([str(Path(__file__).parents[2] / "exports")]) if not m.name.startswith("_"))
+To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"One of {TARGETS}.")]
 Node = Annotated[
     str | None, typer.Option("--node", metavar="NAME", help="What the gains go under: node, section, prefix or process.")
 ]
