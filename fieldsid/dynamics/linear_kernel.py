@@ -1,7 +1,7 @@
 """The compiled core of a linear motion: its free run and tangents, and the base model's normal equations without either.
 
     y' = p,  p' = -a p - k y + m(t),  m straight from the start of an interval to its end; the base model's is b delta + C
-With a and k constant the RK4 map of dynamics/integrate.py over an interval is a matrix: it is worked out once for a step
+With a and k constant the RK4 map of dynamics/integrate.py over an interval is a matrix: it is computed once for a step
 length, with its derivatives by a and k, and applied to every sample. Same numbers as the general core, in a third of the time.
 """
 

@@ -59,7 +59,7 @@ def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
 def rudder_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None]) -> float:
     """Return the rudder of a turn in rad where none is given: the vehicle's limit, or the largest the models were trained on.
 
-    say is told of the last. Raises UsageError where there is none.
+    say is called with the last. Raises UsageError where there is none.
     """
     if vehicle is not None and vehicle.rudder_max_rad is not None:
         return vehicle.rudder_max_rad
@@ -89,7 +89,7 @@ def fin_limits_of(
 
 
 def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]:
-    """Return the logs that the model files of a source name, where they still are; say is told where some are not.
+    """Return the logs that the model files of a source name, where they still are; say is called where some are not.
 
     Models without effects go by a formula, which needs none.
     """

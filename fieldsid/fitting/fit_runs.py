@@ -16,7 +16,7 @@ from fieldsid.runtime.worker_pool import parallel_map
 def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] | None = None) -> list[list[tuple[Run, Record]]]:
     """Return the runs of several groups with their records, without those that no estimator can use.
 
-    unfit is told of each of these, as `sifted` does for each group; without it DataError is raised for the first.
+    unfit is called with each of these, as `sifted` does for each group; without it DataError is raised for the first.
     """
     runs = [run for group in groups for run in group]
     if not runs:

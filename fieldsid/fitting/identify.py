@@ -32,7 +32,7 @@ def identify(
     """Return one fit per run, or a single one over all of them when joint; `done` is called after each.
 
     Of each run the part is used that excites the axis (logs/segments.py), or all of it when `whole`.
-    A vehicle gives the fin's limit and the side a positive fin turns to. unfit is told of each of several runs that cannot be
+    A vehicle gives the fin's limit and the side a positive fin turns to. unfit is called with each of several runs that cannot be
     fitted, and the others are fitted; without it, for a single run, and where none is left, its error is raised.
     Raises DataError for runs that do not allow the fit, UsageError for a method that cannot do what is asked, and for a joint
     fit of which one run is left.

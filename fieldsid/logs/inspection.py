@@ -76,7 +76,7 @@ class Inspection(Brief):
 def inspect_log(
     path: Path, *, mapping: Path | None = None, msg_path: Path | None = None, progress: Callable[[float], None] | None = None
 ) -> Inspection:
-    """Return what is in a log; `progress` is told the share of it that has been looked through.
+    """Return what is in a log; `progress` is given the share of it that has been looked through.
 
     Raises LogError when it cannot be read at all, MappingError for a mapping that does not fit.
     """

@@ -1,4 +1,4 @@
-"""Any log file becomes a Run: `load_run` is the one door, for every command that takes a run."""
+"""Any log file becomes a Run: every command that takes a run calls `load_run`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def load_run(
     mapping: a ChannelMap or a mapping.yaml. Without one: the canonical column names, else `mapping.yaml` in the
     working folder, else in the log's. channels: sources that count more than the mapping's. salvage: take what is
     left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the times in s between which the log is taken
-    and judged. fin_max_rad: fin limits by signal, for the finding of saturation. progress: told the share of the log that has
+    and judged. fin_max_rad: fin limits by signal, for the finding of saturation. progress: given the share of the log that has
     been read, now and then. Raises LogError or MappingError, and DataError where the part is empty.
     """
     if str(path) == "-":

@@ -23,7 +23,7 @@ PACKAGE = "fieldsid.logs.readers"
 DEFINED = "message"
 """The kind of a topic whose fields the format defines: its names are not guessed at."""
 WORTH_SALVAGING = 0.5
-"""Share of a log from which what is left of it is worth taking."""
+"""Share of a log from which its readable part is offered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ class ReadOptions:
     """What a caller may ask of any reader: a folder of .msg files, and to take what is left of a damaged log.
 
     `command` is the one that imports the log as it is read here, for hints; `clock` the time column of a table that is listed,
-    where a mapping names it. `progress` is told which share of the log has been read, now and then.
+    where a mapping names it. `progress` is given which share of the log has been read, now and then.
     """
 
     msg_path: Path | None = None

@@ -29,7 +29,7 @@ part, shows half its own increments in them."""
 BELOW_ANY_BOUND = 1e-12
 """Less than any bound."""
 MIN_SCORING_GAIN = 0.02
-"""Log likelihood below which another iteration is not worth its cost."""
+"""Gain in log likelihood below which the iteration ends."""
 GRADIENT_STEP = 1e-4
 
 
@@ -127,7 +127,7 @@ class _LogNoiseLikelihood:
     def at(self, x: FloatArray, least: float = -np.inf) -> tuple[float, FloatArray, FloatArray]:
         """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number.
 
-        Where the likelihood is not above the least one asked for nothing else is worked out.
+        Where the likelihood is not above `least`, score and information are not computed.
         """
         count, noise = x.size, self.vector(x)
         runs = [

@@ -7,7 +7,7 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 
 SINGULAR_EIGENVALUE_SHARE = 1e-12
-"""Share of the largest product's eigenvalue below which a combination of columns is not told from none."""
+"""Share of the largest product's eigenvalue below which a combination of columns counts as zero."""
 
 
 def gram_least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:

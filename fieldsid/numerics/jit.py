@@ -1,4 +1,4 @@
-"""One typed door to numba: `@jit` compiles a function once and caches it on disk, `@inner` what it calls."""
+"""The typed interface to numba: `@jit` compiles a function once and caches it on disk, `@inner` marks what it calls."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function as it is, which functions of `jit` may call: compiled with them, without a door from Python."""
+    """Return the function as it is, which functions of `jit` may call: compiled with them, not callable from Python."""
     numba: Any = import_module("numba.extending")
-    door = numba.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-    return cast("Callable[P, R]", door(function))
+    decorator = numba.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return cast("Callable[P, R]", decorator(function))
 
 
 def plain_of(function: Callable[P, R]) -> Callable[P, R]:
@@ -37,7 +37,7 @@ def is_loaded(function: Callable[..., object]) -> bool:
 
 
 def warmup_marker(functions: Sequence[Callable[..., object]]) -> Path:
-    """Return the file that stands beside what numba keeps of compiled functions once all of these are compiled on this machine.
+    """Return the file, in numba's cache folder, that exists once all of these functions are compiled on this machine.
 
     Its name changes with what numba compiles anew for: the source files, numba's and Python's version, the processor.
     """

@@ -12,7 +12,7 @@ from fieldsid.numerics.arrays import FloatArray
 
 BLOCK_SAMPLES = 1 << 15
 ROUNDING_SHARE = 1e-12
-"""Share of a signal's power below which what is left of it at a shift is not told from the rounding of its sums."""
+"""Share of a signal's power below which what is left of it at a shift cannot be distinguished from the rounding of its sums."""
 
 
 def shifted_correlations(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:

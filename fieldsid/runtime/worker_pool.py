@@ -9,7 +9,7 @@ runs of `sysid diagnose` (four yaw, one pitch; 3 or 5 logs of 44 to 57 s; median
     executor, start method spawn        2.23 to 3.23 s     52 to 73 % more
     one process, one core               1.72 to 3.01 s     30 to 45 % more
 
-Only spawn works on macOS and beside other threads, and there a second process costs more than it saves: where this process cannot
+Only spawn works on macOS and with other threads, and there a second process costs more than it saves: where this process cannot
 be forked (`can_fork`), it does all of the work itself.
 """
 

@@ -118,14 +118,14 @@ def select_noise(problem: Problem, x: FloatArray, start: Noise) -> tuple[str, No
     lines = linearise_runs(problem, x)
     found: dict[str, tuple[Noise, float]] = {}
 
-    def worth(noise_kind: str) -> float:
+    def penalised_likelihood(noise_kind: str) -> float:
         return found[noise_kind][1] - PENALTY_PER_PARAMETER * len(NOISE_KINDS[noise_kind].fields)
 
     for noise_kind in NOISE_KINDS:
-        if noise_kind == JOINT_NOISE and innovations_are_white(lines, max(found, key=worth), found):
+        if noise_kind == JOINT_NOISE and innovations_are_white(lines, max(found, key=penalised_likelihood), found):
             continue
         found[noise_kind] = reml_noise(problem, lines, noise_kind, start)
-    best = max(found, key=worth)
+    best = max(found, key=penalised_likelihood)
     return best, *found[best]
 
 

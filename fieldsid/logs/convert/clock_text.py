@@ -96,7 +96,7 @@ def stamps_of_text(cells: npt.NDArray[Any]) -> FloatArray | None:
 
 
 def lost_hours(name: str, times: int) -> Note:
-    """Return the note that a clock without hours was brought on."""
+    """Return the note that hours were added to a clock without them."""
     again = f"; it starts again {times} time{'s' * (times != 1)}, each taken for the next hour" if times else ""
     return Note("lost_hours", f"`{name}` counts minutes and seconds, the hour is not in it{again}", {"count": times})
 

@@ -20,7 +20,7 @@ MAX_GAP_S = 2.0
 OWN_STEPS = 5.0
 """Steps of a signal's own that are no gap of it, however long they are."""
 WORTH_TAKING = 10
-"""Samples above which a part without a gap is worth a hint."""
+"""Samples above which a part without a gap is named in a hint."""
 ROUNDING = 1.01
 """What a gap of just the limit may be over it, by the rounding and the jitter of the times."""
 

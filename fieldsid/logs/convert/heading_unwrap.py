@@ -36,7 +36,7 @@ MIN_JUMP_RAD = 0.03
 NOISES = 6.0
 """What stands out is more than this many standard deviations of the noise, and more than `MIN_JUMP_RAD`."""
 LOUDEST_RAD = 1.0
-"""Where only more than this stands out of the noise, nothing is told from it."""
+"""Where only more than this stands out of the noise, nothing can be concluded from it."""
 NEIGHBOURS = 8
 """Steps on each side that say what the motion is."""
 LOOK_AHEAD = 3
@@ -44,7 +44,7 @@ LOOK_AHEAD = 3
 HELD_S = 1.0
 """A heading held at the wrap comes back to it within this time."""
 AGREES = (0.7, 1.4)
-"""Slopes of the heading's steps on the integrated rate between which the rate is believed."""
+"""Slopes of the heading's steps on the integrated rate between which the rate is trusted."""
 STAIR_RAD = 0.5
 """A step up to this size counts as noise where such steps are many: a heading that is held between its own samples."""
 RARE, HELD = 0.02, 0.8

@@ -19,7 +19,7 @@ from fieldsid.numerics.white_noise import robust_white_noise_std
 
 PAIR_WINDOW_S = 1.0
 TRUSTED = 0.8
-"""Correlation from which a slope is believed."""
+"""Correlation from which a slope is taken as real."""
 STRONG, WEAK = 0.9, 0.5
 """Correlations with the other axis's rate and with its own that make an angle look swapped."""
 MIN_NOISE_RATIO = 4.0

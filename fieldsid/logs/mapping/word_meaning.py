@@ -83,7 +83,7 @@ LETTERS: Mapping[str, str] = MappingProxyType(
     {"t": TIME, "r": "yaw_rate_rad_s", "q": "pitch_rate_rad_s", "p": "roll_rate_rad_s", "u": "surge_m_s", "v": "sway_m_s",
      "w": "heave_m_s", "x": "x_m", "y": "y_m", "z": "depth_m", "n": "propeller_rpm", "the": "pitch_rad", "delta": "rudder_rad"}
 )  # fmt: skip
-"""The field's symbols, believed only when a name is nothing else."""
+"""The field's symbols, taken only when a name has no other meaning."""
 
 _UNIT = re.compile(r"[\[(][^\])]*[\])]")
 _SUFFIX = re.compile(r"_(rad|deg|rad_s|deg_s|m_s|m|s|ms|us|ns|kn|ft|rpm|km_h|dps)$")

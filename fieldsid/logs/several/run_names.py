@@ -1,4 +1,4 @@
-"""Names of runs: each log's own, told apart by folder and suffix where several share one, and no data twice."""
+"""Names of runs: each log's own, made different by folder and suffix where several share one, and no data twice."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _real(path: Path) -> Path:
 def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
     """Return the names of the runs of some files, those that several share with as many folders before them as it takes.
 
-    Files of one folder are told apart by their suffix. No two of the names are the same.
+    Files of one folder differ by their suffix. No two of the names are the same.
     """
     alike: dict[str, list[int]] = defaultdict(list)
     for i, name in enumerate(names):

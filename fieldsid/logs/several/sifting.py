@@ -10,7 +10,7 @@ from fieldsid.errors import DataError, EffectError, FieldsidError, LogError, Map
 T = TypeVar("T")
 R = TypeVar("R")
 Refused = Callable[[T, FieldsidError], None]
-"""What is told of each item that cannot be used, and why."""
+"""A function that is called with each item that cannot be used, and its error."""
 
 OF_ONE_LOG = (LogError, MappingError, DataError, ModelError, EffectError)
 """Errors that lie in one log; any other lies in what was asked, and stops all."""
@@ -27,7 +27,7 @@ def attempt(work: Callable[[T], R], item: T) -> R | FieldsidError:
 def sifted(items: Sequence[T], made: Iterable[R | FieldsidError], refused: Refused[T] | None = None) -> list[tuple[T, R]]:
     """Return the items that can be used with what was made of each, see `attempt`.
 
-    refused is told of each other one; without it the first error is raised. Raises DataError where none of
+    refused is called with each other one; without it the first error is raised. Raises DataError where none of
     several is left, and the error itself where the only one cannot be used.
     """
     kept: list[tuple[T, R]] = []

@@ -81,7 +81,7 @@ class Collector:
     """What the reading of a bag brings in: connections by topic, and packets of the topics that are wanted (all when None).
 
     `expected` is the number of messages that the bag's own index states, by topic; `file` the one that is being read; `size`
-    the bytes of all, of which `progress` is told the share.
+    the bytes of all, of which `progress` is given the share.
     """
 
     def __init__(
@@ -165,7 +165,7 @@ class Collector:
         self.damaged(f"{what} at byte {position} of {self.file}", {"file": self.file, "byte": position})
 
     def damaged(self, what: str, data: Mapping[str, Any]) -> None:
-        """Note a part of a bag that could not be read; the first of many places are told one by one."""
+        """Note a part of a bag that could not be read; the first of many places get a note each."""
         self.damages += 1
         if self.damages <= TOLD_PLACES:
             self.notes.append(Note("damaged", f"{what}: damaged, left out with what may be damaged beside it", data))
@@ -175,7 +175,7 @@ class Collector:
         self.expected[topic] = self.expected.get(topic, 0) + count
 
     def say_untold_places(self) -> None:
-        """Note how many places are damaged besides those that were told."""
+        """Note how many places are damaged besides those that have a note."""
         if self.damages > TOLD_PLACES:
             more = self.damages - TOLD_PLACES
             self.notes.append(Note("damaged", f"{more} more places are damaged and were left out", {"places": more}))

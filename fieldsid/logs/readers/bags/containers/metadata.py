@@ -1,4 +1,4 @@
-"""What metadata.yaml beside a ROS 2 bag states: how many messages were recorded by topic, and how they are serialized."""
+"""What the metadata.yaml of a ROS 2 bag states: how many messages were recorded by topic, and how they are serialized."""
 
 from __future__ import annotations
 
