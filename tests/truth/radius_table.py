@@ -1,0 +1,158 @@
+"""Full-rudder radius of hulls nobody tuned to: errors, coverage and width of the bands, by kind and by training set.
+
+Every hull is drawn, flown with sensor noise, identified, and turned to both sides at five speeds:
+    python tests/truth/radius_table.py --draws 40 --seed 7 [--sets pulses,pulses+zigzag] [--json rows.json]
+Every second hull logs no sway. Seed 1 is that of the prior (`radius_prior.py`): measure with another.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import warnings
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from truth.maneuvering.hulls import KINDS, Hull, draw_hull
+from truth.maneuvering.motion import true_turn
+from truth.maneuvering.trials import SETS, Log, training
+
+from fieldsid.errors import FieldsidError
+from fieldsid.fitting.identify import identify
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.plant.parameter_source import source_of_models
+from fieldsid.turning.radius import turn_radius
+
+EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
+WANTED = {"pulses": 0.8, "pulses+zigzag": 0.35, "pulses+circle": 0.35}
+"""Widest band wanted, as a share of the radius."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One predicted turn beside the true one, m; NaN where the tool refused it."""
+
+    draw: int
+    kind: str
+    training: str
+    sway: bool
+    speed: float
+    side: str
+    truth: float
+    radius: float
+    low: float
+    high: float
+    trust: str
+    refused: str = ""
+
+    @property
+    def error(self) -> float:
+        """Share by which the prediction is off."""
+        return self.radius / self.truth - 1.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the band holds the truth."""
+        return self.low <= self.truth <= self.high
+
+    @property
+    def width(self) -> float:
+        """Width of the band as a share of the true radius."""
+        return (self.high - self.low) / self.truth
+
+
+def as_run(log: Log) -> Run:
+    """Return a log as the program's own record of a run."""
+    return Run(log.name, log.time, log.columns)
+
+
+def evaluate(hull: Hull, draw: int, which: str, seed: int) -> list[Outcome]:
+    """Return the turns of one hull after one training set."""
+    sway = draw // len(KINDS) % 2 == 0
+    rng = np.random.default_rng([seed, draw, SETS.index(which)])
+    logs = training(hull, which, rng, sway=sway)
+    truth = {(v, side): true_turn(hull, v, sign)[0] for v in hull.speeds for side, sign in (("port", -1.0), ("starboard", 1.0))}
+    nan = float("nan")
+
+    def outcome(key: tuple[float, str], radius: float, low: float, high: float, trust: str, refused: str = "") -> Outcome:
+        return Outcome(draw, hull.kind, which, sway, key[0], key[1], truth[key], radius, low, high, trust, refused)
+
+    try:
+        models = []
+        for speed in hull.speeds:
+            runs = [as_run(log) for log in logs if log.speed == speed and log.name != "circle"]
+            models += [f.model for f in identify(runs, Axis.YAW, effects=EFFECTS, joint=len(runs) > 1)]
+        source = source_of_models(models, [f"m{i}" for i in range(len(models))])
+        circles = [as_run(log) for log in logs if log.name == "circle"]
+        runs = [as_run(log) for log in logs if log.name != "circle"]
+        found = turn_radius(source, hull.speeds, hull.rudder_limit, runs=runs, measured=circles)
+    except FieldsidError as error:
+        return [outcome(key, nan, nan, nan, "refused", str(error)) for key in truth]
+    return [outcome((r.speed, r.side), r.radius, *r.interval95, r.trust) for r in found.rows]
+
+
+def line(name: str, rows: list[Outcome]) -> str:
+    """Return one line of the table."""
+    known = [r for r in rows if np.isfinite(r.radius) and np.isfinite(r.truth)]
+    if not known:
+        return f"{name:42s} {len(rows):5d}  none predicted"
+    off = 100.0 * np.abs([r.error for r in known])
+    bias = 100.0 * float(np.median([r.error for r in known]))
+    held = 100.0 * float(np.mean([r.holds for r in known]))
+    width = np.array([r.width for r in known])
+    p90 = float(np.percentile(off, 90))
+    return (
+        f"{name:42s} {len(known):5d} {len(rows) - len(known):4d} {bias:+7.1f} {np.median(off):7.1f} {p90:7.1f} {off.max():8.1f} "
+        f"{held:7.0f} {np.median(width):7.2f} {np.percentile(width, 90):7.2f}"
+    )
+
+
+def table(rows: list[Outcome]) -> list[str]:
+    """Return the table's lines: by training set, each with its kinds, trusted rows and sensors apart."""
+    head = ("rows", "bad", "bias %", "mid %", "90th %", "worst %", "held %", "width", "w 90th")
+    lines = [f"{'':42s} {head[0]:>5s} {head[1]:>4s} {head[2]:>7s} {head[3]:>7s} {head[4]:>7s} {head[5]:>8s} {head[6]:>7s} "
+             f"{head[7]:>7s} {head[8]:>7s}"]  # fmt: skip
+    for which in SETS:
+        own = [r for r in rows if r.training == which]
+        if not own:
+            continue
+        lines.append(line(f"{which} (width wanted {WANTED[which]})", own))
+        lines += [line(f"  {kind}", part) for kind in KINDS if (part := [r for r in own if r.kind == kind])]
+        lines += [line(f"  sway {'' if s else 'not '}logged", part) for s in (True, False) if (part := [r for r in own if r.sway == s])]
+        trusts = sorted({r.trust for r in own} - {"refused"})
+        lines += [line(f"  trusted: {t}", [r for r in own if r.trust == t]) for t in trusts]
+    return lines
+
+
+def main() -> None:
+    """Draw, fly, identify, turn, and print the table."""
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--draws", type=int, default=14)
+    asked.add_argument("--first", type=int, default=0)
+    asked.add_argument("--seed", type=int, default=7)
+    asked.add_argument("--sets", default=",".join(SETS))
+    asked.add_argument("--json", type=Path)
+    given = asked.parse_args()
+    rows: list[Outcome] = []
+    begun = time.monotonic()
+    for draw in range(given.first, given.first + given.draws):
+        hull = draw_hull(draw, given.seed)
+        for which in given.sets.split(","):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                rows += evaluate(hull, draw, which, given.seed)
+        print(f"{draw} {hull.kind} {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+        if given.json:
+            given.json.write_text(json.dumps([asdict(r) for r in rows]))
+    print("\n".join(table(rows)))
+
+
+if __name__ == "__main__":
+    main()
