@@ -1,0 +1,153 @@
+"""Surge, sway and yaw of a hull with a rudder at its stern, in coefficients without units, compiled.
+
+    u' = D/L (s^2 (1 + t (1 - u/s)) - u^2) + X0/L U (s - u) + M v r + X L r^2 - M R/L w^2 f(alpha) sin(delta)
+    v' = (-(Yv u + Y0 U) v - Yr L u r - C J0 + R w^2 f(alpha) cos(delta)) / L
+    r' = (-Nv u v - (Nr u + N0 U) L r - b C L J1 + a L R w^2 f(alpha) cos(delta)) / (k L^2)
+    Jn = int_{-1/2}^{1/2} h(x) (v + x L r)|v + x L r| x^n dx,   h = sqrt(1 - |2 x|^3)
+    alpha = delta + d0 - atan((v + a L r)/u),  w^2 = u^2 + (v + a L r)^2,  f(alpha) = alpha / (1 + (alpha/c)^4)^(1/4)
+with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length, U = 1.5 m/s, R also (s/U)^e.
+Source: Fossen 2011, sections 6.4, 6.5 and 9.4; cross-flow drag as Faltinsen 1990, chapter 6; lift that fades at the stall.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import inner, jit
+
+NAMES = (
+    "length", "drag", "sway_surge", "thrust_slope", "rudder", "rudder_arm", "gyration", "sway_lift", "sway_rate",
+    "yaw_lift", "yaw_rate", "cross_drag", "stall", "rudder_offset", "lag", "rate_surge", "rate_limit",
+    "wash", "sway_viscous", "yaw_viscous", "yaw_drag", "surge_viscous",
+)  # fmt: skip
+"""The coefficients in order: L, D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, servo lag (s), X, servo rate limit (rad/s), e, Y0, N0, b, X0."""
+LOGARITHMS = {"length", "drag", "rudder", "gyration", "cross_drag", "stall", "lag", "rate_limit", "yaw_drag"}
+IN_LOGARITHM = np.array([n in LOGARITHMS for n in NAMES])
+REFERENCE_SPEED_M_S = 1.5
+STEP_S = 0.05
+STATIONS = np.linspace(-0.45, 0.45, 10)
+HEIGHTS = 0.1 * np.sqrt(1.0 - np.abs(2.0 * STATIONS) ** 3)
+LEAST_SURGE_M_S = 0.02
+MOST_M_S = 50.0
+
+
+@inner
+def _slope(
+    u: float, v: float, r: float, delta: float, push: float, straight: float, p: FloatArray, places: FloatArray, heights: FloatArray
+) -> tuple[float, float, float]:
+    """Return the accelerations; `push` is the thrust over that of the straight run, p the coefficients."""
+    length = p[0]
+    surge = max(u, LEAST_SURGE_M_S)
+    j0 = 0.0
+    j1 = 0.0
+    for i in range(places.size):
+        across = v + places[i] * length * r
+        part = heights[i] * across * abs(across)
+        j0 += part
+        j1 += part * places[i]
+    side = v + p[5] * length * r
+    alpha = delta + p[13] - math.atan2(side, surge)
+    ratio = (alpha / p[12]) ** 2
+    lift = p[4] * (straight / REFERENCE_SPEED_M_S) ** p[17] * (surge * surge + side * side) * alpha / math.sqrt(math.sqrt(1.0 + ratio * ratio))
+    cosine = lift * math.cos(delta)
+    thrust = push * straight * straight * (1.0 + p[3] * (1.0 - u / straight))
+    viscous = p[21] / length * REFERENCE_SPEED_M_S * (straight - u)
+    du = p[1] / length * (thrust - u * abs(u)) + viscous + p[2] * v * r + p[15] * length * r * r - p[2] * lift * math.sin(delta) / length
+    linear_sway, linear_yaw = p[7] * surge + p[18] * REFERENCE_SPEED_M_S, p[10] * surge + p[19] * REFERENCE_SPEED_M_S
+    dv = (-linear_sway * v - p[8] * length * surge * r - p[11] * j0 + cosine) / length
+    moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * length * j1 + p[5] * length * cosine
+    dr = moment / (p[6] * length * length)
+    return du, dv, dr
+
+
+@jit
+def simulate(
+    p: FloatArray,
+    straight: float,
+    first: FloatArray,
+    begins: FloatArray,
+    time: FloatArray,
+    fin: FloatArray,
+    thrust: FloatArray,
+    places: FloatArray,
+    heights: FloatArray,
+) -> FloatArray:
+    """Return surge, sway, rate and heading (4, n) of a run in segments that begin at samples `begins` with states (m, 3).
+
+    fin (n-1, 2) rad at either end of each interval before the servo's lag, thrust (n,) over the straight run's.
+    """
+    count = time.size
+    out = np.empty((4, count))
+    u, v, r, heading = first[0, 0], first[0, 1], first[0, 2], 0.0
+    angle = fin[0, 0]
+    segment = 0
+    for i in range(count):
+        if segment < begins.size and i == begins[segment]:
+            u, v, r = first[segment, 0], first[segment, 1], first[segment, 2]
+            segment += 1
+        out[0, i], out[1, i], out[2, i], out[3, i] = u, v, r, heading
+        if i == count - 1:
+            break
+        whole = time[i + 1] - time[i]
+        pieces = max(int(math.ceil(whole / STEP_S - 1e-6)), 1)
+        h = whole / pieces
+        keep, half = math.exp(-h / p[14]), math.exp(-0.5 * h / p[14])
+        for j in range(pieces):
+            asked = fin[i, 0] + (fin[i, 1] - fin[i, 0]) * (j + 0.5) / pieces
+            between = angle + min(max((asked - angle) * (1.0 - half), -0.5 * h * p[16]), 0.5 * h * p[16])
+            push = thrust[i] + (thrust[i + 1] - thrust[i]) * (j + 0.5) / pieces
+            du, dv, dr = _slope(u, v, r, angle, push, straight, p, places, heights)
+            mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
+            du, dv, dr = _slope(mu, mv, mr, between, push, straight, p, places, heights)
+            heading += h * mr
+            u = min(max(u + h * du, LEAST_SURGE_M_S), MOST_M_S)
+            v = min(max(v + h * dv, -MOST_M_S), MOST_M_S)
+            r = min(max(r + h * dr, -MOST_M_S), MOST_M_S)
+            angle += min(max((asked - angle) * (1.0 - keep), -h * p[16]), h * p[16])
+    return out
+
+
+@jit
+def settle(p: FloatArray, straight: float, fin: float, places: FloatArray, heights: FloatArray) -> FloatArray:
+    """Return surge, sway and rate (3,) of the circle that a straight run settles to with the rudder at `fin` rad.
+
+    NaN where it has not settled after 400 lengths: within a thousandth over the last 40.
+    """
+    h = 0.1 * p[0] / straight
+    u, v, r = straight, 0.0, 0.0
+    low, high = 1e9, -1e9
+    block = 400
+    for i in range(1, 10 * block + 1):
+        du, dv, dr = _slope(u, v, r, fin, 1.0, straight, p, places, heights)
+        mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
+        du, dv, dr = _slope(mu, mv, mr, fin, 1.0, straight, p, places, heights)
+        u, v, r = max(u + h * du, LEAST_SURGE_M_S), v + h * dv, r + h * dr
+        if not (abs(v) < MOST_M_S and abs(r) < MOST_M_S):
+            break
+        low, high = min(low, r), max(high, r)
+        if i % block == 0:
+            if high - low < 1e-3 * abs(r) and u > LEAST_SURGE_M_S:
+                return np.array([u, v, r])
+            low, high = 1e9, -1e9
+    return np.full(3, np.nan)
+
+
+def coefficients(theta: FloatArray) -> FloatArray:
+    """Return the coefficients (22,) of a vector in which the positive ones are logarithms."""
+    return np.where(IN_LOGARITHM, np.exp(np.where(IN_LOGARITHM, theta, 0.0)), theta)
+
+
+def growth_rate(p: FloatArray, speed: float) -> float:
+    """Return the largest real part of the straight run's lateral modes at a speed in m/s, 1/s."""
+    length, rudder = p[0], p[4]
+    still = REFERENCE_SPEED_M_S / speed
+    lateral = np.array(
+        [
+            [-(p[7] + p[18] * still + rudder) / length, -(p[8] + rudder * p[5])],
+            [-(p[9] + rudder * p[5]) / (p[6] * length**2), -(p[10] + p[19] * still + rudder * p[5] ** 2) / (p[6] * length)],
+        ]
+    )
+    return float(speed * np.max(np.linalg.eigvals(lateral).real))

@@ -1,0 +1,151 @@
+"""What the maneuvering model takes of a run: fin, thrust and the motion that was measured, cut into segments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.dynamics.assemble import fin_path
+from fieldsid.dynamics.free_run import effects_of
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model
+from fieldsid.models.record import Record, knows_speed, record_of
+from fieldsid.numerics.arrays import FloatArray
+
+OWN_EFFECTS = frozenset({"servo_lag", "rate_limit"})
+"""Effects of the actuator that the maneuvering model has itself."""
+LEAST_SAMPLES = 40
+LEAST_TURN_RAD_S = 0.005
+UNKNOWN_BIAS_RAD_S = 0.002
+"""What a gyro may be off by, where no heading shows it."""
+LEAST_BIAS_SD_RAD_S = 1e-5
+LEAST_SPEED_M_S = 0.1
+DISCREPANCY = 0.03
+"""Share of the motion that the equations themselves are off by."""
+DISCREPANCY_LENGTH_M = 2.0
+SURGE, SWAY, RATE, HEADING = range(4)
+
+
+@dataclass(frozen=True, slots=True)
+class FlownRun:
+    """One run: time (n,) s, fin (n-1, 2) rad before the servo's lag, thrust (n,) over the straight run's.
+
+    `measured` (4, n) surge, sway, rate and heading, NaN where not measured; heading only where there is no rate. The rate is
+    free of the bias that the heading shows, to within `rate_bias_sd` rad/s.
+    """
+
+    name: str
+    time: FloatArray
+    fin: FloatArray
+    thrust: FloatArray
+    measured: FloatArray
+    rate_bias_sd: float
+    discrepancy: FloatArray
+
+    @property
+    def speed(self) -> float:
+        """Speed of its straight part, m/s."""
+        return _straight_speed(self.measured)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns at all."""
+        rate = self.measured[RATE]
+        if not np.isfinite(rate).any():
+            rate = np.gradient(self.measured[HEADING], self.time)
+        return float(np.nanpercentile(np.abs(rate), 98)) > LEAST_TURN_RAD_S
+
+    def begins(self, segment_s: float) -> npt.NDArray[np.int64]:
+        """Return the samples (m,) at which segments of about `segment_s` begin."""
+        count = max(1, round(float(self.time[-1] - self.time[0]) / segment_s))
+        return np.unique(np.searchsorted(self.time, np.linspace(self.time[0], self.time[-1], count + 1)[:-1]))
+
+
+def flown_run(run: Run, model: Model | None) -> FlownRun | None:
+    """Return what a run says of a maneuver, None where it lacks fin, yaw or speed; a model's actuator effects shape the fin."""
+    steered = run.has("rudder_rad") or run.has("rudder_measured_rad")
+    if not steered or not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")) or not knows_speed(run):
+        return None
+    record = record_of(run, Axis.YAW)
+    if len(record) < LEAST_SAMPLES:
+        return None
+    path = record.commanded
+    if model is not None and not record.fin_is_measured:
+        acting = [e for e in effects_of(model) if e.fin is not None and e.name not in OWN_EFFECTS]
+        path = fin_path(record, acting, {c.name: c.start for e in acting for c in e.nuisance} | dict(model.values))
+    none = np.full(len(record), np.nan)
+    rate = np.where(record.rate_ok, record.rate, np.nan)
+    has_rate = bool(record.rate_ok.any())
+    heading = none if has_rate else np.where(record.angle_ok, record.angle - record.angle[record.angle_ok][0], np.nan)
+    bias, bias_sd = _rate_bias(record)
+    rate = rate - bias
+    sway = run["sway_m_s"] if run.has("sway_m_s") else none
+    measured = np.stack([run["surge_m_s"], sway, rate if has_rate else none, heading])
+    fin = np.stack([path.start, path.end], axis=1)
+    thrust = _thrust(record.signals.get("thrust"), record.thrust_column, len(record))
+    return FlownRun(run.name, record.time, fin, thrust, measured, bias_sd, _discrepancy(record.time, measured))
+
+
+def _discrepancy(time: FloatArray, measured: FloatArray) -> FloatArray:
+    """Standard deviation (4,) that the model's own error counts as in every sample: a share of what the run shows.
+
+    It stays alike for the time that the hull takes over a few metres, and so counts as the more in single samples.
+    """
+    speed, step = _straight_speed(measured), float(np.median(np.diff(time)))
+    width = max(1, round(1.0 / step))
+    straight = np.array([speed, 0.0, 0.0, 0.0])
+    out = np.zeros(4)
+    for i in range(4):
+        values = measured[i][np.isfinite(measured[i])] - straight[i]
+        if values.size >= width:
+            whole = values[: values.size // width * width].reshape(-1, width).mean(axis=1)
+            out[i] = np.sqrt(np.mean((whole - (whole.mean() if i == HEADING else 0.0)) ** 2))
+    return np.asarray(DISCREPANCY * out * np.sqrt(max(2.0 * DISCREPANCY_LENGTH_M / speed / step, 1.0)))
+
+
+def _straight_speed(measured: FloatArray) -> float:
+    return float(np.nanpercentile(measured[SURGE], 90))
+
+
+def _rate_bias(record: Record) -> tuple[float, float]:
+    """Return the bias of the rate gyro against the heading and its standard deviation, rad/s: the slope of what is between."""
+    if not (record.rate_ok.any() and record.angle_ok.sum() > LEAST_SAMPLES):
+        return 0.0, UNKNOWN_BIAS_RAD_S
+    rate = np.interp(record.time, record.time[record.rate_ok], record.rate[record.rate_ok])
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * record.steps * (rate[1:] + rate[:-1]))])
+    time, between = (record.time - record.time.mean())[record.angle_ok], (turned - record.angle)[record.angle_ok]
+    power = float(time @ time)
+    slope = float(time @ between) / power
+    left = between - between.mean() - slope * time
+    rho = min(max(float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-30), 0.0), 0.98)
+    sd = float(np.sqrt(np.mean(left**2) / power * (1.0 + rho) / (1.0 - rho)))
+    return slope, min(max(sd, LEAST_BIAS_SD_RAD_S), UNKNOWN_BIAS_RAD_S)
+
+
+def _thrust(thrust: FloatArray | None, column: str, count: int) -> FloatArray:
+    """Return the thrust over that at the run's start, one where it is not logged; that of a propeller goes with its rpm squared."""
+    if thrust is None:
+        return np.ones(count)
+    start = float(np.median(thrust[: max(10, thrust.size // 20)]))
+    if not start > 0.0:
+        return np.ones(count)
+    ratio = np.maximum(thrust / start, 0.0)
+    return np.asarray(ratio**2 if column == "propeller_rpm" else ratio)
+
+
+def usable_runs(runs: Sequence[Run], models: Sequence[Model]) -> tuple[FlownRun, ...]:
+    """Return what runs say; the fin is shaped by the model of the nearest speed."""
+    found = []
+    for run in runs:
+        near = None
+        if models and knows_speed(run):
+            speed = max(float(np.nanmedian(run["surge_m_s"])), LEAST_SPEED_M_S)
+            near = min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
+        flown = flown_run(run, near)
+        if flown is not None:
+            found.append(flown)
+    return tuple(found) if any(f.turns for f in found) else ()
