@@ -33,7 +33,7 @@ SUB_ROOMS = {
     "diagnosis": ("data", "evidence", "residual_tests", "search", "report"),
     "planning": ("specify", "belief", "flight", "safety", "design", "discriminate", "output"),
     "plant": ("laws",),
-    "turning": ("measured", "steady"),
+    "turning": ("measured", "steady", "maneuvering"),
     "cli": ("help", "trial", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its

@@ -58,15 +58,16 @@ def turn_radius(
     from fieldsid.turning import turn_radius as radius_over_speed
 
     own_effects()
-    source = source_of(models, law)
+    source, known = source_of(models, law), vehicle_of(vehicle)
     return radius_over_speed(
         source,
         speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
-        rudder_of(vehicle_of(vehicle), source, _say) if rudder_max is None else rudder_max,
+        rudder_of(known, source, _say) if rudder_max is None else rudder_max,
         runs=runs_mapped(run_files(source, _say) if runs is None else runs, mapping),
         measured=runs_mapped(measured, mapping),
         method=method,
         fin_zero=fin_zero,
+        length=None if known is None else known.length_m,
     )
 
 

@@ -22,7 +22,10 @@ HOW = "one and a half circles, x_m and y_m logged"
 
 @dataclass(frozen=True, slots=True, repr=False)
 class TurnRow(Displayed):
-    """The turn at one entry speed to one side; lengths m, times s, rates rad/s, NaN where the method does not give it."""
+    """The turn at one entry speed to one side; lengths m, times s, rates rad/s, NaN where the method does not give it.
+
+    `radius` is the median of what is believed, `of_model` that of the identified yaw model alone.
+    """
 
     speed: float
     side: str
@@ -43,6 +46,7 @@ class TurnRow(Displayed):
     tactical_diameter: float = float("nan")
     predicted: float = float("nan")
     predicted95: tuple[float, float] = (float("nan"), float("nan"))
+    of_model: float = float("nan")
 
     @property
     def extrapolated(self) -> bool:
@@ -67,6 +71,7 @@ class TurnRow(Displayed):
             "tactical_diameter_m": self.tactical_diameter,
             "predicted_m": self.predicted,
             "predicted95": list(self.predicted95),
+            "model_radius_m": self.of_model,
             "method": self.method,
             "extrapolated": self.extrapolated,
             "trust": self.trust,
@@ -176,6 +181,13 @@ class TurnPrediction(Plotted):
             },
             "warnings": [{"code": n.code, "message": n.message} for n in self.notes],
         }
+
+
+def settling_flight(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:
+    """Return the flight that settles what a row lacks."""
+    if not because:
+        return "nothing more: the data reached this turn"
+    return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: {HOW}"
 
 
 def _to(rows: Sequence[TurnRow], side: str) -> bool:

@@ -1,4 +1,4 @@
-"""Turning radius over speed, both sides, with bands: the paper's formula, or the identified model simulated to its circle."""
+"""Turning radius over speed, both sides, with bands: from all runs together, the models simulated, or the paper's formula."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
+from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
+from fieldsid.turning.maneuvering.belief import Belief, believe
 from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
 from fieldsid.turning.paper_formulas import (
@@ -24,13 +26,13 @@ from fieldsid.turning.paper_formulas import (
     u_turn,
     usable_fin,
 )
-from fieldsid.turning.prediction import HOW, SIDES, MeasuredRow, TurnPrediction, TurnRow
+from fieldsid.turning.prediction import SIDES, MeasuredRow, TurnPrediction, TurnRow, settling_flight
 from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
 RADIUS_DRAWS = 500
 SEED = 20240511
-METHODS = ("auto", "u_turn", "steady", "simulated")
+METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
 MIN_REPORTED_OFFSET_RAD = 0.0025
 """An offset in rad that moves a radius by a hundredth."""
 
@@ -46,36 +48,51 @@ def turn_radius(
     draws: int = RADIUS_DRAWS,
     fin_zero: float = FIN_ZERO_TOLERANCE,
     unfit: Refused[Run] | None = None,
+    length: float | None = None,
 ) -> TurnPrediction:
     """Return the turn at every speed (m/s) to both sides with the rudder at rudder_max (rad).
 
-    runs are those the models came from: the loss of speed and the drift in a turn are identified from them. measured
-    are runs of turns to compare with. method "auto" simulates where the models carry effects and takes the u-turn
-    formula elsewhere. An offset of the fin below `fin_zero` (rad) is not counted in the formula. unfit is told of each of
-    several measured runs without a circle; without it, and where none has one, DataError is raised. Raises UsageError, and
-    ModelError for an unstable model.
+    runs are those the models came from, measured are runs of turns: the turn is that of a vehicle in surge, sway and yaw fitted
+    to all of them, `length` (m) being the vehicle's where it is known. A measured circle is compared with what the other runs
+    alone predict. method "auto" does so where the models carry effects and the runs a speed; without runs it simulates
+    models with effects, and takes the u-turn formula elsewhere, where an offset of the fin below `fin_zero` (rad) is not
+    counted. unfit is told of each of several measured runs without a circle; without it, and where none has one, DataError is
+    raised. Raises UsageError, and ModelError for an unstable model.
     """
     _check(source, speeds, rudder_max, method)
     source = source.models_flown_by(runs)
     chosen = _chosen(source, method)
-    if chosen == "simulated" and source.own_laws:
+    if chosen in ("simulated", "maneuvering") and source.own_laws:
         raise UsageError(
             "a law of one's own goes with the formula, not with a simulation of models that carry effects",
             found=f"--law {', '.join(source.own_laws)}",
             hint="add `--method u_turn`, or leave `--law` out",
         )
-    surge = fit_surge(runs) if chosen == "simulated" and runs else None
+    belief = before = None
+    if chosen in ("simulated", "maneuvering") and method != "simulated" and runs:
+        rng = np.random.default_rng(SEED)
+        before = believe(runs, source.models, length, rng)
+        belief = believe((*runs, *measured), source.models, length, rng) if measured else before
+    if method == "maneuvering" and belief is None:
+        raise UsageError(
+            "surge, sway and yaw cannot be fitted without runs that have a speed, a fin and a turn", found=f"{len(runs)} runs",
+            hint="name them with `--runs`, with surge_m_s mapped",
+        )  # fmt: skip
+    surge = fit_surge(runs) if chosen in ("simulated", "maneuvering") and runs else None
     turns = [turn for _, turn in sifted(measured, (attempt(measure_turn, run) for run in measured), unfit)]
 
-    def rows_at(at: Sequence[float], rudder: float) -> list[TurnRow]:
+    def rows_at(at: Sequence[float], rudder: float, known: Belief | None = before) -> list[TurnRow]:
+        if known is not None:
+            return believed_rows(source, known, at, rudder, surge)
         if chosen == "simulated":
             return _simulated_rows(source, at, rudder, surge, draws)
         return _formula_rows(source, at, rudder, chosen, draws, fin_zero)
 
-    if chosen != "simulated":
+    by_formula = belief is None and chosen != "simulated"
+    if by_formula:
         _refuse_turns(source, speeds, rudder_max)
-    rows = rows_at(speeds, rudder_max)
-    least = (lambda _speed: 0.0) if chosen == "simulated" else (lambda speed: abs(_offset(source, speed)))
+    rows = rows_at(speeds, rudder_max, belief)
+    least = (lambda _speed: 0.0) if not by_formula else (lambda speed: abs(_offset(source, speed)))
     compared = [_compared(turn, rows_at, least) for turn in turns]
     rows = [_with_measurement(row, compared, rudder_max) for row in rows]
     return TurnPrediction(tuple(rows), tuple(compared), rudder_max, surge, tuple(_notes(source, rows, chosen, surge, fin_zero)))
@@ -148,7 +165,7 @@ def _simulated_row(source: ParameterSource, turns: BlendedTurns, index: int, sid
     radius = turns.radius[:, index]
     row = _row(
         speed, side, "simulated", coverage, rudder, radius=radius, spread=spread, time=time * radius / radius[0],
-        steady=float(radius[0]), u_turn_radius=float(turns.transient.path_180[index] / np.pi), rate=rate,
+        steady=_median(radius * spread), u_turn_radius=float(turns.transient.path_180[index] / np.pi), rate=rate,
         turn_speed=float(turns.path_speed[index]),
     )  # fmt: skip
     after = turns.transient
@@ -175,9 +192,10 @@ def _row(
     rate: float,
     turn_speed: float,
 ) -> TurnRow:
-    value = float(radius[0])
+    simulated = method == "simulated"
+    value = _median(radius * spread) if simulated else float(radius[0])
     interval = _interval(radius * spread, value)
-    because = coverage.missing
+    because = (*coverage.missing, *(_doubts(radius, interval, value) if simulated else ()))
     return TurnRow(
         speed=float(speed),
         side=side,
@@ -190,19 +208,31 @@ def _row(
         method=method,
         trust="extrapolated" if because else "identified",
         because=because,
-        settle_with=_settles(because, side, speed, rudder),
+        settle_with=settling_flight(because, side, speed, rudder),
         turn_speed=float(turn_speed),
         u_turn_time95=_interval(time * spread, float(time[0])),
         predicted=value,
         predicted95=interval,
+        of_model=float(radius[0]),
     )
 
 
+def _doubts(radius: FloatArray, interval: tuple[float, float], value: float) -> tuple[str, ...]:
+    """Return what the draws themselves say against taking a turn as identified."""
+    unsettled = float(np.mean(~np.isfinite(radius)))
+    return doubts_of_draws(interval[1] - interval[0], value, unsettled)
+
+
+def _median(draws: FloatArray) -> float:
+    """Return the median of the draws that have a settled turn."""
+    return float(np.median(draws[np.isfinite(draws)]))
+
+
 def _interval(draws: FloatArray, value: float) -> tuple[float, float]:
-    """Return the 95 % interval of draws, stretched to hold the value itself."""
+    """Return the 95 % interval of the draws that have a settled turn, stretched to hold the value itself."""
     if not np.isfinite(value):
         return float("nan"), float("nan")
-    low, high = np.nanpercentile(draws, [2.5, 97.5])
+    low, high = np.percentile(draws[np.isfinite(draws)], [2.5, 97.5])
     return min(float(low), value), max(float(high), value)
 
 
@@ -226,12 +256,6 @@ def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, qu
     slowest = model.values.get("cross_damping", np.inf) * model.law.scale(speed)
     seen = slowest * model.trained.get("held_s", 0.0) >= 1.0
     return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
-
-
-def _settles(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:
-    if not because:
-        return "nothing more: the data reached this turn"
-    return f"turning_circle to {side} at {speed:.2f} m/s with {rudder:.3g} rad: {HOW}"
 
 
 def _compared(
@@ -277,7 +301,7 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
         raise UsageError("a turning radius needs the yaw axis", found="pitch parameters", hint="identify with `--axis yaw`")
     if method not in METHODS:
         raise UsageError(f"there is no method {method!r}", found=", ".join(METHODS), hint="leave `--method` out")
-    if method == "simulated" and not source.models:
+    if method in ("simulated", "maneuvering") and not source.models:
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
     if not 0.0 < rudder_max <= 1.5708:
         raise UsageError(
@@ -304,7 +328,7 @@ def _notes(
                 {"speeds": outside},
             )
         )
-    if method == "simulated" and (surge is None or not surge.surge_measured):
+    if method in ("simulated", "maneuvering") and (surge is None or not surge.surge_measured):
         notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 50 %)"))
     if method == "u_turn":
         notes += _offset_notes(source, fin_zero)

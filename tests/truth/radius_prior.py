@@ -1,6 +1,6 @@
 """The prior of the maneuvering model from the ensemble: writes `fieldsid/turning/maneuvering/prior_table.py` again.
 
-    python tests/truth/radius_prior.py [--draws 1400] [--write]
+python tests/truth/radius_prior.py [--draws 1400] [--write]
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ def table(draws: int) -> str:
     rows = "\n".join(f"    ({', '.join(f'{v:.3f}' for v in row)})," for row in correlation)
 
     def numbers(values: np.ndarray) -> str:
-        return ", ".join(f"{v:.4f}" for v in values)
+        return ",\n    ".join(", ".join(f"{v:.4f}" for v in part) for part in np.array_split(values, 2))
 
     return (
         f'"""Moments of the coefficients over {draws} hulls, seed {SEED}: written by `tests/truth/radius_prior.py`."""\n\n'
-        f"# fmt: off\nMEAN = ({numbers(sample.mean(axis=0))})\n"
-        f"STANDARD_DEVIATION = ({numbers(spread)})\nCORRELATION = (\n{rows}\n)\n"
+        f"# fmt: off\nMEAN = (\n    {numbers(sample.mean(axis=0))},\n)\n"
+        f"STANDARD_DEVIATION = (\n    {numbers(spread)},\n)\nCORRELATION = (\n{rows}\n)\n"
     )
 
 

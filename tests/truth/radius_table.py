@@ -19,16 +19,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from truth.maneuvering.hulls import KINDS, Hull, draw_hull
-from truth.maneuvering.motion import true_turn
-from truth.maneuvering.trials import SETS, Log, training
-
 from fieldsid.errors import FieldsidError
 from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.turning.radius import turn_radius
+from truth.maneuvering.hulls import KINDS, Hull, draw_hull
+from truth.maneuvering.motion import true_turn
+from truth.maneuvering.trials import SETS, Log, training
 
 EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
 WANTED = {"pulses": 0.8, "pulses+zigzag": 0.35, "pulses+circle": 0.35}
@@ -117,15 +116,17 @@ def line(name: str, rows: list[Outcome]) -> str:
 def table(rows: list[Outcome]) -> list[str]:
     """Return the table's lines: by training set, each with its kinds, trusted rows and sensors apart."""
     head = ("rows", "bad", "bias %", "mid %", "90th %", "worst %", "held %", "width", "w 90th")
-    lines = [f"{'':42s} {head[0]:>5s} {head[1]:>4s} {head[2]:>7s} {head[3]:>7s} {head[4]:>7s} {head[5]:>8s} {head[6]:>7s} "
-             f"{head[7]:>7s} {head[8]:>7s}"]  # fmt: skip
+    wide = (5, 4, 7, 7, 7, 8, 7, 7, 7)
+    lines = [" ".join([" " * 42, *(f"{h:>{w}s}" for h, w in zip(head, wide, strict=True))])]
     for which in SETS:
         own = [r for r in rows if r.training == which]
         if not own:
             continue
         lines.append(line(f"{which} (width wanted {WANTED[which]})", own))
         lines += [line(f"  {kind}", part) for kind in KINDS if (part := [r for r in own if r.kind == kind])]
-        lines += [line(f"  sway {'' if s else 'not '}logged", part) for s in (True, False) if (part := [r for r in own if r.sway == s])]
+        lines += [
+            line(f"  sway {'' if s else 'not '}logged", part) for s in (True, False) if (part := [r for r in own if r.sway == s])
+        ]
         trusts = sorted({r.trust for r in own} - {"refused"})
         lines += [line(f"  trusted: {t}", [r for r in own if r.trust == t]) for t in trusts]
     return lines

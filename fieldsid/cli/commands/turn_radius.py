@@ -93,6 +93,7 @@ def command(
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
+        length=_length(vehicle),
     )
     body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
     body["skipped_runs"] = skips.records
@@ -120,6 +121,14 @@ def _rudder(given: float | None, vehicle: Path | None, source: ParameterSource) 
     from fieldsid.face.arguments import rudder_of, vehicle_of
 
     return given if given is not None else rudder_of(vehicle_of(vehicle), source, say)
+
+
+def _length(vehicle: Path | None) -> float | None:
+    """Return the vehicle's length in m where it is stated."""
+    from fieldsid.face.arguments import vehicle_of
+
+    known = vehicle_of(vehicle)
+    return None if known is None else known.length_m
 
 
 def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:

@@ -1,11 +1,12 @@
 """Surge, sway and yaw of a hull with a rudder at its stern, in coefficients without units, compiled.
 
-    u' = D/L (s^2 (1 + t (1 - u/s)) - u^2) + X0/L U (s - u) + M v r + X L r^2 - M R/L w^2 f(alpha) sin(delta)
+    u' = (D (s^2 (1 + t (1 - u/s)) - u^2) + X0 U (s - u) - M R w^2 f(alpha) sin(delta)) / L + M v r + X L r^2
     v' = (-(Yv u + Y0 U) v - Yr L u r - C J0 + R w^2 f(alpha) cos(delta)) / L
     r' = (-Nv u v - (Nr u + N0 U) L r - b C L J1 + a L R w^2 f(alpha) cos(delta)) / (k L^2)
     Jn = int_{-1/2}^{1/2} h(x) (v + x L r)|v + x L r| x^n dx,   h = sqrt(1 - |2 x|^3)
     alpha = delta + d0 - atan((v + a L r)/u),  w^2 = u^2 + (v + a L r)^2,  f(alpha) = alpha / (1 + (alpha/c)^4)^(1/4)
-with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length, U = 1.5 m/s, R also (s/U)^e.
+with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length, U = 1.5 m/s; R goes
+with (s/U)^e.
 Source: Fossen 2011, sections 6.4, 6.5 and 9.4; cross-flow drag as Faltinsen 1990, chapter 6; lift that fades at the stall.
 """
 
@@ -23,7 +24,7 @@ NAMES = (
     "yaw_lift", "yaw_rate", "cross_drag", "stall", "rudder_offset", "lag", "rate_surge", "rate_limit",
     "wash", "sway_viscous", "yaw_viscous", "yaw_drag", "surge_viscous",
 )  # fmt: skip
-"""The coefficients in order: L, D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, servo lag (s), X, servo rate limit (rad/s), e, Y0, N0, b, X0."""
+"""In order: L, D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, servo's lag (s), X, its rate limit (rad/s), e, Y0, N0, b, X0."""
 LOGARITHMS = {"length", "drag", "rudder", "gyration", "cross_drag", "stall", "lag", "rate_limit", "yaw_drag"}
 IN_LOGARITHM = np.array([n in LOGARITHMS for n in NAMES])
 REFERENCE_SPEED_M_S = 1.5
@@ -36,7 +37,15 @@ MOST_M_S = 50.0
 
 @inner
 def _slope(
-    u: float, v: float, r: float, delta: float, push: float, straight: float, p: FloatArray, places: FloatArray, heights: FloatArray
+    u: float,
+    v: float,
+    r: float,
+    delta: float,
+    push: float,
+    straight: float,
+    p: FloatArray,
+    places: FloatArray,
+    heights: FloatArray,
 ) -> tuple[float, float, float]:
     """Return the accelerations; `push` is the thrust over that of the straight run, p the coefficients."""
     length = p[0]
@@ -51,11 +60,23 @@ def _slope(
     side = v + p[5] * length * r
     alpha = delta + p[13] - math.atan2(side, surge)
     ratio = (alpha / p[12]) ** 2
-    lift = p[4] * (straight / REFERENCE_SPEED_M_S) ** p[17] * (surge * surge + side * side) * alpha / math.sqrt(math.sqrt(1.0 + ratio * ratio))
+    lift = (
+        p[4]
+        * (straight / REFERENCE_SPEED_M_S) ** p[17]
+        * (surge * surge + side * side)
+        * alpha
+        / math.sqrt(math.sqrt(1.0 + ratio * ratio))
+    )
     cosine = lift * math.cos(delta)
     thrust = push * straight * straight * (1.0 + p[3] * (1.0 - u / straight))
     viscous = p[21] / length * REFERENCE_SPEED_M_S * (straight - u)
-    du = p[1] / length * (thrust - u * abs(u)) + viscous + p[2] * v * r + p[15] * length * r * r - p[2] * lift * math.sin(delta) / length
+    du = (
+        p[1] / length * (thrust - u * abs(u))
+        + viscous
+        + p[2] * v * r
+        + p[15] * length * r * r
+        - p[2] * lift * math.sin(delta) / length
+    )
     linear_sway, linear_yaw = p[7] * surge + p[18] * REFERENCE_SPEED_M_S, p[10] * surge + p[19] * REFERENCE_SPEED_M_S
     dv = (-linear_sway * v - p[8] * length * surge * r - p[11] * j0 + cosine) / length
     moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * length * j1 + p[5] * length * cosine
@@ -92,7 +113,7 @@ def simulate(
         if i == count - 1:
             break
         whole = time[i + 1] - time[i]
-        pieces = max(int(math.ceil(whole / STEP_S - 1e-6)), 1)
+        pieces = max(math.ceil(whole / STEP_S - 1e-6), 1)
         h = whole / pieces
         keep, half = math.exp(-h / p[14]), math.exp(-0.5 * h / p[14])
         for j in range(pieces):

@@ -121,9 +121,7 @@ def _bias_sd(run: FlownRun) -> FloatArray:
     return np.array([run.rate_bias_sd, SWAY_BIAS_SD])
 
 
-def _run_cost(
-    run: FlownRun, vector: FloatArray, local: FloatArray, noise: FloatArray, begins: npt.NDArray[np.int64]
-) -> float:
+def _run_cost(run: FlownRun, vector: FloatArray, local: FloatArray, noise: FloatArray, begins: npt.NDArray[np.int64]) -> float:
     return float(np.sum(_residual(run, vector, local, begins, noise) ** 2) + np.sum(_local_prior(run, local, begins) ** 2))
 
 
@@ -259,5 +257,3 @@ def _step(
     matrix += damping * np.diag(np.diag(matrix))
     step = -np.linalg.solve(matrix, gradient)
     return step, [-(s[:, :-1] @ step + s[:, -1]) for s in solved]
-
-

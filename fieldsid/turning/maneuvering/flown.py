@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fieldsid.dynamics.assemble import fin_path
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.logs.run import Run
-from fieldsid.models.axis import Axis
+from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.models.record import Record, knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
@@ -86,6 +86,8 @@ def flown_run(run: Run, model: Model | None) -> FlownRun | None:
     sway = run["sway_m_s"] if run.has("sway_m_s") else none
     measured = np.stack([run["surge_m_s"], sway, rate if has_rate else none, heading])
     fin = np.stack([path.start, path.end], axis=1)
+    if model is not None and model.base[NAMES[model.axis].authority] > 0.0:
+        fin = -fin  # the equations' rudder turns to port
     thrust = _thrust(record.signals.get("thrust"), record.thrust_column, len(record))
     return FlownRun(run.name, record.time, fin, thrust, measured, bias_sd, _discrepancy(record.time, measured))
 
@@ -127,7 +129,7 @@ def _rate_bias(record: Record) -> tuple[float, float]:
 
 
 def _thrust(thrust: FloatArray | None, column: str, count: int) -> FloatArray:
-    """Return the thrust over that at the run's start, one where it is not logged; that of a propeller goes with its rpm squared."""
+    """Return the thrust over that at the run's start, one where it is not logged; it goes with the rpm squared."""
     if thrust is None:
         return np.ones(count)
     start = float(np.median(thrust[: max(10, thrust.size // 20)]))

@@ -55,7 +55,7 @@ def turn_transient(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, si
         if i % CHECK_EVERY == 0 and bool(np.all(np.abs(state[0]) > np.pi + 0.2)):
             done = i + 1
             break
-    return _read_off(STEP_S * np.arange(done + 1, dtype=np.float64), track[: done + 1], side)
+    return read_off(STEP_S * np.arange(done + 1, dtype=np.float64), track[: done + 1], side)
 
 
 def _slope(state: FloatArray, plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, fin: float) -> FloatArray:
@@ -82,7 +82,8 @@ def _slope(state: FloatArray, plant: YawPlant, speed_loss: SpeedLoss, entry: Flo
     return np.stack([rate, moment, slower, along, across, np.hypot(surge, sway), drift])
 
 
-def _read_off(time: FloatArray, track: FloatArray, side: float) -> Transient:
+def read_off(time: FloatArray, track: FloatArray, side: float) -> Transient:
+    """Return the turn of tracks (n, 4, s) of heading (rad), north, east and path (m) at times (n,) s, toward `side`."""
     columns = [
         _one(time, side * track[:, 0, j], track[:, 1, j], side * track[:, 2, j], track[:, 3, j]) for j in range(track.shape[2])
     ]

@@ -73,7 +73,7 @@ def fly(h, straight, command, mode, settings, sample, gust):
     k, s, mid = np.zeros((4, 6)), np.zeros(6), np.zeros(6)
     s[0] = straight
     fin, course, side, last = -h.rudder_offset, 0.0, 1.0, -1
-    pieces = int(round(sample / 0.02))
+    pieces = round(sample / FINE_S)
     step = sample / pieces
     for i in range(count):
         states[i] = s

@@ -1,4 +1,4 @@
-"""Training sets of a hull: pulses, pulses with zig-zags, pulses with a circle; each speed a run of its own, sensors with noise."""
+"""Training sets of a hull: pulses, pulses with zig-zags, pulses with a circle; each speed a run, sensors with noise."""
 
 from __future__ import annotations
 

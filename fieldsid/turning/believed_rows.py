@@ -1,0 +1,93 @@
+"""The rows of a prediction that rests on all runs together, and why one of them is not taken as identified."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.errors import ModelError
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
+from fieldsid.turning.model_error import MIN_COVERED_SHARE
+from fieldsid.turning.prediction import SIDES, TurnRow, settling_flight
+from fieldsid.turning.steady.blended_turns import blended_turns
+from fieldsid.turning.steady.speed_loss import SurgeModel
+
+SEED = 20240511
+MAX_IDENTIFIED_WIDTH = 0.35
+"""Widest band of a turn that counts as identified, over the radius."""
+MAX_UNSETTLED = 0.05
+"""Share of the draws without a settled turn above which a turn is not taken as identified."""
+
+
+def believed_rows(
+    source: ParameterSource, belief: Belief, speeds: Sequence[float], rudder: float, surge: SurgeModel | None
+) -> list[TurnRow]:
+    """Return the rows of a belief at speeds (m/s) to both sides, the identified models' own circle beside each.
+
+    Raises ModelError where nothing that the runs allow has a settled turn.
+    """
+    own = blended_turns(source, np.array(speeds, dtype=np.float64), rudder, surge, 1, np.random.default_rng(SEED))
+    return [
+        _believed_row(source, belief.turn(float(speed), rudder, sign), float(own[side].radius[0, i]), float(speed), side, rudder)
+        for side, sign in SIDES.items()
+        for i, speed in enumerate(speeds)
+    ]
+
+
+def _believed_row(
+    source: ParameterSource, turn: BelievedTurn, of_model: float, speed: float, side: str, rudder: float
+) -> TurnRow:
+    if not np.isfinite(turn.radius):
+        raise ModelError(
+            f"no draw that the runs allow has a settled turn to {side} at {speed:.3g} m/s",
+            found=f"rudder {rudder:.3g} rad",
+            hint="fly a turning circle there, and give it with `--measured`",
+        )
+    because = _missing(turn, flown=source.supports(speed))
+    after = turn.transient
+    time = float(after.time_180[0])
+    low, high = turn.interval95
+    return TurnRow(
+        speed=speed,
+        side=side,
+        radius=turn.radius,
+        interval95=turn.interval95,
+        steady_radius=turn.radius,
+        u_turn_radius=float(after.path_180[0] / np.pi),
+        u_turn_time=time,
+        yaw_rate_max=turn.rate,
+        method="maneuvering",
+        trust="extrapolated" if because else "identified",
+        because=because,
+        settle_with=settling_flight(because, side, speed, rudder),
+        turn_speed=turn.path_speed,
+        u_turn_time95=(time * low / turn.radius, time * high / turn.radius),
+        advance=float(after.advance[0]),
+        transfer=float(after.transfer[0]),
+        tactical_diameter=float(after.tactical_diameter[0]),
+        predicted=turn.radius,
+        predicted95=turn.interval95,
+        of_model=of_model,
+    )
+
+
+def _missing(turn: BelievedTurn, *, flown: bool) -> tuple[str, ...]:
+    """Return why a turn is not taken as identified; empty where the runs reached it and its band is narrow."""
+    low, high = turn.interval95
+    short = {
+        "a turn this tight was not flown": turn.curvature_covered >= MIN_COVERED_SHARE,
+        "a fin angle this large was not flown": turn.fin_covered >= MIN_COVERED_SHARE,
+        "this speed was not flown": flown,
+    }
+    return (*(says for says, fine in short.items() if not fine), *doubts_of_draws(high - low, turn.radius, turn.unsettled))
+
+
+def doubts_of_draws(width: float, radius: float, unsettled: float) -> tuple[str, ...]:
+    """Return what the draws say against taking a turn as identified: a wide band (m), or a share of them that never settles."""
+    doubts = {
+        f"the band is wider than {MAX_IDENTIFIED_WIDTH:.0%} of the radius": width <= MAX_IDENTIFIED_WIDTH * radius,
+        f"{unsettled:.0%} of what the runs allow has no settled turn there": unsettled <= MAX_UNSETTLED,
+    }
+    return tuple(says for says, fine in doubts.items() if not fine)

@@ -1,0 +1,138 @@
+"""The turns that all runs together make believe in: median and band of the settled circle, and the way into it.
+
+The equations are not the vehicle: beyond the posterior's own spread the radius is spread by what equations with such data were
+off by on hulls of the ensemble and on the field vehicle (`FORM_LOG_SD`, `UNSEEN_LOG_SD`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.dynamics.free_run import effects_of
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import NAMES
+from fieldsid.models.model import Model
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.plant.yaw_plant import steady_fins
+from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, coefficients, simulate
+from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
+from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
+from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, settled_turns, weighted_quantile
+from fieldsid.turning.model_error import STALL_LOG_SD
+from fieldsid.turning.steady.transient import Transient, read_off
+
+FORM_LOG_SD = 0.025
+"""Log error of the equations where the turn was flown: 0.4 % on the ensemble (seed 1), 0.5 to 4 % on a vehicle outside it."""
+UNSEEN_LOG_SD = 0.16
+"""More for each share of the turn's curvature that was not flown: with pulses alone the ensemble (seed 1) was off by 10 %."""
+TRACK_STEP_S = 0.05
+MAX_TRACK_S = 240.0
+
+
+@dataclass(frozen=True, slots=True)
+class BelievedTurn:
+    """One turn: radius (m) with its 95 % band, rate (rad/s, magnitude), path speed (m/s).
+
+    `curvature_covered` and `fin_covered` are what was flown over what the turn has, at most one, `unsettled` is the weight of
+    the draws that have no settled turn there, `transient` that of the likeliest draw.
+    """
+
+    radius: float
+    interval95: tuple[float, float]
+    rate: float
+    path_speed: float
+    curvature_covered: float
+    fin_covered: float
+    unsettled: float
+    transient: Transient
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """The posterior of a vehicle's coefficients, and how its fin goes."""
+
+    fitted: Fitted
+    posterior: Posterior
+    models: tuple[Model, ...]
+
+    @property
+    def runs(self) -> tuple[FlownRun, ...]:
+        """The runs it rests on."""
+        return self.fitted.runs
+
+    def turn(self, entry: float, rudder: float, side: float) -> BelievedTurn:
+        """Return the turn to starboard (side +1) or port (-1) from a straight run at `entry` m/s at `rudder` rad."""
+        fin = _fin(self.models, entry, rudder, side)
+        turns = settled_turns(self.posterior, np.array([entry]), fin)
+        ok = np.isfinite(turns.radius[:, 0]) & (side * turns.rate[:, 0] > 0.0)
+        weights = np.where(ok, self.posterior.weights, 0.0)
+        log_radius = np.log(np.where(ok, turns.radius[:, 0], np.nan))
+        middle = float(np.exp(weighted_quantile(log_radius, weights, 0.5)))
+        covered = min(self.largest_curvature * middle, 1.0) if np.isfinite(middle) else 0.0
+        fin_covered = min(max(float(np.max(np.abs(r.fin))) for r in self.runs) / max(abs(fin), 1e-9), 1.0)
+        spread = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
+        low, high = _band(log_radius, weights, spread)
+        rate = weighted_quantile(np.abs(turns.rate[:, 0]), weights, 0.5)
+        speed = weighted_quantile(turns.path_speed[:, 0], weights, 0.5)
+        way = self._transient(entry, fin, side)
+        return BelievedTurn(middle, (low, high), rate, speed, covered, fin_covered, float(1.0 - weights.sum()), way)
+
+    @property
+    def largest_curvature(self) -> float:
+        """The largest curvature that a run held for a moment, 1/m."""
+        largest = 0.0
+        for run in self.runs:
+            rate = run.measured[RATE]
+            if not np.isfinite(rate).any():
+                rate = np.gradient(run.measured[HEADING], run.time)
+            ok = np.isfinite(rate) & np.isfinite(run.measured[SURGE])
+            width = max(1, round(1.0 / float(np.median(np.diff(run.time)))))
+            count = int(ok.sum()) // width * width
+            if count:
+                means = np.stack([rate[ok][:count], run.measured[SURGE][ok][:count]]).reshape(2, -1, width).mean(axis=2)
+                largest = max(largest, float(np.max(np.abs(means[0]) / np.maximum(means[1], 0.05))))
+        return largest
+
+    def _transient(self, entry: float, fin: float, side: float) -> Transient:
+        time = np.arange(0.0, MAX_TRACK_S, TRACK_STEP_S)
+        path = np.full((time.size - 1, 2), fin)
+        path[0, 0] = 0.0
+        best = coefficients(self.fitted.vector)
+        first = np.array([[entry, 0.0, 0.0]])
+        motion = simulate(best, entry, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), STATIONS, HEIGHTS)
+        u, v, heading = motion[SURGE], motion[SWAY], motion[HEADING]
+        along, across = u * np.cos(heading) - v * np.sin(heading), u * np.sin(heading) + v * np.cos(heading)
+        whole = np.cumsum(np.stack([along, across, np.hypot(u, v)]), axis=1) * TRACK_STEP_S
+        track = np.concatenate([heading[None], whole - whole[:, :1]]).T[:, :, None]
+        return read_off(time, track, side)
+
+
+def believe(runs: Sequence[Run], models: Sequence[Model], length: float | None, rng: np.random.Generator) -> Belief | None:
+    """Return what runs make believe of a vehicle, its length in m where known; None where they lack fin, yaw or speed."""
+    flown = usable_runs(runs, models)
+    if not flown:
+        return None
+    fitted = fit_maneuvering(flown, length)
+    return Belief(fitted, draw_posterior(fitted, rng), tuple(models))
+
+
+def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> float:
+    """Return the fin angle that a rudder at its limit leaves, positive to port, as the equations have it."""
+    if not models:
+        return -side * rudder
+    near = min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
+    sign = float(np.sign(near.base[NAMES[near.axis].authority])) or 1.0
+    acting = [e for e in effects_of(near) if e.name not in OWN_EFFECTS]
+    values = {c.name: c.start for e in acting for c in e.nuisance} | dict(near.values)
+    return -sign * steady_fins(acting, [values], side * sign * rudder, speed)[0]
+
+
+def _band(log_radius: FloatArray, weights: FloatArray, spread: float) -> tuple[float, float]:
+    """Return the 95 % band of weighted draws (n,), each spread by a normal error of the equations."""
+    nodes, parts = np.polynomial.hermite_e.hermegauss(15)
+    whole = (log_radius[:, None] + spread * nodes[None, :]).ravel()
+    shares = (weights[:, None] * parts[None, :]).ravel()
+    return float(np.exp(weighted_quantile(whole, shares, 0.025))), float(np.exp(weighted_quantile(whole, shares, 0.975)))
