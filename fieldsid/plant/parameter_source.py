@@ -28,6 +28,7 @@ from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
 from fieldsid.rounding import nine_digits
 
+MAX_PROPOSALS = 40
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 
 
@@ -214,21 +215,27 @@ def source_of_laws(
 def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[list[dict[str, float]], FloatArray]:
     """Return draws of a model's values from its covariance, the first the estimate, and of its damping exponent (count,).
 
-    Values stay within the bounds their effects declare, and damping that was found positive stays positive.
+    A draw outside the bounds that the effects declare, or with a damping or an authority of the other sign, is rejected as a
+    whole: no value is moved to its bound. Where `MAX_PROPOSALS` times as many leave fewer than `count`, these come again.
     """
     covariance = np.nan_to_num(np.asarray(model.covariance))
     size = len(model.free)
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T)) if size else (np.zeros(0), np.zeros((0, 0)))
-    z = rng.standard_normal((count, size)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    estimate = np.array([model.values[n] for n in model.free])
     bounds = _bounds(model)
-    draws = []
-    for i in range(count):
-        own = dict(model.values)
-        if i:
-            for j, name in enumerate(model.free):
-                low, high = bounds.get(name, (-np.inf, np.inf))
-                own[name] = float(np.clip(own[name] + z[i, j], low, high))
-        draws.append(own)
+    low, high = np.array([bounds.get(n, (-np.inf, np.inf)) for n in model.free]).reshape(size, 2).T
+    kept = np.empty((0, size))
+    for _ in range(MAX_PROPOSALS):
+        drawn = estimate + rng.standard_normal((count, size)) @ root.T
+        kept = np.concatenate([kept, drawn[np.all((drawn >= low) & (drawn <= high), axis=1)]])
+        if kept.shape[0] >= count - 1:
+            break
+    if kept.shape[0] == 0:
+        kept = estimate[None, :]
+    taken = kept[np.arange(count - 1) % kept.shape[0]]
+    own = dict(model.values)
+    draws = [own, *(own | dict(zip(model.free, map(float, row), strict=True)) for row in taken)]
     if EXPONENT in model.free:
         return draws, np.array([d[EXPONENT] for d in draws])
     exponent = np.full(count, model.law.damping_exponent)

@@ -34,13 +34,14 @@ RudderMax = Annotated[
     ),
 ]
 Measured = Annotated[
-    list[Path] | None, typer.Option("--measured", metavar="RUN", help="Run of a turning circle to compare with; may repeat.")
+    list[Path] | None,
+    typer.Option("--measured", metavar="RUN", help="Run of a turning circle, to compare with and to learn from; may repeat."),
 ]
 Runs = Annotated[
     list[Path] | None,
-    typer.Option("--runs", metavar="RUN", help="Runs to take the loss of speed from; the models' own if not given."),
+    typer.Option("--runs", metavar="RUN", help="Runs that the turn is fitted to; the models' own if not given."),
 ]
-Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, u_turn, steady or simulated.")]
+Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, maneuvering, simulated, u_turn or steady.")]
 OwnLaw = Annotated[
     list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
 ]
@@ -68,7 +69,8 @@ def command(
 ) -> Mapping[str, Any]:
     """Predict the turning radius over speed, port and starboard apart, with 95 % bands.
 
-    Models that carry effects, in a fit file too, are simulated to the settled circle, with the speed lost in the turn; a table
+    Models that carry effects, in a fit file too: surge, sway and yaw are fitted to all their runs and the measured turns at
+    once, and the radius is the median of what these allow; without runs the models are simulated to the settled circle. A table
     or first-order models go by the u-turn formula. Rows say what they rest on: measured, identified or extrapolated.
 
     Example: sysid turn-radius models/*.yaml --rudder-max 0.35 --measured circle.parquet -o turning/
@@ -144,7 +146,9 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
     outcomes = {path: attempt(lambda p: load_run(p, chosen), path) for path in run_files(source, say)}
     lost = [f"`{path}`" for path, outcome in outcomes.items() if not isinstance(outcome, Run)]
     if lost:
-        say(f"runs of the models that cannot be read again: {', '.join(lost)}: name them with `--runs` for the loss of speed")
+        say(
+            f"runs of the models that cannot be read again: {', '.join(lost)}: name them with `--runs`, the turn is fitted to all"
+        )
     return [outcome for outcome in outcomes.values() if isinstance(outcome, Run)]
 
 
@@ -174,7 +178,7 @@ def _written(
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
     from fieldsid.rounding import number
 
-    columns = ("side", "m/s", "radius m", "from", "to (95 %)", "deg/s", "180 deg s", "trust")
+    columns = ("side", "m/s", "radius m", "from", "to (95 %)", "model's", "deg/s", "180 deg s", "trust")
     rows = [
         (
             r.side,
@@ -182,6 +186,7 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
             number(r.radius, 3),
             number(r.interval95[0], 3),
             number(r.interval95[1], 3),
+            number(r.of_model, 3),
             number(r.yaw_rate_max * 57.29577951308232, 3),
             number(r.u_turn_time, 3),
             r.trust,

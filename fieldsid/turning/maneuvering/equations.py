@@ -2,7 +2,7 @@
 
     u' = (D (s^2 (1 + t (1 - u/s)) - u^2) + X0 U (s - u) - M R w^2 f(alpha) sin(delta)) / L + M v r + X L r^2
     v' = (-(Yv u + Y0 U) v - Yr L u r - C J0 + R w^2 f(alpha) cos(delta)) / L
-    r' = (-Nv u v - (Nr u + N0 U) L r - b C L J1 + a L R w^2 f(alpha) cos(delta)) / (k L^2)
+    r' = (-Nv u v - (Nr u + N0 U) L r - b C J1 + a R w^2 f(alpha) cos(delta)) / (k L^2)
     Jn = int_{-1/2}^{1/2} h(x) (v + x L r)|v + x L r| x^n dx,   h = sqrt(1 - |2 x|^3)
     alpha = delta + d0 - atan((v + a L r)/u),  w^2 = u^2 + (v + a L r)^2,  f(alpha) = alpha / (1 + (alpha/c)^4)^(1/4)
 with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length, U = 1.5 m/s; R goes
@@ -79,7 +79,7 @@ def _slope(
     )
     linear_sway, linear_yaw = p[7] * surge + p[18] * REFERENCE_SPEED_M_S, p[10] * surge + p[19] * REFERENCE_SPEED_M_S
     dv = (-linear_sway * v - p[8] * length * surge * r - p[11] * j0 + cosine) / length
-    moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * length * j1 + p[5] * length * cosine
+    moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * j1 + p[5] * cosine
     dr = moment / (p[6] * length * length)
     return du, dv, dr
 

@@ -29,6 +29,9 @@ SWAY_BIAS_SD = 0.02
 START_SD = 0.3
 """Prior of a segment's first state about the one measured: m/s, and rad/s."""
 FIRST_SEGMENT_S = 6.0
+LEAST_SEGMENT_S, SEGMENT_LENGTHS = 12.0, 3.0
+"""Segments are this long, s, or the way of so many hulls: what the water does to the vehicle is forgotten at the next one."""
+SHORTEST_SEGMENT_S = 4.0
 LONGEST_GROWTH = 2.5
 """Segments end before an unstable mode has grown by exp of this."""
 MAX_ITERATIONS = 25
@@ -66,10 +69,11 @@ def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
     """Fit the coefficients to runs; `length` of the vehicle in m where it is known."""
     mean, covariance = prior(length)
     found = _Problem(tuple(runs), FIRST_SEGMENT_S, mean, np.linalg.inv(covariance)).solved(mean, FIRST_NOISE, keep_noise=True)
-    speed = float(np.median([r.speed for r in runs]))
-    growth = growth_rate(coefficients(found.vector), speed)
-    longest = max(float(r.time[-1] - r.time[0]) for r in runs)
-    segment = longest if growth <= 0.0 else min(max(LONGEST_GROWTH / growth, 0.7 * FIRST_SEGMENT_S), longest)
+    best, speed = coefficients(found.vector), float(np.median([r.speed for r in runs]))
+    growth = growth_rate(best, speed)
+    segment = max(LEAST_SEGMENT_S, SEGMENT_LENGTHS * float(best[0]) / speed)
+    if growth > 0.0:
+        segment = min(segment, max(LONGEST_GROWTH / growth, SHORTEST_SEGMENT_S))
     return _Problem(tuple(runs), segment, mean, np.linalg.inv(covariance)).solved(found.vector, found.noise, keep_noise=False)
 
 

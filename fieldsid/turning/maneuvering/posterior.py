@@ -18,6 +18,7 @@ DEGREES = 7.0
 BISECTIONS = 30
 LEAST_SHARE = 0.1
 """Share of the last proposal's spread that stays, so that no direction is lost to few draws."""
+KEPT = 160
 ROUNDS = (150, 250, 400)
 """Draws of each adaptation, the last of which are kept."""
 LEAST_EFFECTIVE = 66.0
@@ -30,11 +31,6 @@ class Posterior:
 
     vectors: FloatArray
     weights: FloatArray
-
-    @property
-    def effective_draws(self) -> float:
-        """How many equally weighted draws they are worth."""
-        return float(1.0 / np.sum(self.weights**2))
 
 
 def draw_posterior(fitted: Fitted, rng: np.random.Generator) -> Posterior:
@@ -53,7 +49,14 @@ def draw_posterior(fitted: Fitted, rng: np.random.Generator) -> Posterior:
         centre = weights @ vectors
         away = vectors - centre
         spread = (away * weights[:, None]).T @ away + LEAST_SHARE * spread
-    return Posterior(vectors, weights)
+    return _resampled(vectors, weights, rng)
+
+
+def _resampled(vectors: FloatArray, weights: FloatArray, rng: np.random.Generator) -> Posterior:
+    """Return draws of equal weight, taken systematically (Kitagawa 1996): a turn is worked out for each of them."""
+    places = (np.arange(KEPT) + rng.uniform()) / KEPT
+    chosen = np.searchsorted(np.cumsum(weights), places).clip(max=weights.size - 1)
+    return Posterior(vectors[chosen], np.full(KEPT, 1.0 / KEPT))
 
 
 def _flattened(log_weight: FloatArray) -> FloatArray:

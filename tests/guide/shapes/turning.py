@@ -128,7 +128,7 @@ class Turn(Shape):
     side: Side
     """The side."""
     radius_m: Number
-    """The radius, by `method`."""
+    """The radius, by `method`: the median of what is believed, or the formula's."""
     interval95: Interval
     """Its 95 % band, parameters and model form together."""
     steady_radius_m: Number
@@ -153,7 +153,9 @@ class Turn(Shape):
     """The prediction, where `radius_m` was measured."""
     predicted95: Interval
     """Its band."""
-    method: Literal["u_turn", "steady", "simulated", "measured"]
+    model_radius_m: Number
+    """Radius of the identified yaw model by itself."""
+    method: Literal["u_turn", "steady", "simulated", "maneuvering", "measured"]
     """Where the radius comes from."""
     extrapolated: bool
     """Whether the turn lies beyond what the data reached."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -218,3 +219,12 @@ def outcome(path):
     except FieldsidError as error:
         return (error.what, error.hint)
     return "a table"
+
+
+def test_a_draw_outside_the_bounds_is_rejected_and_none_lies_on_one():
+    model = replace(yaw_model(effects=("quadratic_damping",), quadratic=0.1), covariance=np.diag([0.4, 0.2, 0.01, 0.3]) ** 2)
+    draws, _ = draw_values(model, 800, np.random.default_rng(1))
+    quadratic = np.array([d["quadratic"] for d in draws])
+    assert len(draws) == 800
+    assert quadratic.min() > 0.0
+    assert np.unique(quadratic).size == 800

@@ -1,0 +1,80 @@
+"""What runs make believe: the true circle inside the band, other speeds helped by a circle, sign, length and what is lacking."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from truth.maneuvering.hulls import draw_hull
+from truth.maneuvering.motion import true_turn
+from truth.maneuvering.trials import training
+
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.turning.maneuvering.belief import believe
+from fieldsid.turning.maneuvering.posterior import weighted_quantile
+
+SEED = 5
+
+
+def runs_of(number, which, *, sway=True):
+    hull = draw_hull(number, SEED)
+    logs = training(hull, which, np.random.default_rng([SEED, number]), sway=sway)
+    return hull, [Run(log.name, log.time, log.columns) for log in logs]
+
+
+def believed(runs, models=(), length=None):
+    return believe(runs, models, length, np.random.default_rng(1))
+
+
+@pytest.mark.parametrize(("number", "sway"), [(0, True), (3, False), (6, True)])
+def test_zigzags_tell_the_circle_of_both_sides(number, sway):
+    hull, runs = runs_of(number, "pulses+zigzag", sway=sway)
+    belief = believed(runs)
+    for speed in (hull.speeds[0], hull.speeds[4]):
+        for side in (-1.0, 1.0):
+            turn, truth = belief.turn(speed, hull.rudder_limit, side), true_turn(hull, speed, side)[0]
+            assert turn.radius == pytest.approx(truth, rel=0.05)
+            assert turn.interval95[0] <= truth <= turn.interval95[1]
+            assert turn.interval95[1] - turn.interval95[0] < 0.35 * truth
+
+
+def test_a_circle_at_one_speed_helps_the_others():
+    hull, runs = runs_of(1, "pulses+circle")
+    with_circle = believed(runs)
+    without = believed([r for r in runs if r.name != "circle"])
+    truth = true_turn(hull, hull.speeds[4], -1.0)[0]
+    near, far = (b.turn(hull.speeds[4], hull.rudder_limit, -1.0) for b in (with_circle, without))
+    assert near.radius == pytest.approx(truth, rel=0.05)
+    assert near.interval95[1] - near.interval95[0] < 0.8 * (far.interval95[1] - far.interval95[0])
+
+
+def test_a_rudder_of_the_other_sign_turns_the_same():
+    hull, runs = runs_of(0, "pulses+zigzag")
+    turned = [replace(r, signals={**r.signals, "rudder_rad": -r["rudder_rad"]}) for r in runs]
+    own = {"a22": 1.0, "b2": 1.0, "C0": 0.0}
+    model = Model(Axis.YAW, (), own, {}, tuple(own), np.eye(3), SpeedLaw(1.5), Noise(0.005, 0.005))
+    truth = true_turn(hull, hull.speeds[2], 1.0)[0]
+    assert believed(turned, [model]).turn(hull.speeds[2], hull.rudder_limit, 1.0).radius == pytest.approx(truth, rel=0.05)
+
+
+def test_the_length_that_is_given_is_kept():
+    hull, runs = runs_of(0, "pulses")
+    length = float(np.exp(believed(runs, length=hull.of.length).fitted.vector[0]))
+    assert length == pytest.approx(hull.of.length, rel=0.15)
+
+
+def test_runs_without_a_speed_say_nothing():
+    _, runs = runs_of(0, "pulses")
+    bare = [replace(r, signals={k: v for k, v in r.signals.items() if k != "surge_m_s"}) for r in runs]
+    assert believed(bare) is None
+
+
+def test_quantiles_are_those_of_the_weights():
+    values, weights = np.array([3.0, 1.0, np.nan, 2.0]), np.array([1.0, 1.0, 9.0, 1.0])
+    assert weighted_quantile(values, weights, 0.5) == pytest.approx(2.0)
+    assert weighted_quantile(values, np.array([98.0, 1.0, 9.0, 1.0]), 0.5) == pytest.approx(3.0, abs=0.05)
+    assert np.isnan(weighted_quantile(np.full(4, np.nan), weights, 0.5))
