@@ -217,8 +217,8 @@ def _turned(result: Result) -> str:
 def _scheduled(result: Result) -> str:
     first, last = result["rows"][0], result["rows"][-1]
     return (
-        f"kp = a22^2 / (4 zeta^2 b2) goes from {number(abs(first['kp']), 2)} at {number(first['speed_m_s'], 2)} m/s to "
-        f"{number(abs(last['kp']), 2)} at {number(last['speed_m_s'], 2)} m/s, as each speed's own model says; "
+        f"kp goes from {number(abs(first['kp']), 2)} at {number(first['speed_m_s'], 2)} m/s to "
+        f"{number(abs(last['kp']), 2)} at {number(last['speed_m_s'], 2)} m/s, as each speed's own model and its errors say; "
         "the feed-forward holds the fin's own trim."
     )
 

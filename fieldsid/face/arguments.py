@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from fieldsid.effects._user_folder import add_user_effects
-from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.errors import ArtifactError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.registry import near
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
 if TYPE_CHECKING:
+    from fieldsid.logs.run import Run
     from fieldsid.schedule import Schedule
     from fieldsid.turning import ParameterSource
 
@@ -102,6 +103,23 @@ def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]
     if len(there) < len(named):
         say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
     return there
+
+
+def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run]:
+    """Return the runs that the models of a yaw source came from, where they still are: they have the speed lost in a turn."""
+    from fieldsid.logs import load_run
+    from fieldsid.logs.several.sifting import attempt
+    from fieldsid.plant.parameter_source import logs_of
+
+    if not source.models or not source.paths or source.axis is not Axis.YAW:
+        return []
+    named = logs_of(source.paths)
+    runs = [run for run in (attempt(load_run, path) for path in named if path.exists()) if not isinstance(run, FieldsidError)]
+    if len(runs) < len(named):
+        say(
+            f"{len(named) - len(runs)} of {len(named)} runs of the models cannot be read again: they show the speed lost"
+        )
+    return runs
 
 
 def designed_from(schedule: Schedule, name: str) -> list[Path]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldsid.face.arguments import File, designed_from, fin_limits_of, own_effects, rudder_of, run_files, vehicle_of
+from fieldsid.face.arguments import File, designed_from, fin_limits_of, own_effects, rudder_of, run_files, runs_behind, vehicle_of
 from fieldsid.face.models import Models, source_of
 from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.speeds import speeds_of
@@ -74,7 +74,7 @@ def turn_radius(
 def design_schedule(
     models: Models,
     *,
-    controller: str = "p",
+    controller: str | None = None,
     damping: float = 0.7071,
     phase_margin: float = 45.0,
     speeds: str | Sequence[float] | None = None,
@@ -82,18 +82,21 @@ def design_schedule(
     fin_rate: float | None = None,
     fin_lag: float | None = None,
     delay: float | None = None,
+    latency: float | None = None,
     depth: bool = False,
     law: str | Sequence[str] = (),
     vehicle: Vehicle | File | None = None,
 ) -> Schedule:
     """Return gains per speed for heading or pitch, by the models' axis.
 
-    controller: p, pd, pi, pid or lqr. phase_margin: in deg. speeds: in m/s or as `1.0,1.5`, without them the models' own.
-    fin_limit (rad), fin_rate (rad/s): without them the vehicle's. fin_lag, delay (s): without them the models'. depth: the loop
-    above pitch. Raises UsageError for what cannot be meant, ModelError where no gain holds the loop.
+    controller: p, pd, pi, pid or lqr; without it pd where the models' runs have a rate, else p. phase_margin: in deg. speeds:
+    in m/s or as `1.0,1.5`, without them the models' own. fin_limit (rad), fin_rate (rad/s): without them the vehicle's.
+    fin_lag, delay (s): without them the models'. latency (s): the autopilot's own, on top. depth: the loop above pitch.
+    Raises UsageError for what cannot be meant, ModelError where no gain holds the loop.
     """
     from fieldsid.schedule import FinLimits, Wish
     from fieldsid.schedule import design_schedule as design
+    from fieldsid.schedule.make import usual_controller
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     own_effects()
@@ -103,9 +106,10 @@ def design_schedule(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller, damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
-        limits=FinLimits(fin_lag, delay, rate),
+        wish=Wish(controller or usual_controller(source), damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
+        limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
+        runs=runs_behind(source, _say),
     )
 
 
@@ -120,4 +124,5 @@ def verify_schedule(schedule: Schedule | File, models: Models | None = None) -> 
     own_effects()
     known = schedule if isinstance(schedule, Schedule) else load_schedule(Path(schedule))
     name = "SCHEDULE" if isinstance(schedule, Schedule) else str(schedule)
-    return verify(known, source_of(designed_from(known, name) if models is None else models))
+    source = source_of(designed_from(known, name) if models is None else models)
+    return verify(known, source, runs=runs_behind(source, _say))

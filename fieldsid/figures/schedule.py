@@ -9,28 +9,29 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
+from fieldsid.schedule.flown.response import Steps
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.response import Steps
-from fieldsid.schedule.verify import STEP_ANGLE_RAD, Check, Verification
+from fieldsid.schedule.verify import STEPS_RAD, Check, Verification
 
 SHOWN_S = 25.0
 
 
 def figure(schedule: Schedule, verification: Verification) -> Figure:
     """Return gains, feed-forward and margins over speed at the left, steps of schedule and constant gain at the right."""
-    sheet = canvas.sheet(12.0, 8.0)
+    sheet = canvas.sheet(12.0, 9.0)
     left, right = np.asarray(sheet.subfigures(1, 2, width_ratios=(1.0, 1.15)), dtype=object)
     gains, forward, margins = np.ravel(left.subplots(3, 1, sharex=True))
     draw_gains(schedule, gains)
     draw_forward(schedule, forward)
     draw_margins(verification.scheduled, margins)
-    scheduled, constant = np.ravel(right.subplots(2, 1, sharex=True, sharey=True))
-    size = STEP_ANGLE_RAD[schedule.axis]
-    draw_steps([(u, s) for u, s, _ in verification.steps], size, scheduled)
-    draw_steps([(u, s) for u, _, s in verification.steps], size, constant)
-    scheduled.set_title(f"{schedule.kind} schedule: step of {np.degrees(size):.0f}°", loc="left", fontsize=10)
-    constant.set_title(f"one constant gain, kp = {verification.constant_row.gains.kp:.3g}", loc="left", fontsize=10)
-    constant.set_xlabel("time, s")
+    *steps, leg = np.ravel(right.subplots(4, 1))
+    for at, (size, ax) in enumerate(zip(STEPS_RAD[schedule.axis], steps, strict=True)):
+        draw_steps([(f.speed, f.scheduled[at], f.constant[at]) for f in verification.flown], size, ax)
+    steps[0].set_title(
+        f"steps with the {schedule.kind} schedule; thin: one constant gain, kp = {verification.constant_row.gains.kp:.3g}",
+        loc="left", fontsize=10,
+    )  # fmt: skip
+    draw_leg([(f.speed, f.leg) for f in verification.flown], verification.disturbance, leg)
     return sheet
 
 
@@ -76,19 +77,34 @@ def draw_margins(checks: Sequence[Check], ax: Axes) -> None:
     ax.legend(frameon=False, fontsize=9, ncols=2, loc="lower right")
 
 
-def draw_steps(steps: Sequence[tuple[float, Steps]], size: float, ax: Axes) -> None:
-    """Draw the step at every speed, dark to light from slow to fast, with the 5 % corridor."""
-    speeds = np.array([u for u, _ in steps])
-    span = float(np.ptp(speeds)) or 1.0
+def draw_steps(steps: Sequence[tuple[float, Steps, Steps]], size: float, ax: Axes) -> None:
+    """Draw a step at every speed, dark to light from slow to fast, with the 5 % corridor; thin with one constant gain."""
     ax.axhspan(0.95 * np.degrees(size), 1.05 * np.degrees(size), color="0.92", linewidth=0)
-    for i, (speed, shown) in enumerate(steps):
-        share = (speed - float(speeds.min())) / span
-        colour = (0.05 + 0.85 * share, 0.25 + 0.25 * share, 0.60 - 0.5 * share)
-        label = f"{speed:.2f} m/s" if i in (0, len(steps) - 1) else None
-        keep = shown.time <= SHOWN_S
-        ax.plot(shown.time[keep], np.degrees(shown.angle[keep, 0]), color=colour, linewidth=1.2, label=label)
-    canvas.dress(ax, y="angle, deg")
+    for (speed, own, constant), colour in zip(steps, _colours([u for u, _, _ in steps]), strict=True):
+        label = f"{speed:.2f} m/s" if speed in (steps[0][0], steps[-1][0]) else None
+        for shown, width in ((constant, 0.5), (own, 1.4)):
+            keep = shown.time <= SHOWN_S
+            angle = np.degrees(shown.angle[keep, 0])
+            ax.plot(shown.time[keep], angle, color=colour, linewidth=width, label=label if width > 1 else None)
+    ax.set_ylim(-0.1 * np.degrees(size), 1.4 * np.degrees(size))
+    canvas.dress(ax, y=f"{np.degrees(size):.0f}° step, deg")
     ax.legend(frameon=False, fontsize=9, loc="lower right")
+
+
+def draw_leg(legs: Sequence[tuple[float, Steps]], disturbance: float, ax: Axes) -> None:
+    """Draw the angle of a straight leg at every speed, in the disturbance the models' runs had."""
+    for (_, shown), colour in zip(legs, _colours([u for u, _ in legs]), strict=True):
+        keep = shown.time <= SHOWN_S
+        ax.plot(shown.time[keep], np.degrees(shown.angle[keep, 0]), color=colour, linewidth=1.0)
+    canvas.dress(ax, x="time, s", y="straight leg, deg")
+    said = f"disturbance moment {disturbance:.2g} rad/s² rms" if disturbance > 0 else "no disturbance is known"
+    ax.set_title(said, loc="left", fontsize=9)
+
+
+def _colours(speeds: Sequence[float]) -> list[tuple[float, float, float]]:
+    span = float(np.ptp(speeds)) or 1.0
+    shares = [(speed - min(speeds)) / span for speed in speeds]
+    return [(0.05 + 0.85 * s, 0.25 + 0.25 * s, 0.60 - 0.5 * s) for s in shares]
 
 
 def _knots(schedule: Schedule, values: np.ndarray, colour: str, ax: Axes) -> None:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.numerics.arrays import ComplexArray, FloatArray
-from fieldsid.schedule.linear_plant import LinearPlant
+from fieldsid.schedule.linear_plant import LinearPlant, products, roots_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,21 +54,24 @@ def loop(plant: LinearPlant, gains: Gains, omega: FloatArray) -> ComplexArray:
 
 
 def closed_poles(plant: LinearPlant, gains: Gains) -> ComplexArray:
-    """Return the closed loop's poles at the estimate, the delay by a second-order Pade approximation."""
+    """Return the closed loop's poles (d, n) of every draw, the delay by a second-order Pade approximation."""
     numerator, denominator = plant.polynomials()
-    if plant.delay[0] > 0.0:
-        t = float(plant.delay[0])
-        numerator = np.asarray(np.polymul(numerator, [t * t / 12.0, -t / 2.0, 1.0]), dtype=np.float64)
-        denominator = np.asarray(np.polymul(denominator, [t * t / 12.0, t / 2.0, 1.0]), dtype=np.float64)
-    control, divisor = np.array([gains.kd, gains.kp]), np.array([1.0])
+    one = np.ones_like(plant.damping)
+    if plant.delay.any():
+        t = plant.delay
+        numerator = products(numerator, np.column_stack([t * t / 12.0, -t / 2.0, one]))
+        denominator = products(denominator, np.column_stack([t * t / 12.0, t / 2.0, one]))
+    control = [gains.kd, gains.kp]
     if gains.ki != 0.0:
-        control, divisor = np.array([gains.kd, gains.kp, gains.ki]), np.array([1.0, 0.0])
-    whole = np.polyadd(np.polymul(denominator, divisor), np.polymul(numerator, control))
-    return np.asarray(np.roots(whole), dtype=np.complex128)
+        control, denominator = [*control, gains.ki], np.column_stack([denominator, 0.0 * one])
+    forward = products(numerator, np.tile(np.array(control), (plant.count, 1)))
+    whole = denominator.copy()
+    whole[:, -forward.shape[1] :] += forward
+    return roots_of(whole)
 
 
-def least_damping(plant: LinearPlant, gains: Gains) -> float:
-    """Return the smallest damping ratio of the closed loop's poles at the estimate, -1 .. 1."""
+def least_damping(plant: LinearPlant, gains: Gains) -> FloatArray:
+    """Return the smallest damping ratio of the closed loop's poles of every draw, (d,) in -1 .. 1."""
     poles = closed_poles(plant, gains)
     size = np.abs(poles)
-    return float(np.min(np.where(size > 1e-9, -poles.real / np.maximum(size, 1e-9), 1.0)))
+    return np.asarray(np.min(np.where(size > 1e-9, -poles.real / np.maximum(size, 1e-9), 1.0), axis=1))

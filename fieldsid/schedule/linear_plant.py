@@ -24,8 +24,12 @@ from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, straight_moment
 
 PARTS = (
     "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "crossflow", "cross_damping",
-    "cross_rate", "cross_fin", "cross_quadratic", "lag", "delay", "fin_rate",
+    "cross_rate", "cross_fin", "cross_quadratic", "lag", "delay", "fin_rate", "powers", "speed_loss",
 )  # fmt: skip
+POWERS = ("damping", "authority", "cross_damping", "cross_rate", "cross_fin", "cross_quadratic")
+"""What goes with a power of the speed, in the order of a plant's `powers`."""
+NEARBY = 0.9
+"""Share of the speed at which the powers of an effect's own scaling are read off."""
 
 ACTUATOR = ("lag", "delay", "max_rate")
 """Coefficients of the actuator's effects that the plant holds."""
@@ -35,8 +39,9 @@ ACTUATOR = ("lag", "delay", "max_rate")
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `quadratic`, `beyond_square`, `crossflow` and `cross_quadratic` act in time simulations only.
-    `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited.
+    `quadratic`, `beyond_square`, `crossflow`, `cross_quadratic`, `powers` and `speed_loss` act in time simulations only.
+    `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited. `powers` (d, 6)
+    are the exponents of the speed, by POWERS; `speed_loss` (d, 3) is drag a_u (1/m), the fin's and the turn's loss over it.
     """
 
     axis: Axis
@@ -55,6 +60,8 @@ class LinearPlant:
     lag: FloatArray
     delay: FloatArray
     fin_rate: FloatArray
+    powers: FloatArray
+    speed_loss: FloatArray
 
     @property
     def count(self) -> int:
@@ -75,6 +82,11 @@ class LinearPlant:
         parts: dict[str, Any] = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in PARTS}
         return replace(self, **parts)
 
+    def distinct(self) -> LinearPlant:
+        """Return the estimate alone where all draws are alike, else all of them."""
+        same = all(bool((getattr(self, n) == getattr(self, n)[:1]).all()) for n in PARTS)
+        return self.one() if same else self
+
     def response(self, omega: FloatArray) -> ComplexArray:
         """Return angle over fin command at frequencies (w,) rad/s, (d, w)."""
         s = 1j * omega[None, :]
@@ -84,29 +96,78 @@ class LinearPlant:
         return np.asarray(hull * np.exp(-s * self.delay[:, None]) / (self.lag[:, None] * s + 1.0))
 
     def polynomials(self) -> tuple[FloatArray, FloatArray]:
-        """Return numerator and denominator of angle over command without the delay, draw 0, highest power first."""
-        a, k, b = float(self.damping[0]), float(self.stiffness[0]), float(self.authority[0])
-        c, c_r, c_f = float(self.cross_damping[0]), float(self.cross_rate[0]), float(self.cross_fin[0])
-        numerator, denominator = np.array([b]), np.array([1.0, a, k])
-        if c_r != 0.0 or c_f != 0.0:
-            numerator = np.array([b, b * c + c_f])
-            denominator = np.polyadd(np.polymul(denominator, [1.0, c]), [c_r, 0.0])
-        if self.lag[0] > 0.0:
-            denominator = np.polymul(denominator, [float(self.lag[0]), 1.0])
-        return numerator, np.asarray(denominator)
+        """Return numerator (d, m) and denominator (d, n) of angle over command without delay, highest power first."""
+        a, k, b = self.damping, self.stiffness, self.authority
+        c, c_r, c_f = self.cross_damping, self.cross_rate, self.cross_fin
+        one = np.ones_like(a)
+        numerator, denominator = b[:, None], np.column_stack([one, a, k])
+        if c_r.any() or c_f.any():
+            numerator = np.column_stack([b, b * c + c_f])
+            denominator = np.column_stack([one, a + c, k + a * c + c_r, k * c])
+        if self.lag.any():
+            denominator = products(denominator, np.column_stack([self.lag, one]))
+        return numerator, denominator
+
+    @property
+    def growth(self) -> FloatArray:
+        """Return how fast the hull's least stable motion grows without a pilot, (d,) 1/s; a free heading is not one."""
+        a, k, c, c_r = self.damping, self.stiffness, self.cross_damping, self.cross_rate
+        coupled = bool(c_r.any() or self.cross_fin.any())
+        own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r] if coupled else [np.ones_like(a), a])
+        if k.any():
+            own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
+        return np.asarray(roots_of(own).real.max(axis=1))
+
+    @property
+    def slow_damping(self) -> FloatArray:
+        """Return the damping of the yaw or pitch rate (d,) 1/s once sway or heave has followed."""
+        return np.asarray(self.damping + self.cross_rate / self.cross_damping)
+
+    @property
+    def slow_authority(self) -> FloatArray:
+        """Return the authority (d,) 1/s^2 as the slow loop feels it: the fin's own and that through sway or heave."""
+        return np.asarray(self.authority + self.cross_fin / self.cross_damping)
+
+
+def products(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the products of polynomials, row by row: (d, m) and (d, n) give (d, m + n - 1)."""
+    out = np.zeros((left.shape[0], left.shape[1] + right.shape[1] - 1))
+    for j in range(right.shape[1]):
+        out[:, j : j + left.shape[1]] += left * right[:, j : j + 1]
+    return out
+
+
+def roots_of(polynomials: FloatArray) -> ComplexArray:
+    """Return the roots (d, n) of polynomials (d, n + 1), as eigenvalues of their companion matrices.
+
+    A leading coefficient of zero, as of a draw whose fin does not lag, is a root at -infinity: very fast.
+    """
+    first = polynomials[:, :1]
+    least = 1e-9 * np.max(np.abs(polynomials), axis=1, keepdims=True)
+    monic = polynomials / np.where(np.abs(first) > least, first, least)
+    size = monic.shape[1] - 1
+    companion = np.zeros((monic.shape[0], size, size))
+    companion[:, 0, :] = -monic[:, 1:]
+    companion[:, np.arange(1, size), np.arange(size - 1)] = 1.0
+    return np.asarray(np.linalg.eigvals(companion), dtype=np.complex128)
 
 
 @dataclass(frozen=True, slots=True)
 class FinLimits:
-    """What the fin can do, where the vehicle or the user says so (s, rad/s); None leaves it to the model's effects."""
+    """What the fin can do, where the vehicle or the user says so (s, rad/s); None leaves it to the model's effects.
+
+    `latency` (s) is the autopilot's own, from sensor to command with half its period: no log of commands holds it, so it
+    comes on top of the delay.
+    """
 
     lag: float | None = None
     delay: float | None = None
     rate: float | None = None
+    latency: float | None = None
 
     def record(self) -> dict[str, float | None]:
         """Return what is said, by the names a schedule's file has."""
-        return {"lag_s": self.lag, "delay_s": self.delay, "fin_rate_rad_s": self.rate}
+        return {"lag_s": self.lag, "delay_s": self.delay, "fin_rate_rad_s": self.rate, "latency_s": self.latency}
 
 
 def plants_at(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
@@ -133,10 +194,10 @@ def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, d
     stiffness = np.zeros(draws) if names.stiffness is None else base[names.stiffness]
     authority = _same_sign(base[names.authority])
     zero = np.zeros(draws)
-    actuator = _actuator({}, limits, draws)
+    lag, delay, fin_rate = _actuator({}, limits, draws)
     return LinearPlant(
         source.axis, speed, _same_sign(base[names.damping]), stiffness, authority, base[names.trim] / authority,
-        zero, zero, zero, zero + 1.0, zero, zero, zero, *actuator,
+        zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate, _powers(zero + 1.0, {}), np.zeros((draws, 3)),
     )  # fmt: skip
 
 
@@ -158,19 +219,21 @@ def _plant_of_model(
         )
     moved = {n: value - at[n] for n, value in centre.items()}
     parts = effects_of(model)
-    cores = []
-    for v, exponent in zip(values, exponents, strict=True):
-        core = Core()
-        for effect in parts:
-            if effect.core is not None:
-                core = core.plus(effect.core({EXPONENT: float(exponent)} | v, scale))
-        cores.append(core)
+    cores, slower = (
+        [_core(parts, {EXPONENT: float(e)} | v, at) for v, e in zip(values, exponents, strict=True)]
+        for at in (scale, NEARBY * scale)
+    )
 
     def column(name: str) -> FloatArray:
         return np.array([v[name] for v in values])
 
     def cored(name: str) -> FloatArray:
         return np.array([getattr(c, name) for c in cores])
+
+    def power(name: str) -> FloatArray:
+        there = np.array([getattr(c, name) for c in slower])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.nan_to_num(np.log(there / cored(name)) / np.log(NEARBY)))
 
     authority = column(names.authority) * ratio
     coupled = cored("cross_damping")
@@ -192,7 +255,23 @@ def _plant_of_model(
         cross_fin=cored("cross_fin"),
         cross_quadratic=cored("cross_quadratic"),
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
+        powers=_powers(exponents, {name: power(name) for name in POWERS[2:]}),
+        speed_loss=np.zeros((draws, 3)),
     )
+
+
+def _core(parts: Sequence[Effect], values: Mapping[str, float], scale: float) -> Core:
+    core = Core()
+    for effect in parts:
+        if effect.core is not None:
+            core = core.plus(effect.core(values, scale))
+    return core
+
+
+def _powers(damping: FloatArray, own: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the exponents (d, 6) of the speed: damping's, two of the fin's lift, and the cross state's own."""
+    lift, none = np.full_like(damping, 2.0), np.zeros_like(damping)
+    return np.column_stack([damping, lift, *(own.get(name, none) for name in POWERS[2:])])
 
 
 def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -> Sequence[FloatArray]:
@@ -201,6 +280,7 @@ def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -
     out = []
     for name, said, none in zip(ACTUATOR, stated, absent, strict=True):
         out.append(np.full(draws, said) if said is not None else shared.get(name, np.full(draws, none)))
+    out[1] = out[1] + (limits.latency or 0.0)
     return out
 
 

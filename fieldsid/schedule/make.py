@@ -10,15 +10,21 @@ import numpy as np
 from fieldsid._version import __version__
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import UsageError
+from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
+from fieldsid.runtime.worker_pool import parallel_map
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import Wish, check_wish, design_gains
-from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, plants_at
+from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
+from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import Row, Schedule
+from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
+DESIGN_DRAWS = 24
+SEED = 41
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
 TURNS = {
     (Axis.YAW, 1.0): "positive rudder turns to starboard (b2 > 0)",
@@ -36,10 +42,12 @@ def design_schedule(
     wish: Wish | None = None,
     limits: FinLimits | None = None,
     depth: bool = False,
+    runs: Sequence[Run] = (),
 ) -> Schedule:
     """Return the schedule of a source's axis at its speeds (or those given, m/s), fin limited to +/-fin_limit rad.
 
-    Raises UsageError for what cannot be meant and ModelError where no gain holds the loop.
+    runs are those the models came from: the speed lost in a turn is identified from them. Raises UsageError for what cannot be
+    meant and ModelError where no gain holds the loop.
     """
     wish, limits = wish or Wish(), limits or FinLimits()
     check_wish(wish)
@@ -50,7 +58,12 @@ def design_schedule(
         hint = in_radians("--fin-limit", fin_limit)
         raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
     _refuse_offsets(source, knots, fin_limit, limits)
-    rows = tuple(_row(source, speed, fin_limit, wish, limits, depth=depth) for speed in knots)
+    surge = fit_surge(runs) if runs and source.axis is Axis.YAW else None
+
+    def made(speed: float) -> Row:
+        return _row(source, speed, fin_limit, wish, limits, surge, depth=depth)
+
+    rows = tuple(parallel_map(made, knots))
     return Schedule(
         axis=source.axis,
         kind=wish.kind,
@@ -59,7 +72,7 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=actuator_of(source, limits),
-        provenance=_provenance(source, wish),
+        provenance=_provenance(source, wish, surge),
         stated=limits.record(),
     )
 
@@ -71,8 +84,17 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
     return knots
 
 
-def _row(source: ParameterSource, speed: float, fin_limit: float, wish: Wish, limits: FinLimits, *, depth: bool) -> Row:
-    plants = plants_at(source, speed, limits, 1, 0)
+def _row(
+    source: ParameterSource,
+    speed: float,
+    fin_limit: float,
+    wish: Wish,
+    limits: FinLimits,
+    surge: SurgeModel | None,
+    *,
+    depth: bool,
+) -> Row:
+    plants = [(slowing(p, surge, fin_limit, SEED), w) for p, w in plants_at(source, speed, limits, DESIGN_DRAWS, SEED)]
     made = [(design_gains(plant, wish, fin_limit), plant, share) for plant, share in plants]
     gains, forward, reference, depth_gain, slowed = Gains(0.0), 0.0, 0.0, 0.0, 1.0
     for designed, plant, share in made:
@@ -82,16 +104,13 @@ def _row(source: ParameterSource, speed: float, fin_limit: float, wish: Wish, li
         reference += share * designed.reference_gain
         depth_gain += share * designed.depth_gain
         slowed = min(slowed, designed.slowed)
-    worst = [_margins_at(plant, gains) for _, plant, _ in made]
+    worst = [margins(plant, gains).worst() for _, plant, _ in made]
     phase, gain, delay = (min(w[i] for w in worst) for i in range(3))
+    gains = Gains(float(gains.kp), float(gains.ki), float(gains.kd))
     return Row(
         float(speed), gains, forward, reference, fin_limit, depth_gain if depth else 0.0, source.supports(speed), slowed,
-        phase, gain, delay,
+        phase, gain, delay, min(d.held for d, _, _ in made), max(d.settling for d, _, _ in made),
     )  # fmt: skip
-
-
-def _margins_at(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
-    return margins(plant.one(), gains).worst()
 
 
 def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
@@ -113,11 +132,11 @@ def actuator_of(source: ParameterSource, limits: FinLimits) -> dict[str, float |
     values = [m.values for m in source.models]
     lag, delay = (max((v.get(n, 0.0) for v in values), default=0.0) for n in ("lag", "delay"))
     rate = min((v["max_rate"] for v in values if "max_rate" in v), default=None)
-    own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate}
+    own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate, "latency_s": 0.0}
     return own | {name: value for name, value in limits.record().items() if value is not None}
 
 
-def _provenance(source: ParameterSource, wish: Wish) -> dict[str, Any]:
+def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None) -> dict[str, Any]:
     names = NAMES[source.axis]
     sign = float(np.sign(source.points[0].values[names.authority]))
     low, high = float(source.speeds[0]), float(source.speeds[-1])
@@ -127,6 +146,8 @@ def _provenance(source: ParameterSource, wish: Wish) -> dict[str, Any]:
         "runs": [r for m in source.models for r in m.runs],
         "effects": sorted({e for m in source.models for e in m.effects}),
         "effects_not_counted": list(not_counted(source.models)),
+        "speed_lost": speed_kept_said(source.axis, surge),
+        "draws": DESIGN_DRAWS,
         "schedule_variable": "speed_m_s: forward speed through the water, m/s",
         "between_rows": "linear in speed",
         "outside_rows": "clamp: the nearest row's gains",
@@ -136,3 +157,9 @@ def _provenance(source: ParameterSource, wish: Wish) -> dict[str, Any]:
         "+ feed_forward + reference_gain ref, limited to +/- fin_limit",
         "wished": {"controller": wish.kind, "damping_ratio": wish.damping, "phase_margin_deg": wish.phase_margin_deg},
     }
+
+
+def usual_controller(source: ParameterSource) -> str:
+    """Return the controller where none is asked for: with the rate where the models' runs have logged one, else P."""
+    logged = source.models and all(np.isfinite(m.trained.get("rate_max", np.nan)) for m in source.models)
+    return "pd" if logged else "p"

@@ -10,15 +10,20 @@ import numpy as np
 
 from fieldsid.errors import FieldsidError
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.controller import Gains, loop
+from fieldsid.schedule.controller import Gains, least_damping, loop
 from fieldsid.schedule.linear_plant import LinearPlant
 
 FREQUENCY_GRID_RAD_S = np.geomspace(1e-3, 200.0, 1500)
+HELD_SHARE = 0.95
+"""Share of the draws that a number of the identified set speaks for."""
 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Smallest margins (d,): phase deg, gain dB (up), delay s, at crossover rad/s; inf where the loop never crosses."""
+    """Smallest margins (d,): phase deg, gain dB (up), delay s, at crossover rad/s; inf where the loop never crosses.
+
+    An unstable closed loop has a phase margin below zero, whatever its crossings are, and no other margin.
+    """
 
     phase_deg: FloatArray
     gain_db: FloatArray
@@ -26,8 +31,15 @@ class Margins:
     crossover: FloatArray
 
     def worst(self) -> tuple[float, float, float]:
-        """Return the smallest phase, gain and delay margin over the draws."""
-        return float(np.min(self.phase_deg)), float(np.min(self.gain_db)), float(np.min(self.delay_s))
+        """Return the smallest phase, gain and delay margin over 95 % of the draws."""
+        phase, gain, delay = (worst_of(part, most=False) for part in (self.phase_deg, self.gain_db, self.delay_s))
+        return phase, gain, delay
+
+
+def worst_of(values: FloatArray, *, most: bool) -> float:
+    """Return the worst of a number over 95 % of the draws (d,): the largest where `most`, else the least; NaN is worse."""
+    ordered = np.sort(np.where(np.isnan(values), np.inf, values if most else -values))
+    return float(ordered[int(np.ceil(HELD_SHARE * ordered.size - 1e-9)) - 1]) * (1.0 if most else -1.0)
 
 
 def margins(plant: LinearPlant, gains: Gains) -> Margins:
@@ -37,7 +49,15 @@ def margins(plant: LinearPlant, gains: Gains) -> Margins:
     phase = np.unwrap(np.angle(open_loop), axis=1)
     # an unwrapped phase may sit a turn off: a loop with positive gain starts between -360 and 0
     phase -= 2 * np.pi * np.ceil(phase[:, :1] / (2 * np.pi) - 1e-9)
-    return _read_off(size, phase)
+    found = _read_off(size, phase)
+    unstable = least_damping(plant, gains) < 0.0
+    below = -np.minimum(np.abs(found.phase_deg), 180.0)
+    return Margins(
+        np.where(unstable, below, found.phase_deg),
+        np.where(unstable, 0.0, found.gain_db),
+        np.where(unstable, 0.0, found.delay_s),
+        found.crossover,
+    )
 
 
 def _read_off(size: FloatArray, phase: FloatArray) -> Margins:
@@ -78,4 +98,6 @@ def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, flo
     gain, phase, _, _, phase_crossing, _ = control.stability_margins(system)
     delay = np.radians(phase) / phase_crossing if np.isfinite(phase_crossing) and phase_crossing > 0 else np.inf
     gain_db = 20 * np.log10(gain) if gain > 1.0 else np.inf
+    if least_damping(plant.one(), gains)[0] < 0.0:
+        return -min(abs(float(phase)), 180.0), 0.0, 0.0
     return float(phase), float(gain_db), float(delay)

@@ -9,8 +9,10 @@ from typing import Any
 
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.rounding import number
+from fieldsid.schedule.best_constant import MARGIN_ROUNDING_DEG, margin_kept
 from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.make import actuator_of
+from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import (
     DEPTH_STEP_M,
@@ -96,7 +98,14 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     weakest, slowest = checked.weakest("phase_margin_deg"), max(checked.scheduled, key=lambda c: c.settling)
     step, found = degrees(STEP_ANGLE_RAD[schedule.axis]), []
     if weakest.phase_least_deg <= 0.0:
-        found.append(f"unstable at {number(weakest.speed, 3)} m/s, phase margin {number(weakest.phase_least_deg, 3)} deg")
+        of = f" by {weakest.unstable} of the draws" if checked.spread else ""
+        found.append(f"unstable at {number(weakest.speed, 3)} m/s{of}, phase margin {number(weakest.phase_least_deg, 3)} deg")
+    elif (hunting := next((c for c in checked.scheduled if c.hunts), None)) and (after := hunting.hunts):
+        words = "diverges" if not isfinite(after.swing) else f"still swings by {degrees(after.swing * after.size):.1f} deg"
+        found.append(f"at {number(hunting.speed, 3)} m/s the loop {words} after a {degrees(after.size):.0f} deg step")
+    unheld = min(schedule.rows, key=lambda r: r.draws_held)
+    if unheld.draws_held < HELD_SHARE and not found and checked.spread:
+        found.append(f"at {number(unheld.speed, 3)} m/s it holds {100 * unheld.draws_held:.0f} % of the draws it was designed on")
     if not isfinite(slowest.settling):
         found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {STEP_DURATION_S:.0f} s")
     deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
@@ -104,6 +113,26 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
         where = f"at {number(deepest.speed, 3)} m/s a {DEPTH_STEP_M:.0f} m depth step"
         found.append(f"{where} is not within 5 % after {DEPTH_STEP_S:.0f} s")
     return found
+
+
+def against_constant(checked: Verification) -> str:
+    """Return how the schedule compares with the best one gain for all speeds, by the slowest standard step of each."""
+    row, (own, other) = checked.constant_row.gains, checked.slowest
+    named = ", ".join(f"{n} {number(v, 3)}" for n, v in (("kp", row.kp), ("ki", row.ki), ("kd", row.kd)) if v or n == "kp")
+    least = min(c.phase_least_deg for c in checked.constant)
+    wanted = margin_kept(checked.schedule)
+    if least < min(wanted, checked.weakest("phase_margin_deg").phase_least_deg - MARGIN_ROUNDING_DEG):
+        return f"no one gain for all speeds keeps the schedule's margin: the best, {named}, has {least:.0f} deg at least"
+    times = f"the slowest step settles in {_seconds(own)} with the schedule, {_seconds(other)} with {named}"
+    if any(c.hunts for c in checked.constant):
+        return f"no one gain for all speeds comes to rest at every speed: the best, {named}, does not"
+    if other < own:
+        return f"one constant gain is better: {times}, with a phase margin of {least:.0f} deg at least"
+    return f"against the best constant gain: {times}"
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.1f} s" if isfinite(value) else f"more than {STEP_DURATION_S:.0f} s"
 
 
 def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:
@@ -114,6 +143,9 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
     errors = f"{checked.draws} draws of their errors" if checked.spread else "no errors stated, the estimate alone"
     speeds = [c.speed for c in checked.scheduled]
     beyond = sum(not c.supported for c in checked.scheduled)
+    heard = (
+        f"disturbance {number(checked.disturbance, 2)} rad/s^2 as in the runs" if checked.disturbance > 0 else "no disturbance"
+    )
     limit = number(min(r.fin_limit for r in schedule.rows), 3)
     return "; ".join(
         (
@@ -122,6 +154,8 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             f"{len(speeds)} speeds, {number(min(speeds), 3)} .. {number(max(speeds), 3)} m/s"
             + (f", {beyond} of them beyond the data" if beyond else ""),
             f"fin {limit} rad, {fin_of(actuator_of(source, stated_limits(schedule)))}",
+            checked.speed_lost,
+            heard,
             *lost(source),
         )
     )
@@ -130,8 +164,10 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
 def fin_of(actuator: Mapping[str, float | None]) -> str:
     """Return lag, delay and rate limit in words."""
     lag, delay, rate = (actuator[name] for name in ("lag_s", "delay_s", "fin_rate_rad_s"))
+    late = actuator.get("latency_s") or 0.0
     fastest = "no rate limit" if rate is None or not isfinite(rate) else f"at most {number(rate, 3)} rad/s"
-    return f"lag {number(lag, 3)} s, delay {number(delay, 3)} s, {fastest}"
+    own = f", autopilot's latency {number(late, 3)} s" if late else ""
+    return f"lag {number(lag, 3)} s, delay {number(delay, 3)} s{own}, {fastest}"
 
 
 def lost(source: ParameterSource) -> tuple[str, ...]:

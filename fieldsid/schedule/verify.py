@@ -1,26 +1,49 @@
-"""Is the schedule good: margins and steps over the identified set, at the knots and between, against one constant gain."""
+"""Is the schedule good: margins and flown steps over the identified set, at the knots and between, against one constant gain."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from fieldsid.display import Displayed, Plotted
+from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.worker_pool import parallel_map
-from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant, family_at, plants_at
-from fieldsid.schedule.margins import control_margins, margins
+from fieldsid.schedule.best_constant import best_constant, held_at
+from fieldsid.schedule.flown.response import (
+    LIMIT_CYCLE_SHARE,
+    Steps,
+    about_rest,
+    depth_response,
+    overshoot,
+    settling,
+    steady_error,
+    step_response,
+    swing,
+)
+from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
+from fieldsid.schedule.flown.straight_leg import straight_leg
+from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant, family_at
+from fieldsid.schedule.margins import control_margins, margins, worst_of
 from fieldsid.schedule.record import Row, Schedule
-from fieldsid.schedule.response import Steps, depth_response, overshoot, settling, steady_error, step_response
+from fieldsid.turning.steady.speed_loss import fit_surge
 
 VERIFY_DRAWS = 60
 SEED = 77
 STEP_ANGLE_RAD = {Axis.YAW: 0.3490658503988659, Axis.PITCH: 0.17453292519943295}
 """20 deg of heading, 10 deg of pitch."""
+STEPS_RAD = {
+    Axis.YAW: (0.08726646259971647, STEP_ANGLE_RAD[Axis.YAW], 1.5707963267948966),
+    Axis.PITCH: (0.03490658503988659, STEP_ANGLE_RAD[Axis.PITCH], 0.3490658503988659),
+}
+"""A small, the standard and a large step: 5, 20 and 90 deg of heading, 2, 10 and 20 deg of pitch."""
 FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
 STEP_DURATION_S = 60.0
@@ -30,11 +53,39 @@ PITCH_LIMIT_RAD = 0.3490658503988659
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Check(Displayed):
-    """One speed under one set of gains: margins at the estimate (python-control) and the least over the set; the step.
+class StepCheck(Displayed):
+    """A step of one size (rad) by the estimate and by 95 % of the draws: overshoot as a share of it, settling in s (5 %).
 
-    Overshoot as a share, settling in s (5 %), largest over the set beside that of the estimate; `bent_error` the steady
-    error (rad) of a 3 deg fin offset that the feed-forward knows, `bent_error_unknown` one it does not.
+    Those of the draws are about where each comes to rest; `off` (rad) is how far that is from what was asked, by 95 % of them:
+    what a trim that is not known to better leaves. `swing` is what still swings in the last quarter, peak to peak as a share of
+    the step, by 95 % of the draws.
+    """
+
+    size: float
+    overshoot: float
+    overshoot_most: float
+    settling: float
+    settling_most: float
+    swing: float
+    off: float
+
+    def record(self) -> dict[str, Any]:
+        """Return the step by its fields' names with units."""
+        return {
+            "step_rad": self.size, "overshoot_percent": 100 * self.overshoot,
+            "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
+            "settling_most_s": self.settling_most, "swing_percent": 100 * self.swing,
+            "steady_error_most_rad": self.off,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Check(Displayed):
+    """One speed under one set of gains: margins at the estimate (python-control) and the least over 95 % of the draws; steps.
+
+    `steps` are of the small, the standard and the large size; `unstable` how many of the draws are, `speed_least` (m/s) the
+    least speed in the large step. `bent_error` is the steady error (rad) of a 3 deg fin offset that the feed-forward knows,
+    `bent_error_unknown` one it does not; `leg_rms` and `leg_fin_rms` (rad) are of a straight leg in the models' disturbance.
     """
 
     speed: float
@@ -47,14 +98,40 @@ class Check(Displayed):
     phase_least_deg: float
     gain_least_db: float
     delay_least_s: float
-    overshoot: float
-    overshoot_most: float
-    settling: float
-    settling_most: float
+    unstable: int
+    steps: tuple[StepCheck, StepCheck, StepCheck]
+    speed_least: float
     bent_error: float
     bent_error_unknown: float
+    leg_rms: float
+    leg_fin_rms: float
     depth_overshoot: float
     depth_settling: float
+
+    @property
+    def overshoot(self) -> float:
+        """Overshoot of the standard step by the estimate, as a share."""
+        return self.steps[1].overshoot
+
+    @property
+    def overshoot_most(self) -> float:
+        """The most overshoot of the standard step by 95 % of the draws, as a share."""
+        return self.steps[1].overshoot_most
+
+    @property
+    def settling(self) -> float:
+        """Settling time of the standard step by the estimate, s."""
+        return self.steps[1].settling
+
+    @property
+    def settling_most(self) -> float:
+        """Settling time of the standard step by 95 % of the draws, s."""
+        return self.steps[1].settling_most
+
+    @property
+    def hunts(self) -> StepCheck | None:
+        """The first step after which the loop goes on swinging, a limit cycle; None where all come to rest."""
+        return next((s for s in self.steps if s.swing > LIMIT_CYCLE_SHARE), None)
 
     def record(self) -> dict[str, Any]:
         """Return the check by its fields' names with units."""
@@ -62,10 +139,12 @@ class Check(Displayed):
             "speed_m_s": self.speed, "knot": self.knot, "supported": self.supported, "constant_gain": self.constant,
             "phase_margin_deg": self.phase_deg, "gain_margin_db": self.gain_db, "delay_margin_s": self.delay_s,
             "phase_margin_least_deg": self.phase_least_deg, "gain_margin_least_db": self.gain_least_db,
-            "delay_margin_least_s": self.delay_least_s, "overshoot_percent": 100 * self.overshoot,
-            "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
-            "settling_most_s": self.settling_most, "fin_offset_error_rad": self.bent_error,
-            "fin_offset_error_unknown_rad": self.bent_error_unknown,
+            "delay_margin_least_s": self.delay_least_s, "unstable_draws": self.unstable,
+            "overshoot_percent": 100 * self.overshoot, "overshoot_most_percent": 100 * self.overshoot_most,
+            "settling_s": self.settling, "settling_most_s": self.settling_most,
+            "steps": [s.record() for s in self.steps], "speed_least_m_s": self.speed_least,
+            "fin_offset_error_rad": self.bent_error, "fin_offset_error_unknown_rad": self.bent_error_unknown,
+            "leg_rms_rad": self.leg_rms, "leg_fin_rms_rad": self.leg_fin_rms,
             "depth_overshoot_percent": 100 * self.depth_overshoot, "depth_settling_s": self.depth_settling,
         }  # fmt: skip
 
@@ -82,21 +161,34 @@ READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyTyp
 
 
 @dataclass(frozen=True, slots=True, repr=False)
+class FlownSet(Displayed):
+    """One speed (m/s) as the estimate flies it: the three steps under the schedule and the constant gain, the straight leg."""
+
+    speed: float
+    scheduled: tuple[Steps, Steps, Steps]
+    constant: tuple[Steps, Steps, Steps]
+    leg: Steps
+
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Verification(Plotted):
-    """Checks of the schedule and of the constant gain at the same speeds; the constant row; nominal steps for the figure."""
+    """Checks of the schedule and of the best constant gain at the same speeds; its row; what the estimate flies."""
 
     schedule: Schedule
     scheduled: tuple[Check, ...]
     constant: tuple[Check, ...]
     constant_row: Row
-    steps: tuple[tuple[float, Steps, Steps], ...]
+    flown: tuple[FlownSet, ...]
     draws: int
     spread: bool
     """Draws of the errors for each model, and whether they differ: a table may state no errors."""
+    speed_lost: str
+    disturbance: float
+    """Where the speed lost in the turn comes from; the rms of the models' disturbance moment, rad/s^2, zero for none."""
 
     @property
     def worst(self) -> dict[str, float]:
-        """The least margins and the most overshoot of the schedule, over speeds and the set."""
+        """The least margins and the most overshoot of the schedule, over speeds and 95 % of the draws."""
         return {name: read(self.weakest(name)) for name, (_, read) in READ_OFF.items()}
 
     def weakest(self, name: str) -> Check:
@@ -104,27 +196,53 @@ class Verification(Plotted):
         sign, read = READ_OFF[name]
         return min(self.scheduled, key=lambda c: sign * read(c))
 
+    @property
+    def slowest(self) -> tuple[float, float]:
+        """The longest settling of the standard step over speeds and 95 % of the draws, s: schedule and constant gain."""
+        own, other = (max(c.settling_most for c in part) for part in (self.scheduled, self.constant))
+        return own, other
+
 
 def verify_schedule(
-    schedule: Schedule, source: ParameterSource, *, draws: int = VERIFY_DRAWS, limits: FinLimits | None = None
+    schedule: Schedule,
+    source: ParameterSource,
+    *,
+    draws: int = VERIFY_DRAWS,
+    limits: FinLimits | None = None,
+    runs: Sequence[Run] = (),
 ) -> Verification:
-    """Check a schedule on the parameters it was made from, with their errors, at its knots and midway between them."""
+    """Fly a schedule on the parameters it was made from, with their errors, at its knots and midway between them.
+
+    runs are those the models came from: the speed lost in a turn is identified from them.
+    """
     limits = limits or stated_limits(schedule)
-    constant = constant_row(schedule)
+    surge = fit_surge(runs) if runs and schedule.axis is Axis.YAW else None
+    places = checked_speeds(schedule)
+    plants = [
+        slowing(family_at(source, speed, limits, draws, SEED + 10 * i), surge, schedule.at(speed).fin_limit, SEED + i)
+        for i, (speed, _) in enumerate(places)
+    ]
+    constant = best_constant(schedule, plants, step=STEP_ANGLE_RAD[schedule.axis], seconds=STEP_DURATION_S)
 
-    def checked(place: tuple[int, tuple[float, bool]]) -> tuple[Check, Check, tuple[float, Steps, Steps]]:
-        i, (speed, knot) = place
-        plant = family_at(source, speed, limits, draws, SEED + 10 * i)
-        row = schedule.at(speed)
-        held = replace(constant, speed=speed, feed_forward=row.feed_forward, reference_gain=row.reference_gain)
-        one, steps_of_row = _check(plant, row, schedule, knot=knot, constant=False)
-        other, steps_of_constant = _check(plant, held, schedule, knot=knot, constant=True)
-        return one, other, (speed, steps_of_row, steps_of_constant)
+    def checked(i: int) -> tuple[Check, Check, FlownSet]:
+        (speed, knot), plant, noise = places[i], plants[i], _noise_at(source, places[i][0])
+        one, steps, leg = _check(plant, schedule.at(speed), schedule.rows, schedule, noise, knot=knot, constant=False)
+        held = held_at(constant, schedule, speed)
+        other, theirs, _ = _check(plant, held, (held,), schedule, noise, knot=knot, constant=True)
+        return one, other, FlownSet(speed, steps, theirs, leg)
 
-    scheduled, compared, steps = zip(*parallel_map(checked, list(enumerate(checked_speeds(schedule)))), strict=True)
-    (plant, _), *_ = plants_at(source, schedule.speeds[0], limits, draws, SEED)
-    spread = any(bool((getattr(plant, name) != getattr(plant, name)[0]).any()) for name in PARTS)
-    return Verification(schedule, scheduled, compared, constant, steps, draws, spread)
+    scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
+    spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
+    kept, heard = speed_kept_said(schedule.axis, surge), max((m.noise.disturbance for m in source.models), default=0.0)
+    return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard)
+
+
+def _noise_at(source: ParameterSource, speed: float) -> Noise | None:
+    """Return the noise of the model that counts most at a speed, None for a table."""
+    if not source.models:
+        return None
+    nearest, _ = max(source.near(speed), key=lambda at: at[1])
+    return source.models[nearest].noise
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
@@ -134,43 +252,48 @@ def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
     return sorted([(s, True) for s in knots] + [(s, False) for s in between])
 
 
-def constant_row(schedule: Schedule) -> Row:
-    """Return the one robust gain for all speeds: the row of least proportional gain, which is damped everywhere."""
-    return min(schedule.rows, key=lambda r: abs(r.gains.kp))
-
-
-def nominal_steps(plant: LinearPlant, row: Row, axis: Axis, seconds: float = STEP_DURATION_S) -> Steps:
-    """Return the estimate's response to the standard step."""
-    return step_response(plant.one(), row, reference=STEP_ANGLE_RAD[axis], seconds=seconds)
-
-
 def stated_limits(schedule: Schedule) -> FinLimits:
     """Return what was said of the fin: what was not is that of the models it is tried on, varied over their draws."""
     a = schedule.stated
-    return FinLimits(a.get("lag_s"), a.get("delay_s"), a.get("fin_rate_rad_s"))
+    return FinLimits(a.get("lag_s"), a.get("delay_s"), a.get("fin_rate_rad_s"), a.get("latency_s"))
 
 
-def _check(plant: LinearPlant, row: Row, schedule: Schedule, *, knot: bool, constant: bool) -> tuple[Check, Steps]:
-    step = STEP_ANGLE_RAD[schedule.axis]
+def _check(
+    plant: LinearPlant, row: Row, rows: Sequence[Row], schedule: Schedule, noise: Noise | None, *, knot: bool, constant: bool
+) -> tuple[Check, tuple[Steps, Steps, Steps], Steps]:
     phase, gain, delay = control_margins(plant, row.gains)
-    least = margins(plant, row.gains).worst()
-    steps = step_response(plant, row, reference=step, seconds=STEP_DURATION_S)
-    over, settled = overshoot(steps.angle, step), settling(steps.time, steps.angle, step)
-    known = replace(row, feed_forward=row.feed_forward - FIN_OFFSET_RAD)
-    bent = step_response(plant.one(), known, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD)
-    unknown = step_response(plant.one(), row, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD)
-    known_error, unknown_error = (float(steady_error(s.angle, 0.0)[0]) for s in (bent, unknown))
-    depth_over, depth_settled = _depth(plant, row) if schedule.depth else (float("nan"), float("nan"))
-    check = Check(
-        row.speed, knot, row.supported, constant, phase, gain, delay, *least, float(over[0]), float(over.max()),
-        float(settled[0]), float(settled.max()), known_error, unknown_error,
-        depth_over, depth_settled,
-    )  # fmt: skip
-    return check, Steps(steps.time, steps.angle[:, :1], steps.fin[:, :1], steps.depth[:, :1])
-
-
-def _depth(plant: LinearPlant, row: Row) -> tuple[float, float]:
+    found = margins(plant, row.gains)
+    least_phase, least_gain, least_delay = found.worst()
+    flights = [step_response(plant, rows, reference=size, seconds=STEP_DURATION_S) for size in STEPS_RAD[schedule.axis]]
+    small, usual, large = (_step(s, size) for s, size in zip(flights, STEPS_RAD[schedule.axis], strict=True))
+    known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
-    steps = depth_response(one, row, step=DEPTH_STEP_M, seconds=DEPTH_STEP_S, pitch_limit=PITCH_LIMIT_RAD)
+    bent, unknown = (step_response(one, r, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD) for r in (known, rows))
+    leg = straight_leg(plant, rows, noise)
+    depth_over, depth_settled = _depth(one, rows) if schedule.depth else (float("nan"), float("nan"))
+    check = Check(
+        row.speed, knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
+        int(np.sum(found.phase_deg < 0.0)),
+        (small, usual, large), float(np.min(flights[2].speed[:, 0])),
+        float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
+        float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled,
+    )  # fmt: skip
+    return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg.one()
+
+
+def _step(flown: Steps, size: float) -> StepCheck:
+    moved, off = about_rest(flown.angle, size), np.abs(steady_error(flown.angle, size))
+    over, settled, left = overshoot(moved, size), settling(flown.time, moved, size), swing(flown.angle, size)
+    over[0], settled[0] = overshoot(flown.angle, size)[0], settling(flown.time, flown.angle, size)[0]  # its trim is known
+    most = [worst_of(part, most=True) for part in (over, settled, left, off)]
+    return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], most[2], most[3])
+
+
+def _trimmed(row: Row, fin: float) -> Row:
+    return replace(row, feed_forward=row.feed_forward + fin)
+
+
+def _depth(one: LinearPlant, rows: Sequence[Row]) -> tuple[float, float]:
+    steps = depth_response(one, rows, step=DEPTH_STEP_M, seconds=DEPTH_STEP_S, pitch_limit=PITCH_LIMIT_RAD)
     settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
     return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])

@@ -45,7 +45,8 @@ def test_the_helps_own_example_counts_with_the_servo_of_the_models(run_cli, tmp_
     assert body["rows"] == run_cli("schedule", "design", *paths, "--fin-limit", "0.26", "--json").json["rows"]
     assert "counted with: lag 0.300 s, delay 0 s" in run_cli("schedule", "design", law, "--fin-limit", "0.26").out
     bare = " ".join(run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26").out.split())
-    assert "counted with: lag 0 s, delay 0 s, no rate limit; a table carries no effects" in bare
+    assert "counted with: lag 0 s, delay 0 s, no rate limit; no run to measure the speed lost in the turn: 15 % assumed" in bare
+    assert "a table carries no effects" in bare
     rows = run_cli("turn-radius", law, "--rudder-max", "0.2", "--json").json["rows"]
     assert {r["method"] for r in rows} == {"simulated"}
 
@@ -69,7 +70,7 @@ def test_verify_begins_with_its_verdict_and_what_that_rests_on(run_cli, gains):
     assert lines[1] == body["rests_on"]
     assert lines[1].startswith("rests on yaw.csv with no effects; ")
     assert "lag 0.200 s" in lines[1]
-    table_at = next(i for i, line in enumerate(lines) if line.startswith("margins and steps"))
+    table_at = next(i for i, line in enumerate(lines) if line.startswith("deg, dB, s of margin"))
     assert table_at > 1
 
 

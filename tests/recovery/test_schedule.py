@@ -15,7 +15,7 @@ from fieldsid.plant.parameter_source import load_parameter_source
 from fieldsid.schedule.design import Wish
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.verify import checked_speeds, constant_row
+from fieldsid.schedule.verify import checked_speeds, verify_schedule
 
 KNOTS = (1.2, 1.6, 2.0)
 FINS = Fins(lag=0.15, rate=1.0, limit=0.3)
@@ -35,7 +35,8 @@ def schedule_from(folder, fins: Fins, kind: str = "pd"):
         (fit,) = identify([flown(speed, 20 + i, fins)], Axis.YAW, method="output_error")
         paths.append(save_model(fit.model, folder / f"m{i}.yaml"))
     limits = FinLimits(lag=fins.lag, rate=fins.rate)
-    return design_schedule(load_parameter_source(paths), fins.limit, wish=Wish(kind=kind, bandwidth=1.0), limits=limits)
+    source = load_parameter_source(paths)
+    return design_schedule(source, fins.limit, wish=Wish(kind=kind, bandwidth=1.0), limits=limits), source
 
 
 def steered(row, speed: float, *, fins: Fins = FINS, step: float = STEP, forward: bool = True, seed: int = 50):
@@ -65,7 +66,8 @@ def schedule(tmp_path_factory):
 
 
 def test_steps_are_damped_and_quick_at_every_speed_and_none_slower_than_the_constant_gain(schedule):
-    constant = constant_row(schedule)
+    schedule, source = schedule
+    constant = verify_schedule(schedule, source).constant_row
     rows = []
     for speed, knot in checked_speeds(schedule):
         ours = figures(*steered(schedule.at(speed), speed))
@@ -80,7 +82,7 @@ def test_steps_are_damped_and_quick_at_every_speed_and_none_slower_than_the_cons
 
 def test_the_steady_error_of_a_bent_fin_goes_to_zero_by_the_feed_forward(tmp_path):
     bent = Fins(lag=FINS.lag, rate=FINS.rate, limit=FINS.limit, rudder_offset=BENT)
-    row = schedule_from(tmp_path, bent).at(1.5)
+    row = schedule_from(tmp_path, bent)[0].at(1.5)
     tail = [float(np.mean(steered(row, 1.5, fins=bent, step=0.0, forward=f)[1][-200:])) for f in (True, False)]
     assert abs(row.feed_forward + BENT) < np.deg2rad(0.5)
     assert abs(tail[0]) < np.deg2rad(1.0)

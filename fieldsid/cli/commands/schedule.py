@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 command = typer.Typer(help="Gains per speed: design them, verify them, write them for the vehicle's software.")
 
 ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
-Controller = Annotated[str, typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr.")]
+Controller = Annotated[
+    str | None,
+    typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr; pd where the runs have a rate, else p."),
+]
 Damping = Annotated[float, typer.Option("--damping", help="Damping ratio of the closed loop.")]
 PhaseWanted = Annotated[float, typer.Option("--phase-margin", metavar="DEG", help="Phase margin the gains are slowed to keep.")]
 Speeds = Annotated[
@@ -44,7 +47,13 @@ FinRate = Annotated[
 FinLag = Annotated[
     float | None, typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.")
 ]
-Delay = Annotated[float | None, typer.Option("--delay", metavar="S", help="Dead time of the loop; the model's if not given.")]
+Delay = Annotated[
+    float | None, typer.Option("--delay", metavar="S", help="Dead time from command to fin; the model's if not given.")
+]
+Latency = Annotated[
+    float | None,
+    typer.Option("--latency", metavar="S", help="The autopilot's own, sensor to command, with half its period."),
+]
 Depth = Annotated[bool, typer.Option("--depth", help="Add the depth loop above pitch.")]
 OwnLaw = Annotated[
     list[str] | None, typer.Option("--law", metavar="NAME=c0[,c1]", help="A law of your own, c0 + c1 u^2, as `b2=-0.23,-0.33`.")
@@ -76,7 +85,7 @@ Write = Annotated[bool, typer.Option("--write", help="Change the file of `--into
 @command.command("design", short_help="Gains per speed from models, a fit file or a table.")
 def design(
     models: ModelFiles,
-    controller: Controller = "p",
+    controller: Controller = None,
     damping: Damping = 0.7071,
     phase_margin: PhaseWanted = 45.0,
     speeds: Speeds = None,
@@ -84,6 +93,7 @@ def design(
     fin_rate: FinRate = None,
     fin_lag: FinLag = None,
     delay: Delay = None,
+    latency: Latency = None,
     depth: Depth = False,
     law: OwnLaw = None,
     vehicle: VehicleFile = None,
@@ -91,19 +101,22 @@ def design(
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
-    """Design gains per speed: P with feed-forward, or PD, PI, PID, LQR; heading or pitch, by the models' axis.
+    """Design gains per speed: PD or P with feed-forward, PI, PID, LQR; heading or pitch, by the models' axis.
 
-    Gains are slowed until damping and phase margin hold with the fin's lag and delay. The feed-forward cancels the trim.
+    Gains are slowed until damping and phase margin hold with the fin's lag and delay for 95 % of the draws of the models' errors,
+    and a step flown by them comes to rest: with the fin's limits and the speed lost in the turn. What no such gain holds is
+    refused. The feed-forward cancels the trim.
 
     Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
     """
     from fieldsid.angles import FIN, FIN_RATE, parse_angle
     from fieldsid.cli.user_effects import check_effects
+    from fieldsid.face.arguments import runs_behind
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.schedule.design import Wish
     from fieldsid.schedule.linear_plant import FinLimits
-    from fieldsid.schedule.make import design_schedule
+    from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import body_of, save_schedule
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
@@ -116,9 +129,10 @@ def design(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller, damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
-        limits=FinLimits(fin_lag, delay, rate),
+        wish=Wish(controller or usual_controller(source), damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
+        limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
+        runs=runs_behind(source, say),
     )
     body: dict[str, Any] = {"schema": "fieldsid/schedule/1", **body_of(schedule), "file": None}
     if output is not None:
@@ -140,25 +154,27 @@ def verify(
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
-    """Check a schedule at its knots and between, over the errors of the models, against one constant gain.
+    """Check a schedule at its knots and between, over the errors of the models, against the best one gain for all speeds.
 
-    The first line is the verdict, the second what it rests on. Margins by python-control; steps with the fin's limit, rate,
-    lag and delay. A gate that fails makes the exit code 1. With `-o FILE` a figure is drawn.
+    The first line is the verdict, the second what it rests on. Margins by python-control; steps of three sizes flown with the
+    fin's limit, rate, lag and delay, the hull's drag in the turn and the speed lost in it; a straight leg in the disturbance of
+    the models' runs. The least and the most are over 95 % of the draws. A gate that fails makes the exit code 1. With `-o FILE` a
+    figure is drawn.
 
     Example: sysid schedule verify gains.yaml --require-phase-margin 40 -o gains.png
     """
     from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import designed_from
+    from fieldsid.face.arguments import designed_from, runs_behind
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.schedule.record import load_schedule
-    from fieldsid.schedule.verdict import gates_of, rests_on, verdict_of
+    from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
     from fieldsid.schedule.verify import verify_schedule
 
     refuse_figure(output, force=force)
     known = load_schedule(schedule)
     source = load_parameter_source(models or designed_from(known, str(schedule)))
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
-    checked = verify_schedule(known, source)
+    checked = verify_schedule(known, source, runs=runs_behind(source, say))
     wanted = (require_phase_margin, require_gain_margin, require_delay_margin, max_overshoot)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
@@ -167,6 +183,8 @@ def verify(
         "verdict": verdict,
         "says": says,
         "rests_on": rests_on(checked, known, source),
+        "against_constant": against_constant(checked),
+        "constant_gains": {n: getattr(checked.constant_row.gains, n) for n in ("kp", "ki", "kd")},
         "axis": known.axis.value,
         "controller": known.kind,
         "worst": checked.worst,
@@ -255,8 +273,11 @@ def _draw(schedule: Schedule, checked: Verification, path: Path, context: typer.
 
 
 def _render_design(to: Console, schedule: Schedule, source: ParameterSource, body: Mapping[str, Any]) -> None:
+    from math import degrees, isfinite
+
     from fieldsid.rounding import number
     from fieldsid.schedule.verdict import fin_of, lost
+    from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     extra = ("kz",) if schedule.depth else ()
     rows = [
@@ -270,18 +291,25 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
             *((number(r.depth_gain, 3),) if schedule.depth else ()),
             f"{r.phase_margin_deg:.0f}",
             f"{r.slowed:.2f}",
+            f"{r.settling:.1f}" if isfinite(r.settling) else "never",
+            f"{100 * r.draws_held:.0f}%",
             "yes" if r.supported else "no",
         )
         for r in schedule.rows
     ]
-    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "data")
+    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "settle s", "held", "data")
     to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
-    to.print(f"counted with: {'; '.join((fin_of(schedule.actuator), *lost(source)))}")
+    counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
+    to.print(f"counted with: {'; '.join(counted)}")
+    to.print(
+        f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of the models' errors; held: those that come "
+        f"to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
+    )
     slowed = [r for r in schedule.rows if r.slowed < 1.0]
     if slowed:
         to.print(
-            f"{len(slowed)} of {len(schedule.rows)} rows were slowed for the fin's lag, delay or margin (1 is the formula's)"
+            f"{len(slowed)} of {len(schedule.rows)} rows were slowed for lag, delay, margin or the draws (1 is the formula's)"
         )
     if body["file"]:
         to.print(f"schedule: {body['file']}", soft_wrap=True)
@@ -290,17 +318,33 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
 
 
 def _render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) -> None:
+    from math import degrees
+
     from rich.text import Text
 
     to.print(Text(f"{body['verdict']}: {body['says']}", style="bold"), soft_wrap=True)
     to.print(Text(body["rests_on"]), soft_wrap=True)
     to.print()
-    columns = ("m/s", "phase", "least", "gain dB", "delay s", "over %", "most", "settle s", "constant", "knot")
+    small, usual, large = (degrees(step.size) for step in checked.scheduled[0].steps)
+    columns = (
+        "m/s", "phase", "least", "dB", "delay", "over", "most", f"{small:.0f}", f"{usual:.0f}", "most", f"{large:.0f}", "const",
+        "knot",
+    )  # fmt: skip
     rows = [_verify_row(a, b) for a, b in zip(checked.scheduled, checked.constant, strict=True)]
-    to.print(table("margins and steps; constant: settling with one gain for all speeds", columns, rows, left=0))
+    to.print(table("deg, dB, s of margin; overshoot %; s to settle by step in deg", columns, rows, left=0))
+    to.print(body["against_constant"], soft_wrap=True)
     bent = max(abs(c.bent_error) for c in checked.scheduled)
     unknown = max(abs(c.bent_error_unknown) for c in checked.scheduled)
-    to.print(f"a fin 3 deg off: steady error {57.3 * bent:.2f} deg with the feed-forward, {57.3 * unknown:.2f} deg without")
+    to.print(f"a fin 3 deg off: steady error {degrees(bent):.2f} deg with the feed-forward, {degrees(unknown):.2f} deg without")
+    if checked.spread:
+        off = max(c.steps[1].off for c in checked.scheduled)
+        to.print(f"the trim is known so far that a straight course is held to {degrees(off):.2f} deg by 95 % of the draws")
+    if checked.disturbance > 0:
+        rms, fin = max(c.leg_rms for c in checked.scheduled), max(c.leg_fin_rms for c in checked.scheduled)
+        to.print(f"a straight leg in that disturbance: {degrees(rms):.2f} deg rms with {degrees(fin):.2f} deg rms of fin")
+    slowest = min(checked.scheduled, key=lambda c: c.speed_least / c.speed)
+    if slowest.speed_least < 0.99 * slowest.speed:
+        to.print(f"in the {large:.0f} deg step the speed falls from {slowest.speed:.2f} to {slowest.speed_least:.2f} m/s at most")
     depth = [c for c in checked.scheduled if c.depth_settling == c.depth_settling]
     if depth:
         over, settle = max(100 * c.depth_overshoot for c in depth), max(c.depth_settling for c in depth)
@@ -324,10 +368,17 @@ def _verify_row(check: Check, constant: Check) -> tuple[str, ...]:
         f"{check.delay_least_s:.2f}",
         f"{100 * check.overshoot:.0f}",
         f"{100 * check.overshoot_most:.0f}",
-        f"{check.settling:.1f}",
-        f"{constant.settling:.1f}",
+        _settles(check.steps[0].settling),
+        _settles(check.settling),
+        _settles(check.settling_most),
+        _settles(check.steps[2].settling),
+        _settles(constant.settling),
         "knot" if check.knot else "",
     )
+
+
+def _settles(seconds: float) -> str:
+    return f"{seconds:.1f}" if seconds != float("inf") else "never"
 
 
 def _render_export(to: Console, body: Mapping[str, Any]) -> None:

@@ -35,7 +35,11 @@ class Row(Shape):
     gain_margin_db: Number
     """Gain margin; null where the loop never crosses."""
     delay_margin_s: Number
-    """Delay margin."""
+    """Delay margin; the three margins are the least over 95 % of the draws."""
+    draws_held: Number
+    """Share of the draws with the wished margin that come to rest from the standard step."""
+    settling_s: Number
+    """Time of 95 % of them to stay within 5 % of it."""
 
 
 class Actuator(Shape):
@@ -47,6 +51,8 @@ class Actuator(Shape):
     """Dead time."""
     fin_rate_rad_s: Number
     """Fastest rate; null where it is not limited."""
+    latency_s: Number
+    """The autopilot's own."""
 
 
 class Schedule(Shape):
@@ -75,6 +81,25 @@ class Schedule(Shape):
     """The file that was written."""
 
 
+class StepCheck(Shape):
+    """A step of one size."""
+
+    step_rad: float
+    """Its size."""
+    overshoot_percent: Number
+    """Overshoot by the estimate."""
+    overshoot_most_percent: Number
+    """Largest over 95 % of the draws."""
+    settling_s: Number
+    """Time to stay within 5 % by the estimate; null if never."""
+    settling_most_s: Number
+    """Longest over 95 % of the draws."""
+    swing_percent: Number
+    """What still swings in the last quarter of a minute, peak to peak."""
+    steady_error_most_rad: Number
+    """How far from what was asked it comes to rest, by 95 % of the draws: the error of the trim."""
+
+
 class Check(Shape):
     """One speed under one set of gains."""
 
@@ -98,18 +123,28 @@ class Check(Shape):
     """Smallest over the draws."""
     delay_margin_least_s: Number
     """Smallest over the draws."""
+    unstable_draws: int
+    """How many of the draws are unstable."""
     overshoot_percent: Number
-    """Overshoot of a step."""
+    """Overshoot of the standard step, 20 deg of heading or 10 deg of pitch."""
     overshoot_most_percent: Number
     """Largest over the draws."""
     settling_s: Number
     """Time to stay within 5 % of the step; null if never."""
     settling_most_s: Number
-    """Longest over the draws."""
+    """Longest over 95 % of the draws."""
+    steps: list[StepCheck]
+    """A small, the standard and a large step."""
+    speed_least_m_s: Number
+    """The least speed in the large step."""
     fin_offset_error_rad: Number
     """Steady error with a fin 3 deg off that the feed-forward knows."""
     fin_offset_error_unknown_rad: Number
     """The same with one it does not."""
+    leg_rms_rad: Number
+    """Angle on a straight leg in the disturbance of the models' runs."""
+    leg_fin_rms_rad: Number
+    """The fin there."""
     depth_overshoot_percent: Number
     """Overshoot of a step of depth."""
     depth_settling_s: Number
@@ -154,6 +189,10 @@ class Verification(Shape):
     """The same in a sentence, with its number."""
     rests_on: str
     """What it rests on."""
+    against_constant: str
+    """How it compares with the best one gain for all speeds."""
+    constant_gains: dict[str, float]
+    """That gain."""
     axis: AxisName
     """The plane."""
     controller: str

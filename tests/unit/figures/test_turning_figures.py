@@ -64,10 +64,13 @@ def test_track_figure_draws_the_circle_with_its_radius():
 def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
     made = design_schedule(source, 0.26, speeds=[0.7, 1.4, 2.0])
     figure = schedule.figure(made, verify_schedule(made, source, draws=5))
-    gains, forward, margins, scheduled, constant = axes_of(figure)
+    gains, forward, margins, small, usual, large, leg = axes_of(figure)
     faces = [line.get_markerfacecolor() for line in gains.lines if line.get_marker() == "o"]
     assert faces[0] == "white"
     assert "white" not in faces[1:]
     assert forward.get_ylabel() == "feed-forward, deg"
     assert margins.get_ylim()[0] == 0.0
-    assert len(scheduled.lines) == len(constant.lines) == 5
+    assert [len(ax.lines) for ax in (small, usual, large)] == [10, 10, 10]
+    assert [ax.get_ylabel() for ax in (small, usual, large)] == [f"{d}° step, deg" for d in (5, 20, 90)]
+    assert len(leg.lines) == 5
+    assert "no disturbance" in leg.get_title(loc="left")

@@ -1,0 +1,50 @@
+"""The best one gain for all speeds: what a schedule has to beat, sought among its own rows and multiples of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fieldsid.schedule.flown.response import LIMIT_CYCLE_SHARE, about_rest, settling, step_response, swing
+from fieldsid.schedule.linear_plant import LinearPlant
+from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
+from fieldsid.schedule.record import Row, Schedule
+
+MULTIPLES = (0.5, 0.7, 1.0, 1.4, 2.0)
+TRIED_DRAWS = 12
+MARGIN_ROUNDING_DEG = 1.0
+
+
+def best_constant(schedule: Schedule, plants: Sequence[LinearPlant], *, step: float, seconds: float) -> Row:
+    """Return the gains that settle soonest at the slowest of the speeds of plants, within 95 % of the draws of each.
+
+    They have to keep the margin that the schedule keeps: a faster loop without it is no better one. Feed-forward and reference
+    gain are left to `held_at`: the trim is known at every speed. Where nothing holds everywhere it is what holds at most speeds.
+    """
+    candidates = [replace(r, gains=r.gains.times(f)) for r in schedule.rows for f in MULTIPLES]
+    margin = margin_kept(schedule)
+    few = [p.pick(np.arange(min(TRIED_DRAWS, p.count))) for p in plants]
+
+    def cost(row: Row) -> tuple[int, float]:
+        slowest, lost = 0.0, 0
+        for plant in few:
+            steps = step_response(plant, held_at(row, schedule, plant.speed), reference=step, seconds=seconds)
+            kept = (swing(steps.angle, step) <= LIMIT_CYCLE_SHARE) & (margins(plant, row.gains).phase_deg >= margin)
+            lost += int(np.mean(kept) < HELD_SHARE)
+            slowest = max(slowest, worst_of(settling(steps.time, about_rest(steps.angle, step), step), most=True))
+        return lost, slowest
+
+    return min(candidates, key=cost)
+
+
+def held_at(constant: Row, schedule: Schedule, speed: float) -> Row:
+    """Return the constant gains as they are at a speed, with the trim and the reference gain the schedule has there."""
+    here = schedule.at(speed)
+    return replace(constant, speed=speed, feed_forward=here.feed_forward, reference_gain=here.reference_gain)
+
+
+def margin_kept(schedule: Schedule) -> float:
+    """Return the least phase margin (deg) of the schedule's rows."""
+    return float(min(schedule.column("phase_margin_deg"))) - MARGIN_ROUNDING_DEG

@@ -1,0 +1,121 @@
+"""Closed loops in time of every draw of a plant: steps, dives, a straight leg; and what is read off them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.display import Brief
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, close_loop
+from fieldsid.schedule.linear_plant import LinearPlant
+from fieldsid.schedule.record import Row
+
+STEP_S = 0.02
+SETTLING_BAND = 0.05
+FASTEST_LAG_S = 1e-6
+TAIL_SHARE = 0.25
+"""The last part of a response: what still swings there is a limit cycle."""
+LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
+"""Peak to peak over the step: what swings through the whole corridor of settling after 45 s does not settle."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Steps(Brief):
+    """Responses of n cases: time (t,) s, angle (t, n) rad, fin command or angle (t, n) rad, depth (t, n) m, speed (t, n) m/s."""
+
+    time: FloatArray
+    angle: FloatArray
+    fin: FloatArray
+    depth: FloatArray
+    speed: FloatArray
+
+    def one(self) -> Steps:
+        """Return the first case alone."""
+        return Steps(self.time, self.angle[:, :1], self.fin[:, :1], self.depth[:, :1], self.speed[:, :1])
+
+
+def overshoot(values: FloatArray, size: float) -> FloatArray:
+    """Return the overshoot of steps (t, n) of `size`, (n,), as a share of it; inf for what diverges."""
+    return np.asarray(np.maximum(np.max(values / size, axis=0) - 1.0, 0.0))
+
+
+def settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
+    """Return the time after which steps (t, n) stay within 5 % of `size`, (n,) s; inf if never."""
+    off = np.asarray(np.abs(values - size) > SETTLING_BAND * abs(size))
+    last = time.size - 1 - np.argmax(off[::-1], axis=0)
+    return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
+
+
+def swing(values: FloatArray, size: float) -> FloatArray:
+    """Return what steps (t, n) of `size` still swing in their last quarter, peak to peak, (n,), as a share of it."""
+    tail = values[-max(2, round(TAIL_SHARE * values.shape[0])) :]
+    gone = ~np.isfinite(tail).all(axis=0)
+    steady = np.where(gone[None, :], 0.0, tail)
+    return np.asarray(np.where(gone, np.inf, np.ptp(steady, axis=0) / abs(size)))
+
+
+def about_rest(values: FloatArray, size: float) -> FloatArray:
+    """Return steps (t, n) of `size` moved to where each comes to rest: what a trim that is not known leaves is no motion."""
+    rest = size - steady_error(values, size)
+    return np.asarray(values + np.where(np.isfinite(rest), size - rest, 0.0))
+
+
+def steady_error(values: FloatArray, wanted: float) -> FloatArray:
+    """Return wanted less the mean of the last twentieth of (t, n), (n,)."""
+    tail = max(1, values.shape[0] // 20)
+    return np.asarray(wanted - values[-tail:].mean(axis=0))
+
+
+def step_response(
+    plant: LinearPlant, rows: Sequence[Row] | Row, *, reference: float, seconds: float, offset: float = 0.0
+) -> Steps:
+    """Return the response of every draw of a plant to a step of the reference (rad) at time 0, under a row's gains or rows'.
+
+    `offset` (rad) is added to the fin: a bent fin, on top of the plant's own trim.
+    """
+    return _run(plant, rows, reference, 0.0, seconds, offset, 0.0)
+
+
+def depth_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, step: float, seconds: float, pitch_limit: float) -> Steps:
+    """Return the response to a step of the wanted depth (m) through pitch, z' = -u theta, pitch asked within pitch_limit."""
+    return _run(plant, rows, 0.0, step, seconds, 0.0, pitch_limit)
+
+
+def leg_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, push: FloatArray) -> Steps:
+    """Return a straight leg under a disturbance moment push (t,) rad/s^2, a value for each 0.02 s."""
+    return _run(plant, rows, 0.0, 0.0, STEP_S * (push.size - 1), 0.0, 0.0, push)
+
+
+def _run(
+    plant: LinearPlant,
+    rows: Sequence[Row] | Row,
+    reference: float,
+    depth: float,
+    seconds: float,
+    offset: float,
+    pitch_limit: float,
+    push: FloatArray | None = None,
+) -> Steps:
+    plants = np.column_stack(
+        [
+            plant.damping, plant.stiffness, plant.authority, plant.offset + offset, plant.quadratic, plant.beyond_square,
+            plant.crossflow, plant.cross_damping, plant.cross_rate, plant.cross_fin, plant.cross_quadratic,
+            np.exp(-STEP_S / np.maximum(plant.lag, FASTEST_LAG_S)), np.round(plant.delay / STEP_S),
+            np.minimum(plant.fin_rate, 1e6) * STEP_S, plant.powers, plant.speed_loss,
+        ]
+    )  # fmt: skip
+    table = np.array([_gains(r) for r in ([rows] if isinstance(rows, Row) else rows)])
+    count = round(seconds / STEP_S) + 1
+    out = np.zeros((plant.count, count, OUT_COLUMNS))
+    pushed = np.zeros(count) if push is None else push
+    close_loop(np.ascontiguousarray(plants), table, reference, depth, pitch_limit, plant.speed, STEP_S, pushed, out)
+    angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
+    return Steps(STEP_S * np.arange(count, dtype=np.float64), angle, fin, deep, speed)
+
+
+def _gains(row: Row) -> tuple[float, ...]:
+    g = row.gains
+    return row.speed, g.kp, g.ki, g.kd, row.feed_forward, row.reference_gain, row.fin_limit, row.depth_gain
