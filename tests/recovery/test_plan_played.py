@@ -1,0 +1,125 @@
+"""Exported plans read back and flown by the six-degree-of-freedom vehicle with faults: every abort fires in time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plan_legs import ENVELOPE, leg, plan
+from played import dune, moos, ros2
+from truth.pilots import Autopilot
+from truth.vehicle import CALM, QUIET, Fins, Sea, fly_vehicle
+
+from fieldsid.planning.design.abort_conditions import aborts_of
+from fieldsid.planning.output.command_files import write_all
+
+COURSE = np.radians(90.0)
+LIMITS = replace(ENVELOPE, pitch=0.4)
+RUN_UP_S = 10.0
+FAULTS = {
+    "none": {},
+    "half the authority": {"gain": 0.5},
+    "strong trim": {"fins": Fins(rudder_offset=0.12)},
+    "lost fin": {"gain": 0.0},
+    "stuck fin": {"stuck": 0.2},
+    "stern plane stuck down": {"elevator": 0.3},
+    "current across": {"sea": Sea(current=(0.0, 0.9))},
+    "current from ahead": {"sea": Sea(current=(-1.7, 0.0))},
+}
+BREAKS = {
+    "stuck fin": "yaw_rad", "stern plane stuck down": "pitch_rad", "current across": "y_m",
+    "current from ahead": "x_m",
+}  # fmt: skip
+"""The limit that a fault is expected to reach first, none for the others."""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The leg and its files, each read back anew by its own interpreter."""
+    made = replace(plan(leg()), envelope=LIMITS, course=COURSE)
+    folder = tmp_path_factory.mktemp("plan")
+    stem = write_all(made, folder)[0].with_suffix("")
+    name = lambda end: stem.with_name(f"{stem.name}_{end}")  # noqa: E731
+    run_up = RUN_UP_S * made.legs[0].speed
+    players = {
+        "dune": lambda: dune(name("dune.ini"), run_up),
+        "ros2": lambda: ros2(name("bag"), run_up),
+        "moos": lambda: moos(name("moos_timer_script.moos"), name("moos_oparea.bhv"), COURSE),
+    }
+    return made, players
+
+
+def flown(player, speed, seconds, *, gain=1.0, stuck=None, elevator=None, fins=None, sea=CALM):
+    """Flight under a player's commands, the autopilot where it steers, with a fault from the window's start on."""
+    pilot = Autopilot()
+    fins = fins or Fins()
+
+    def steer(t, seen):
+        rudder, plane = pilot(t, seen)
+        commanded = player.step(t, seen)
+        rudder = rudder if commanded is None else commanded
+        rudder = stuck if stuck is not None else gain * rudder
+        return rudder, plane if elevator is None else elevator
+
+    return fly_vehicle(
+        steer, seconds, speed=speed, fins=fins, sea=sea, sensors=QUIET, run_up=Autopilot(), run_up_s=RUN_UP_S
+    ).truth
+
+
+def first_broken(truth, conditions, run_up):
+    """When the truth passes the first of the limits, and which; None where it never does."""
+    broken = []
+    for a in conditions:
+        values = truth[a.signal] - (run_up if a.signal == "x_m" else 0.0)
+        moved = values - values[0] if a.signal in ("yaw_rad", "pitch_rad", "roll_rad") else values
+        outside = {
+            "below": moved < a.limit,
+            "above": moved > a.limit,
+            "deviation": np.abs(moved) > a.limit,
+            "time": values > a.limit,
+        }
+        if outside[a.kind].any():
+            broken.append((float(truth["time_s"][np.argmax(outside[a.kind])]), a.signal))
+    return min(broken, default=None)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("target", ["dune", "ros2", "moos"])
+def test_every_abort_fires_when_its_limit_is_passed_and_not_before(written, target, fault):
+    made, players = written
+    one, player = made.legs[0], players[target]()
+    truth = flown(player, one.speed, one.window.length, **FAULTS[fault])
+    wanted = first_broken(truth, aborts_of(one, made.envelope), RUN_UP_S * one.speed)
+    assert (wanted and wanted[1]) == BREAKS.get(fault)
+    assert (player.aborted is None) == (wanted is None)
+    if wanted is not None:
+        # a helm watches from when the fin is taken from the autopilot on, not before
+        due = max(wanted[0], one.window.lead) if target == "moos" else wanted[0]
+        assert player.aborted[0] == pytest.approx(due, abs=0.15)
+        assert player.step(player.aborted[0] + 0.05, _seen(truth)) is None
+
+
+def _seen(truth):
+    from truth.vehicle import SEEN, Measured
+
+    return Measured(*(float(truth[name][-1]) for name in SEEN))
+
+
+@pytest.mark.parametrize("target", ["dune", "ros2", "moos"])
+def test_the_fins_that_are_flown_are_those_of_the_plan_and_within_the_limit(written, target):
+    made, players = written
+    player, commanded = players[target](), []
+    step = player.step
+
+    def heard(t, seen):
+        fin = step(t, seen)
+        commanded.append(np.nan if fin is None else fin)
+        return fin
+
+    player.step = heard
+    flown(player, made.legs[0].speed, made.legs[0].window.length)
+    assert player.aborted is None
+    assert np.nanmax(np.abs(commanded)) <= made.envelope.fin + 1e-4
+    assert np.nanmax(commanded) > 0.1
+    assert np.nanmin(commanded) < -0.1
