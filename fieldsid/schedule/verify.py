@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.display import Displayed, Plotted
+from fieldsid.display import Brief, Displayed, Plotted
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
@@ -53,7 +53,7 @@ PITCH_LIMIT_RAD = 0.3490658503988659
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class StepCheck(Displayed):
+class StepCheck(Brief):
     """A step of one size (rad) by the estimate and by 95 % of the draws: overshoot as a share of it, settling in s (5 %).
 
     Those of the draws are about where each comes to rest; `off` (rad) is how far that is from what was asked, by 95 % of them:
@@ -161,7 +161,7 @@ READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyTyp
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class FlownSet(Displayed):
+class FlownSet(Brief):
     """One speed (m/s) as the estimate flies it: the three steps under the schedule and the constant gain, the straight leg."""
 
     speed: float

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.numerics.arrays import FloatArray
@@ -44,7 +45,7 @@ def overshoot(values: FloatArray, size: float) -> FloatArray:
 
 def settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
     """Return the time after which steps (t, n) stay within 5 % of `size`, (n,) s; inf if never."""
-    off = np.asarray(np.abs(values - size) > SETTLING_BAND * abs(size))
+    off = np.abs(values - size) > SETTLING_BAND * abs(size)
     last = time.size - 1 - np.argmax(off[::-1], axis=0)
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
 
@@ -52,7 +53,7 @@ def settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
 def swing(values: FloatArray, size: float) -> FloatArray:
     """Return what steps (t, n) of `size` still swing in their last quarter, peak to peak, (n,), as a share of it."""
     tail = values[-max(2, round(TAIL_SHARE * values.shape[0])) :]
-    gone = ~np.isfinite(tail).all(axis=0)
+    gone: npt.NDArray[np.bool_] = np.asarray(~np.isfinite(tail).all(axis=0))
     steady = np.where(gone[None, :], 0.0, tail)
     return np.asarray(np.where(gone, np.inf, np.ptp(steady, axis=0) / abs(size)))
 
