@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measured, with_moments
-from fieldsid.errors import DivergenceError
+from fieldsid.errors import DivergenceError, ModelError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, Motion, as_fitted, effect_held
 from fieldsid.models.model import Model
@@ -33,8 +33,20 @@ class Trajectory:
 
 
 def effects_of(model: Model) -> tuple[Effect, ...]:
-    """Return the effects that a model holds, in the forms it was fitted in; raises EffectError for one not known here."""
-    return tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
+    """Return the effects that a model holds, in the forms it was fitted in.
+
+    Raises EffectError for one not known here, ModelError where the model does not give a coefficient of one.
+    """
+    held = tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
+    for effect in held:
+        lacking = [c.name for c in effect.shared if c.name not in model.values]
+        if lacking:
+            raise ModelError(
+                f"the model holds `{effect.name}`, and no value of its `{lacking[0]}`",
+                found=", ".join(model.values),
+                hint=f"add `{lacking[0]}` under `parameters` of its file, or identify again",
+            )
+    return held
 
 
 def base_at(model: Model, speed: float) -> Base:

@@ -20,6 +20,8 @@ from fieldsid.models.speed_law import SpeedLaw, with_speed
 from fieldsid.numerics.arrays import FloatArray
 
 KIND = "fieldsid/model"
+LARGEST = 1e9
+"""No parameter of a vehicle in SI is larger: what is beyond is damage, and its powers would overflow."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -134,12 +136,12 @@ def model_of(body: Mapping[str, Any], path: Path) -> Model:
     try:
         law = body["speed_law"]
         reference = law["reference_m_s"]
-        return Model(
+        model = Model(
             axis=Axis(body["axis"]),
             effects=tuple(str(e) for e in body["effects"]),
-            values={k: _finite(k, p["value"]) for k, p in body["parameters"].items()},
+            values={k: finite_number(p["value"], k) for k, p in body["parameters"].items()},
             units={k: str(p["unit"]) for k, p in body["parameters"].items()},
-            free=tuple(body["free"]),
+            free=tuple(str(n) for n in body["free"]),
             covariance=np.array(body["covariance"], dtype=np.float64).reshape(len(body["free"]), len(body["free"])),
             law=SpeedLaw(
                 float("nan") if reference is None else float(reference),
@@ -152,21 +154,46 @@ def model_of(body: Mapping[str, Any], path: Path) -> Model:
             noise=Noise(**{k: float(v) for k, v in body["noise"].items()}),
             trained={k: float("nan") if v is None else float(v) for k, v in body["trained"].items()},
             method=str(body["method"]),
-            runs=tuple(body["runs"]),
-            info=body["info"],
+            runs=tuple(str(r) for r in body["runs"]),
+            info=dict(body["info"]),
             own=read_definitions(body.get("own_effects", ()), path),
         )
-    except (KeyError, TypeError, ValueError) as error:
+        _check(model, body)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise ArtifactError(
             f"`{path}` is not a complete model file",
             found=f"{type(error).__name__}: {error}",
             hint="identify again, with `--force`",
         ) from error
+    return model
 
 
-def _finite(name: str, value: float | str) -> float:
-    """Return a parameter as the number it must be; raises ValueError for infinity and for what is no number."""
+def _check(model: Model, body: Mapping[str, Any]) -> None:
+    """Raise ValueError, TypeError or KeyError where a record's parts do not belong together, or a number is none of a vehicle."""
+    lacking = [n for n in (*NAMES[model.axis].base, *model.free) if n not in model.values]
+    if lacking:
+        raise ValueError(f"no value of `{lacking[0]}` under `parameters`")
+    law, stated = model.law, dict(model.info.get("law_parameters", {}))
+    speeds = {"reference_m_s": law.reference} if np.isfinite(law.reference) else {}
+    speeds |= {f"points: {s}": s for s, _ in law.points} | {"disturbance_time": model.noise.disturbance_time}
+    wrong = [f"{name} = {value}" for name, value in speeds.items() if not value > 0.0]
+    if wrong:
+        raise ValueError(f"{wrong[0]} is not above zero")
+    numbers = speeds | {"damping_exponent": law.damping_exponent, "authority_exponent": law.authority_exponent, "snap": law.snap}
+    numbers |= {f"points: {s}": b for s, b in law.points} | {f: getattr(model.noise, f) for f in Noise.__dataclass_fields__}
+    numbers |= {str(n): entry["std_error"] for n, entry in stated.items() if entry["std_error"] is not None}
+    for name, value in numbers.items():
+        finite_number(value, name)
+    # what could not be estimated is not a number in it, and written as nothing
+    if bool((np.abs(np.nan_to_num(model.covariance)) > LARGEST**2).any()):
+        raise ValueError("a covariance is no number of a vehicle")
+    for entry in body.get("inputs", []):
+        str(entry["path"])
+
+
+def finite_number(value: float | str, name: str) -> float:
+    """Return a value of a record as the number it must be; raises ValueError for what is none, or is none of a vehicle."""
     number = float(value)
-    if not np.isfinite(number):
-        raise ValueError(f"{name} = {number} is not a finite number")
+    if not abs(number) <= LARGEST:
+        raise ValueError(f"{name} = {number} is no number of a vehicle")
     return number

@@ -12,7 +12,7 @@ import numpy as np
 from fieldsid.artifacts import read_yaml
 from fieldsid.display import Brief
 from fieldsid.dynamics.free_run import effects_of
-from fieldsid.errors import UsageError
+from fieldsid.errors import DataError, UsageError
 from fieldsid.logs.run import Run
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
@@ -102,6 +102,19 @@ class ParameterSource(Brief):
         laws = self.laws.at(speed)
         own = {} if here is None else self._scaled(here, speed)
         return {**laws, **own, **{n: laws[n] for n in self.own_laws}}
+
+    def require(self, speeds: Sequence[float]) -> None:
+        """Raise DataError where damping or authority is not known at one of some speeds (m/s): there is no plant without them."""
+        names = NAMES[self.axis]
+        for speed in speeds:
+            known = self.base_at(speed)
+            lacking = [n for n in (names.damping, names.authority) if n not in known]
+            if lacking:
+                raise DataError(
+                    f"`{lacking[0]}` is not known at {speed:.3g} m/s",
+                    found=", ".join(f"{n} = {v:.4g}" for n, v in known.items()),
+                    hint=f"give `{lacking[0]}` at that speed, or at two others to draw a law through",
+                )
 
     def base_std_at(self, speed: float) -> dict[str, float]:
         """Return standard errors of the base parameters at a speed: the point's own, else the law's with the points' scatter."""

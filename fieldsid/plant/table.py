@@ -62,6 +62,12 @@ def _frame(path: Path) -> pd.DataFrame:
         raise DataError(
             f"`{path}` is not a table", found=str(error).strip(), hint=f"give a CSV file with a header line, {SPEED},a22,b2,C0"
         ) from error
+    if not isinstance(table.index, pd.RangeIndex):
+        raise DataError(
+            f"`{path}` has rows with more cells than its header names",
+            found=", ".join(map(str, table.columns)),
+            hint="give every column a name",
+        )
     if table.empty:
         raise DataError(f"`{path}` has no rows", found=", ".join(map(str, table.columns)), hint="add one line per speed")
     return table

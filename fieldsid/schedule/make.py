@@ -57,6 +57,7 @@ def design_schedule(
     if not 0.0 < fin_limit <= 1.5708:
         hint = in_radians("--fin-limit", fin_limit)
         raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
+    source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
     surge = fit_surge(runs) if runs and source.axis is Axis.YAW else None
 
@@ -138,7 +139,7 @@ def actuator_of(source: ParameterSource, limits: FinLimits) -> dict[str, float |
 
 def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None) -> dict[str, Any]:
     names = NAMES[source.axis]
-    sign = float(np.sign(source.points[0].values[names.authority]))
+    sign = float(np.sign(source.base_at(float(source.speeds[0]))[names.authority]))
     low, high = float(source.speeds[0]), float(source.speeds[-1])
     return {
         "tool": f"fieldsid {__version__}",

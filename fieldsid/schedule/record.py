@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import finite_number
 from fieldsid.schedule.controller import Gains
 
 KIND = "fieldsid/schedule"
@@ -142,6 +144,7 @@ def load_schedule(path: Path) -> Schedule:
     try:
         rows = tuple(_row(r) for r in body["rows"])
         first = rows[0]
+        _refuse_falling(rows)
         return Schedule(
             axis=Axis(body["axis"]),
             kind=str(body["controller"]),
@@ -149,11 +152,11 @@ def load_schedule(path: Path) -> Schedule:
             phase_margin_deg=float(body["phase_margin_wanted_deg"]),
             depth=bool(body["depth"]),
             rows=(first, *rows[1:]),
-            actuator=dict(body["actuator"]),
-            provenance={**body["provenance"], "inputs": body.get("inputs", [])},
-            stated=dict(body["stated"]),
+            actuator=_limits(body["actuator"]),
+            provenance=_provenance(body),
+            stated=_limits(body["stated"]),
         )
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise ArtifactError(
             f"`{path}` is not a complete schedule",
             found=f"{type(error).__name__}: {error}",
@@ -161,13 +164,39 @@ def load_schedule(path: Path) -> Schedule:
         ) from error
 
 
+def _refuse_falling(rows: Sequence[Row]) -> None:
+    if any(b.speed <= a.speed for a, b in pairwise(rows)):
+        raise ValueError(f"the speeds do not rise: {', '.join(f'{r.speed:g}' for r in rows)}")
+
+
 def _row(r: Mapping[str, Any]) -> Row:
-    def number(name: str) -> float:
+    def margin(name: str) -> float:
         return float("inf") if r[name] is None else float(r[name])
 
-    gains = Gains(number("kp"), number("ki"), number("kd"))
+    def number(name: str) -> float:
+        return finite_number(r[name], name)
+
+    speed, gains = number("speed_m_s"), Gains(number("kp"), number("ki"), number("kd"))
+    if speed <= 0.0:
+        raise ValueError(f"speed_m_s = {speed:g} is not above zero")
     return Row(
-        number("speed_m_s"), gains, number("feed_forward_rad"), number("reference_gain"), number("fin_limit_rad"),
-        number("depth_gain"), bool(r["supported"]), number("slowed"), number("phase_margin_deg"), number("gain_margin_db"),
-        number("delay_margin_s"), number("draws_held"), number("settling_s"),
+        speed, gains, number("feed_forward_rad"), number("reference_gain"), number("fin_limit_rad"),
+        number("depth_gain"), bool(r["supported"]), number("slowed"), number("phase_margin_deg"), margin("gain_margin_db"),
+        margin("delay_margin_s"), number("draws_held"), margin("settling_s"),
     )  # fmt: skip
+
+
+def _limits(body: Mapping[str, Any]) -> dict[str, float | None]:
+    return {str(name): None if value is None else finite_number(value, name) for name, value in body.items()}
+
+
+def _provenance(body: Mapping[str, Any]) -> dict[str, Any]:
+    """Return where a schedule came from, as an export writes it: files with their SHA-256, speeds and runs."""
+    said = dict(body["provenance"])
+    files = [{**m, "path": str(m["path"]), "sha256": str(m["sha256"])} for m in said.get("models", [])]
+    runs = [str(r) for r in said.get("runs", [])]
+    inputs = [{**i, "path": str(i["path"])} for i in body.get("inputs", [])]
+    if "supported_m_s" in said:
+        low, high = said["supported_m_s"]
+        said["supported_m_s"] = [finite_number(low, "supported_m_s"), finite_number(high, "supported_m_s")]
+    return {**said, "models": files, "runs": runs, "inputs": inputs}

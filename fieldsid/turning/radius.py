@@ -145,6 +145,7 @@ def _formula_rows(
 
 def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: float) -> None:
     """Refuse what the formula has no turn for, at the speed where it is worst."""
+    source.require(speeds)
     damping = {speed: source.base_at(speed)[NAMES[Axis.YAW].damping] for speed in speeds}
     loosest = min(damping, key=lambda speed: damping[speed])
     refuse_unstable(damping[loosest], f"at {loosest:.3g} m/s", damping_that_holds(source, loosest))

@@ -81,6 +81,8 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     return epoch or unit_of_step(step) or "s"
 
 
+LATEST_S = 1e20
+"""No clock is at more, not even one of nanoseconds since an epoch that is taken for seconds: such a cell is damage."""
 SLOW_S = 5.0
 """A step longer than this shows nothing of a vehicle's motion: time is in another unit."""
 
@@ -112,9 +114,10 @@ def _of_integers(values: npt.NDArray[np.int64], factor: float, name: str) -> tup
 
 def _of_floats(values: FloatArray, factor: float, name: str, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
     notes: list[Note] = []
-    missing = np.flatnonzero(~np.isfinite(values))
+    missing = np.flatnonzero(~(np.abs(values) * factor <= LATEST_S))
     if missing.size:
         notes.append(_no_times(missing, values, name, options))
+        values = np.where(np.isin(np.arange(values.size), missing), np.nan, values)
     values, coarse = rebuilt(values, name)
     seen = values[np.isfinite(values)]
     start = float(seen[0]) if seen.size else 0.0

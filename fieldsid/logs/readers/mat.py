@@ -15,6 +15,7 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._clock import clock_of
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
+from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
 from fieldsid.logs.unknown_file import COPY_AGAIN
 from fieldsid.numerics.arrays import FloatArray
@@ -54,6 +55,7 @@ def _columns(path: Path) -> Columns:
 
 def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
     scipy_io = import_module("scipy.io")
+    refuse_damaged(path)
     try:
         variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except _FAILURES as error:

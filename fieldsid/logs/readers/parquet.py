@@ -7,6 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.canonical_names import TIME
@@ -19,6 +21,7 @@ from fieldsid.logs.unknown_file import COPY_AGAIN
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"
+AGAIN = "import the log again, with `--force`"
 
 
 def sniff(path: Path) -> bool:
@@ -35,12 +38,13 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     columns = _columns(path, table)
     clock = clock_of(columns, options.clock)
     channels = []
-    for name in table.column_names:
-        column = table.column(name)
+    for i, name in enumerate(table.column_names):
+        column, cells = table.column(i), columns.take(i)
         count = len(column) - column.null_count
-        kind = "number" if _is_number(column) else "text"
-        rate = clock.rate_hz(column.to_numpy()) if clock else float("nan")
-        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(column[:3].to_pylist())),)))
+        kind = "text" if cells.dtype.kind == "O" else "number"
+        rate = clock.rate_hz(cells) if clock else float("nan")
+        first = cells[:3].astype(str) if cells.dtype.kind == "M" else cells[:3]
+        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist())),)))
     samples = samples_of(columns, clock.time, clock.source) if clock else None
     return Inventory(path, "Parquet table", clock.duration_s if clock else float("nan"), tuple(channels), samples=samples)
 
@@ -48,12 +52,9 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped columns, or one of our Runs as it was written."""
     table = _table(path)
-    ours = _ours(table)
-    if ours is not None and mapping.origin is None:
-        time = _cells(table, TIME)
-        series = {n: Series(time, _cells(table, n), n) for n in table.column_names if n in SIGNALS}
-        notes = tuple(Note(n["code"], n["message"], n["data"]) for n in ours["notes"])
-        return RawLog(stem_of(path), series, notes, finished=True)
+    notes = _notes_of_ours(path, table)
+    if notes is not None and mapping.origin is None:
+        return RawLog(stem_of(path), _series_of_ours(path, table), notes, finished=True)
     return series_of(path, _columns(path, table), mapping, (), options)
 
 
@@ -67,12 +68,14 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
 
 def _columns(path: Path, table: Any) -> Columns:
     names = tuple(table.column_names)
-    return Columns(path, names, len(names), lambda i: _cells(table, names[i]))
+    return Columns(path, names, len(names), lambda i: _cells(table.column(i)))
 
 
 def _table(path: Path) -> Any:
     try:
-        return import_module("pyarrow.parquet").read_table(path)
+        # read_table refuses a file in which two columns have one name
+        with import_module("pyarrow.parquet").ParquetFile(path) as file:
+            return file.read()
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error
 
@@ -85,20 +88,48 @@ def _unreadable(path: Path, error: Exception) -> LogError:
     )
 
 
-def _ours(table: Any) -> Any:
-    """Return what we wrote beside the columns, or None for somebody else's table."""
+def _notes_of_ours(path: Path, table: Any) -> tuple[Note, ...] | None:
+    """Return the notes we wrote beside the columns, None for somebody else's table; raises LogError where they are spoilt."""
     text = (table.schema.metadata or {}).get(METADATA_KEY)
-    body = json.loads(text) if text else None
-    return body if isinstance(body, dict) and str(body.get("schema", "")).startswith("fieldsid/run/") else None
+    if not text:
+        return None
+    try:
+        body = json.loads(text)
+        if not str(body["schema"]).startswith("fieldsid/run/"):
+            return None
+        return tuple(Note(str(n["code"]), str(n["message"]), dict(n["data"])) for n in body["notes"])
+    except (ValueError, TypeError, LookupError) as error:
+        raise LogError(
+            f"`{path}` is a run of ours whose notes are spoilt", found=f"{type(error).__name__}: {error}"[:160], hint=AGAIN
+        ) from error
 
 
-def _is_number(column: Any) -> bool:
-    kinds = import_module("pyarrow.types")
-    return bool(kinds.is_integer(column.type) or kinds.is_floating(column.type) or kinds.is_boolean(column.type))
+def _series_of_ours(path: Path, table: Any) -> dict[str, Series]:
+    """Return the signals of a run of ours on its time; raises LogError where a column is missing, twice there or no numbers."""
+    kept = [n for n in table.column_names if n in SIGNALS or n == TIME]
+    numbers = {n: _cells(table.column(i)) for i, n in enumerate(table.column_names) if n in kept}
+    wrong = [n for n in (TIME, *kept) if kept.count(n) != 1 or numbers[n].dtype.kind not in "fiub"]
+    if not wrong and not (numbers[TIME].size > 1 and bool(np.isfinite(numbers[TIME]).all())):
+        raise LogError(f"`{path}` is a run of ours without a time", found=f"{numbers[TIME].size} rows", hint=AGAIN)
+    if wrong:
+        found = f"`{wrong[0]}` is {'missing' if wrong[0] not in kept else 'twice there, or holds no numbers'}"
+        raise LogError(f"`{path}` is a run of ours whose columns are spoilt", found=found, hint=AGAIN)
+    return {n: Series(numbers[TIME], v, n) for n, v in numbers.items() if n != TIME}
 
 
-def _cells(table: Any, name: str) -> Any:
-    return table.column(name).to_numpy()
+def _cells(column: Any) -> Any:
+    """Return a column's cells (n,): numbers as they are, instants as datetime64, all else as text with None where it is empty."""
+    kinds, arrow = import_module("pyarrow.types"), import_module("pyarrow")
+    held = column.type
+    if kinds.is_integer(held) or kinds.is_floating(held):
+        return column.to_numpy()
+    if kinds.is_boolean(held) or kinds.is_decimal(held) or kinds.is_null(held):
+        return column.cast(arrow.float64()).to_numpy()
+    if kinds.is_timestamp(held) or kinds.is_date(held):
+        return column.cast(arrow.timestamp("ns"), safe=False).to_numpy()
+    if kinds.is_duration(held):
+        return column.cast(arrow.duration("ns"), safe=False).cast(arrow.int64()).to_numpy() / 1e9
+    return np.array([None if cell is None else str(cell) for cell in column.to_pylist()], dtype=object)
 
 
 READER = Reader(

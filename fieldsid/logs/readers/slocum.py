@@ -18,6 +18,8 @@ from fieldsid.logs.unknown_file import COPY_AGAIN, is_glider_log
 
 END = b"X"
 HEAD = 2048
+SIZES = {1, 2, 4, 8}
+"""Bytes of a sensor's number."""
 MEANS: Means = {
     f"m_heading.{DATA}": ("yaw_rad", {"unit": "rad"}),
     f"m_pitch.{DATA}": ("pitch_rad", {"unit": "rad"}),
@@ -49,9 +51,9 @@ def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
         # The list of sensors of a log that brings its own is written to the cache: not beside the log.
         with TemporaryDirectory() as own:
             log = dbdreader.DBD(str(path), cacheDir=str(folder or own))
-            names = [n for n in log.parameterNames if wanted is None or n in wanted]
-            found = {n: _sensor(log, n) for n in names}
-            log.close()
+            log.close()  # it opens the file again to read it
+            _refuse_other_lengths(path, log)
+            found = _sensors(log, [n for n in log.parameterNames if wanted is None or n in wanted])
     except (*_FAILURES, dbdreader.DbdError) as error:
         what = f"`{path}` is a Slocum glider's log that cannot be read"
         raise LogError(what, found=f"{type(error).__name__}: {error}"[:160], hint=COPY_AGAIN) from error
@@ -70,9 +72,24 @@ def _refuse_cut_head(path: Path) -> None:
         raise LogError(f"`{path}` is a Slocum glider's log that cannot be read", found=found, hint=COPY_AGAIN)
 
 
-def _sensor(log: Any, name: str) -> Topic | None:
-    time, values = log.get(name)
-    return topic_of(np.asarray(time, dtype=np.float64), {DATA: np.asarray(values, dtype=np.float64)}, log.parameterUnits[name])
+def _refuse_other_lengths(path: Path, log: Any) -> None:
+    """Raise LogError where the counts of a head are not those of its list: dbdreader's compiled part takes them as they stand."""
+    count, sizes, names = log.headerInfo["sensors_per_cycle"], log.byteSizes, log.parameterNames
+    fits = len(sizes) == count > 0 and log.n_state_bytes == -(-count // 4) and len(set(names)) == count
+    if not fits or not set(sizes) <= SIZES:
+        found = (
+            f"{len(sizes)} sensors of {sorted(set(sizes))} bytes where {count} with {log.n_state_bytes} bytes of state are stated"
+        )
+        raise LogError(f"`{path}` is a Slocum glider's log whose list of sensors is damaged", found=found, hint=COPY_AGAIN)
+
+
+def _sensors(log: Any, names: list[str]) -> dict[str, Topic | None]:
+    """Return sensors by name, all of them by one way through the file: a glider has two thousand."""
+    read = log.get(*names) if len(names) > 1 else [log.get(*names)] if names else []
+    return {
+        name: topic_of(np.asarray(time, dtype=np.float64), {DATA: np.asarray(values, dtype=np.float64)}, log.parameterUnits[name])
+        for name, (time, values) in zip(names, read, strict=True)
+    }
 
 
 def _cut(path: Path) -> tuple[Note, ...]:

@@ -49,6 +49,8 @@ def _topics(path: Path) -> dict[str, Topic]:
         raise LogError(f"`{path}` is a damaged ULog file", found=found, hint=COPY_AGAIN) from error
     topics = {}
     for part in log.data_list:
+        if "timestamp" not in part.data:  # the format asks for it: a definition that was damaged
+            continue
         fields = {n: np.asarray(v, dtype=np.float64) for n, v in part.data.items() if n != "timestamp"}
         stamps = np.asarray(part.data["timestamp"], dtype=np.float64) / 1e6
         topic = topic_of(stamps, fields)

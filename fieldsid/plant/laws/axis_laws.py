@@ -16,7 +16,7 @@ from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import KIND as MODEL_KIND
-from fieldsid.models.model import Model, model_of
+from fieldsid.models.model import Model, finite_number, model_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law, without_candidates
 from fieldsid.plant.laws.regression import Regression, regression_of
@@ -150,7 +150,7 @@ def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
     body = load_record(path, KIND)
     try:
         return tuple((str(m["name"]), model_of(m["record"], path)) for m in body["models"])
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, AttributeError) as error:
         raise ArtifactError(
             f"`{path}` does not carry the models it was made from: their effects would be lost",
             found=f"{type(error).__name__}: {error}",
@@ -165,9 +165,9 @@ def load_laws(path: Path) -> Laws:
         points = tuple(
             Point(
                 str(p["name"]),
-                float(p["speed_m_s"]),
-                MappingProxyType({k: float(v) for k, v in p["values"].items()}),
-                MappingProxyType({k: float(v) for k, v in p["std_errors"].items()}),
+                finite_number(p["speed_m_s"], "speed_m_s"),
+                MappingProxyType({k: finite_number(v, k) for k, v in p["values"].items()}),
+                MappingProxyType({k: finite_number(v, k) for k, v in p["std_errors"].items()}),
             )
             for p in body["points"]
         )

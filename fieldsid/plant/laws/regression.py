@@ -85,7 +85,7 @@ def regression_of(record: Mapping[str, Any]) -> Regression:
             r2=_number(record["r2"]),
             rms=_number(record["rms"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ArtifactError(
             "a law in the file is not complete",
             found=f"{type(error).__name__}: {error}",
