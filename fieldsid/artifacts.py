@@ -7,9 +7,10 @@ import hashlib
 import io
 import math
 import os
+import secrets
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -23,6 +24,9 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError
+
+OWN_HANDLES = Path("/proc/self/fd")
+"""Where Linux shows a process the files that it has open, by their number: the way to one that has no name."""
 
 
 def sha256_of(path: Path) -> str:
@@ -53,30 +57,72 @@ def check_output(path: Path, *, force: bool = False) -> None:
 
 @contextmanager
 def replacing(path: Path, *, force: bool = False) -> Iterator[Path]:
-    """Yield a temporary path beside `path` and move it into place when the block ends without an error.
+    """Yield a temporary path to write to, which becomes `path` when the block ends without an error.
 
     Raises ArtifactError when `path` exists and `force` is false, or when it cannot be written; then nothing
-    is left behind and an existing file is as it was.
+    is left behind and an existing file is as it was. Where the system has files without a name, nothing is left behind
+    either by a process that is killed.
     """
     check_output(path, force=force)
-    temporary: Path | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        yield temporary
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
+        with ExitStack() as stack:
+            handle = _nameless(path.parent)
+            temporary = stack.enter_context(_named(path) if handle is None else _at_handle(handle))
+            yield temporary
+            temporary.chmod(0o666 & ~_umask())
+            if handle is not None:
+                temporary = stack.enter_context(_given_a_name(handle, path))
+            temporary.replace(path)
     except OSError as error:
         raise ArtifactError(
             f"`{path}` cannot be written: {error.strerror or error}",
             found=f"folder `{path.parent}`",
             hint="name a place that can be written",
         ) from error
+
+
+def _nameless(folder: Path) -> int | None:
+    """Return an open file of a folder that has no name there; None where the system or the folder's disk has no such files."""
+    if not hasattr(os, "O_TMPFILE") or not OWN_HANDLES.is_dir():
+        return None
+    try:
+        return os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o600)
+    except OSError:  # what is wrong with the folder is met again, and said, where a named file is made in it
+        return None
+
+
+@contextmanager
+def _at_handle(handle: int) -> Iterator[Path]:
+    try:
+        yield OWN_HANDLES / str(handle)
     finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
+        os.close(handle)
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[Path]:
+    """Yield a hidden file beside a path, gone at the end unless it was moved."""
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    try:
+        yield Path(name)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+@contextmanager
+def _given_a_name(handle: int, path: Path) -> Iterator[Path]:
+    """Yield a hidden name beside a path for a file that has none: a link does not replace what is there, a name can."""
+    name = path.parent / f".{path.name}.{secrets.token_hex(6)}{path.suffix}"
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        # by the folder's handle: only then Python asks the system to follow the link that the handle's path is
+        os.link(OWN_HANDLES / str(handle), name.name, dst_dir_fd=folder, follow_symlinks=True)
+        yield name
+    finally:
+        os.close(folder)
+        name.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str, *, force: bool = False) -> Path:
