@@ -38,6 +38,8 @@ def share_of_fin(record: Record) -> float:
     by_rate = bool(record.rate_ok.any())
     values, ok = (record.rate, record.rate_ok) if by_rate else (record.angle, record.angle_ok)
     motion = blocks_of(np.interp(record.time, record.time[ok], values[ok]), record)
+    if motion.size < 2:
+        return 1.0
     motion = motion if by_rate else np.diff(motion, prepend=motion[0])
     lags, slow = fin_history(record)
     columns = np.column_stack([*lags, *slow, np.ones(motion.size)])

@@ -109,6 +109,12 @@ class ParameterSource(Brief):
         for speed in speeds:
             known = self.base_at(speed)
             lacking = [n for n in (names.damping, names.authority) if n not in known]
+            if not lacking and known[names.authority] == 0.0:
+                raise DataError(
+                    f"`{names.authority}` is zero at {speed:.3g} m/s",
+                    found="a fin that turns nothing",
+                    hint="mend it, or leave it out",
+                )
             if lacking:
                 raise DataError(
                     f"`{lacking[0]}` is not known at {speed:.3g} m/s",

@@ -27,6 +27,7 @@ import numpy as np
 import typer
 from fuzz.kinds import KINDS, Kind
 
+from fieldsid.cli.failure import CLOSED
 from fieldsid.errors import FieldsidError
 
 LONGEST_S = 20
@@ -90,6 +91,8 @@ def _attempt(kind: Kind, made: Path, seed: int, folder: Path, keep: Path | None)
             signal.alarm(0)
         except Exception as error:  # noqa: BLE001 - any other error is what is looked for
             signal.alarm(0)
+            if isinstance(error, OSError) and error.errno in CLOSED:  # told as what it is, see cli/failure.py
+                continue
             if keep is not None:
                 target = keep / f"{kind.name}-{seed}"
                 shutil.rmtree(target, ignore_errors=True)

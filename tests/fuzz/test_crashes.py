@@ -10,16 +10,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from binary_logs import write_mat, write_ulog
-from fuzz.kinds import SIGNALS, TIME, as_radius_table, as_run, good_files
+from fuzz.kinds import SIGNALS, TIME, as_radius_table, as_run, bag, good_files
 
 from fieldsid.artifacts import read_yaml, to_yaml
 from fieldsid.cli.app import run as command
 from fieldsid.dynamics.free_run import effects_of
-from fieldsid.errors import ArtifactError, DataError, FieldsidError, LogError, ModelError
+from fieldsid.errors import ArtifactError, DataError, FieldsidError, LogError, MappingError, ModelError
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log
+from fieldsid.logs.mapping.mapping_file import load_mapping
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.models.model import load_model
+from fieldsid.planning.belief.prior_file import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
 from fieldsid.schedule.record import load_schedule
 
@@ -250,3 +252,37 @@ def test_matlab_arrays_of_every_class_pass(tmp_path):
     for packed in (False, True):
         scipy.io.savemat(tmp_path / "log.mat", held, do_compression=packed)
         refuse_damaged(tmp_path / "log.mat")
+
+
+def test_a_position_of_one_column_is_refused(tmp_path):
+    path = tmp_path / "mapping.yaml"
+    path.write_text("signals: {position: 1, yaw_rad: yaw_rad}\n")
+    with pytest.raises(MappingError, match="needs two columns"):
+        load_mapping(path)
+
+
+def test_a_prior_of_impossible_numbers_is_refused(tmp_path):
+    with pytest.raises(ArtifactError, match="must be a number up to"):
+        load_prior(changed(tmp_path, "prior.yaml", "parameters", "b2", "std_error", to=1e300))
+
+
+def test_a_law_with_more_powers_than_coefficients_is_refused(tmp_path):
+    kind = read_yaml(good_files() / "law.yaml")["laws"]["b2"]["chosen"]
+    with pytest.raises(ArtifactError):
+        load_laws(changed(tmp_path, "law.yaml", "laws", "b2", "candidates", kind, "powers", to=[0.0, 1.0, 2.0, 3.0]))
+
+
+def test_standard_errors_without_bounds_draw_no_law(tmp_path):
+    path = as_radius_table(tmp_path)
+    path.write_text(path.read_text().replace(",0.02\n", ",1e308\n").replace("1.4,", "1e-320,").replace("1.8,", "1e308,"))
+    with pytest.raises(FieldsidError):
+        command(["fit", str(path)])
+
+
+def test_a_count_without_end_is_no_description_of_a_bag(tmp_path):
+    path = bag("db3")(tmp_path)
+    file = path / "metadata.yaml"
+    text = file.read_text()
+    at = text.index("message_count: ", text.index("topics_with_message_count"))
+    file.write_text(text[:at] + "message_count: .inf\n" + text[text.index("\n", at) + 1 :])
+    assert any("no description of a bag" in n.message for n in inspect_log(path).notes)

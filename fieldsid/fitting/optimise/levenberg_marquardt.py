@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.errors import EffectError
+from fieldsid.errors import DivergenceError, EffectError
 from fieldsid.fitting.optimise.chunked import chunked_normal_equations, is_chunked
 from fieldsid.fitting.optimise.linear_white import LinearWhite, linear_white
 from fieldsid.fitting.problem.problem import Problem, RunResult
@@ -241,6 +241,11 @@ def sandwich(normal: FloatArray, centre: FloatArray) -> FloatArray:
 def _directions(normal: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return a normal matrix's scale (F,), its eigenvalues and eigenvectors in that, and the least information there can be."""
     # not smaller: the inverse of a direction without information must stay a number
+    if not bool(np.isfinite(normal).all()):
+        raise DivergenceError(
+            "the fit came to sensitivities that are no numbers", found="the model grows beyond all bounds on this run",
+            hint="check the units of the run's signals: `sysid inspect LOG`",
+        )  # fmt: skip
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-60))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     return scale, values, vectors, 1e-13 * max(float(values[-1]), 1e-300)

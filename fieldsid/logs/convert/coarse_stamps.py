@@ -22,6 +22,8 @@ WITHIN = 1.0 + 1e-6
 """Last digits by which a stamp may be off: half of one where it was rounded, up to one where it was cut."""
 ROUGH = 0.25
 """Share of a step from which on the last digit of its stamps makes steps uneven that are not."""
+SAME = 1e-3
+"""Share of a step within which stamps are at even steps already: 0.2, 0.4, 0.6 has all the digits that it needs."""
 GAP_STEPS = 5.0
 MOST = 99.0
 """Percentile of the steps up to which they tell the usual one: what is longer may be a gap."""
@@ -47,6 +49,8 @@ def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
             continue
         even = _even(stamps, last)
         if even is not None:
+            if not shared and float(np.max(np.abs(even - stamps))) < SAME * float(np.median(steps)):
+                return time, []
             whole = time.copy()
             whole[seen] = even
             return whole, [_note(name, stamps)]

@@ -8,6 +8,8 @@ import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.time_column import SLOW_S
+from fieldsid.logs.doctor.course_findings import course_findings
+from fieldsid.logs.doctor.fin_findings import fin_findings
 from fieldsid.logs.doctor.pair_findings import pair_findings
 from fieldsid.logs.doctor.signal_findings import signal_findings
 from fieldsid.logs.doctor.stated import Stated
@@ -35,7 +37,7 @@ def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: St
         findings = [*_sampling(run, stated), *_fins(run, fin_max_rad or {})]
         for name in run.signals:
             findings += signal_findings(run, name, stated)
-        return (*findings, *pair_findings(run, stated))
+        return (*findings, *pair_findings(run, stated), *course_findings(run), *fin_findings(run))
 
 
 def _sampling(run: Run, stated: Stated) -> list[Note]:

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from fieldsid.logs.doctor.spikes import DIGITS, last_digit
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
@@ -17,7 +18,8 @@ from fieldsid.numerics.shifted_correlation import shifted_correlations
 from fieldsid.numerics.trapezoid import trapezoid_integral
 from fieldsid.numerics.white_noise import robust_white_noise_std
 
-PAIR_WINDOW_S = 1.0
+PAIR_WINDOW_S, LONG_WINDOW_S = 1.0, 4.0
+"""Time over which an angle's change is set against its rate's, and that for a motion which shows above its noise only then."""
 TRUSTED = 0.8
 """Correlation from which a slope is taken as real."""
 STRONG, WEAK = 0.9, 0.5
@@ -25,6 +27,8 @@ STRONG, WEAK = 0.9, 0.5
 MIN_NOISE_RATIO = 4.0
 """How many times its noise a change must be to be judged."""
 SLOPE_LIMIT = 0.15
+JUMP_SPREADS, FASTER, FEWEST_JUMPS = 8.0, 1.5, 4
+"""Standard deviations, and times the turn of a fast tenth of the log, by which an angle and its rate may differ in one step."""
 DEGREES = 180.0 / math.pi
 LAG_S = 1.0
 """Longest clock offset looked for."""
@@ -39,6 +43,7 @@ def pair_findings(run: Run, stated: Stated) -> list[Note]:
     for angle, rate in _PAIRS:
         if run.has(angle) and run.has(rate):
             found += _angle_and_rate(run, angle, rate, stated)
+            found += _jumps(run, angle, rate)
     found += _swapped(run)
     if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
         found += _speed_and_way(run)
@@ -59,6 +64,27 @@ def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Not
     return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
 
 
+def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
+    """Steps of an angle that its rate does not make, or rates that the angle does not follow, beyond the noise of both."""
+    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
+    if both.sum() < 50:
+        return []
+    time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
+    off = np.abs(np.diff(turned) - np.diff(swept))
+    usual = float(np.median(off)) / 0.6745
+    fastest = float(np.percentile(np.abs(run[rate][both]), 90)) * np.diff(time)
+    odd = off > np.maximum(max(JUMP_SPREADS * usual, DIGITS * last_digit(turned)), FASTER * fastest)
+    count = int(odd.sum())
+    if count < FEWEST_JUMPS or usual == 0.0:
+        return []
+    at = int(np.argmax(off))
+    message = (
+        f"{angle} and {rate} disagree in {count} of {odd.size} steps, by up to {off[at]:.3g} rad at {time[at]:.2f} s (limit "
+        f"{JUMP_SPREADS * usual:.3g} rad, {JUMP_SPREADS:g} standard deviations): one of them jumps where the other does not"
+    )
+    return [Note("disagree", message, {"signal": angle, "value": float(off[at]), "limit": JUMP_SPREADS * usual, "count": count})]
+
+
 def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
     """Return the changes of an angle and of an integrated rate over the window (n,), and the step.
 
@@ -69,13 +95,16 @@ def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, f
         return None
     time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
     step = float(np.median(np.diff(time)))
-    width = max(1, round(PAIR_WINDOW_S / step))
-    if time.size <= 3 * width:
-        return None
-    a, b = turned[width:] - turned[:-width], swept[width:] - swept[:-width]
     floor = MIN_NOISE_RATIO * math.sqrt(2.0) * robust_white_noise_std(np.diff(turned, 2), 2)
-    drift = MIN_NOISE_RATIO * robust_white_noise_std(np.diff(run[rate][both], 2), 2) * math.sqrt(PAIR_WINDOW_S * step)
-    return (a, b, step) if float(np.std(a)) > floor and float(np.std(b)) > drift else None
+    noise = robust_white_noise_std(np.diff(run[rate][both], 2), 2)
+    for window_s in (PAIR_WINDOW_S, LONG_WINDOW_S):
+        width = max(1, round(window_s / step))
+        if time.size <= 3 * width:
+            return None
+        a, b = turned[width:] - turned[:-width], swept[width:] - swept[:-width]
+        if float(np.std(a)) > floor and float(np.std(b)) > MIN_NOISE_RATIO * noise * math.sqrt(window_s * step):
+            return a, b, step
+    return None
 
 
 def _swapped(run: Run) -> list[Note]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.doctor.dropouts import dropout_findings
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import SIGNALS, Note, Run
@@ -41,6 +42,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
     found += _size(name, present, stated)
     if name in MEASURED and present.size > 20:
         found += [*_frozen(name, run.time[seen], present), *_coarse(name, present), *_spikes(name, run.time[seen], present)]
+        found += dropout_findings(name, present)
     return found
 
 
@@ -97,6 +99,13 @@ def _coarse(name: str, values: FloatArray) -> list[Note]:
     share = float(np.mean(steps == 0.0))
     moved = steps[steps > 0.0]
     levels = float(np.ptp(values)) / float(moved.min()) if moved.size else 0.0
+    every = _held_for(steps)
+    if every > 1:
+        message = (
+            f"{name} changes at every {every}th sample only ({moved.size} times): it was taken at a lower rate and repeated; log "
+            "it at its own rate, or leave the repeated cells empty"
+        )
+        return [Note("coarse", message, {"signal": name, "value": share, "limit": COARSE_LIMIT, "step": float(moved.min())})]
     if share <= COARSE_LIMIT or levels > 1000:
         return []
     message = (
@@ -104,6 +113,19 @@ def _coarse(name: str, values: FloatArray) -> list[Note]:
         f"one (limit {100 * COARSE_LIMIT:.0f} %); log it with more digits or at its own rate"
     )
     return [Note("coarse", message, {"signal": name, "value": share, "limit": COARSE_LIMIT, "step": float(moved.min())})]
+
+
+def _held_for(steps: FloatArray) -> int:
+    """Return for how many samples each value of a signal with such steps (n,) is held, where it is for always as many; else 1.
+
+    That n changes fall on every m-th sample by chance has the probability m^(1-n): ten are no chance.
+    """
+    places = np.flatnonzero(steps > 0.0)
+    if places.size < 10:
+        return 1
+    apart = np.diff(places)
+    every = int(np.gcd.reduce(apart))
+    return every if every == int(np.median(apart)) else 1
 
 
 def _spikes(name: str, time: FloatArray, values: FloatArray) -> list[Note]:

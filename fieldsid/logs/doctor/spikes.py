@@ -46,7 +46,7 @@ def spikes_of(values: FloatArray) -> Spikes:
     usual = float(np.median(np.abs(bend))) or float(np.mean(np.abs(bend)))
     if usual == 0.0:
         return none
-    limit = max(SPREADS * OF_MEDIAN * 0.5 * usual, DIGITS * _last_digit(values))
+    limit = max(SPREADS * OF_MEDIAN * 0.5 * usual, DIGITS * last_digit(values))
     before, middle, after = bend[:-2], -0.5 * bend[1:-1], bend[2:]
     sign = np.sign(middle)
     alone = np.minimum(np.minimum(before * sign, after * sign), np.abs(middle)) > limit
@@ -56,7 +56,7 @@ def spikes_of(values: FloatArray) -> Spikes:
     return Spikes(places + 2, np.abs(middle[places]), limit)
 
 
-def _last_digit(values: FloatArray) -> float:
+def last_digit(values: FloatArray) -> float:
     """Return the least difference of two values that differ: the last digit of a log that has few."""
     ordered, ends = np.sort(values), int(BULK * values.size)
     apart = np.diff(ordered)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -15,7 +14,7 @@ from fieldsid.effects import pick_effect
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.model import Model, Noise, load_model
+from fieldsid.models.model import LARGEST, Model, Noise, load_model
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 from fieldsid.registry import near
 
@@ -92,6 +91,8 @@ def _noise(body: Mapping[str, Any]) -> Noise:
 
 
 def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ArtifactError(f"`{name}` must be a finite number", found=repr(value), hint=f"write a number after `{name}:`")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
+        raise ArtifactError(
+            f"`{name}` must be a number up to {LARGEST:g}", found=repr(value)[:80], hint=f"write a number after `{name}:`"
+        )
     return float(value)

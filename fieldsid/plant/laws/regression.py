@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.display import Brief
-from fieldsid.errors import ArtifactError
+from fieldsid.errors import ArtifactError, DataError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile
 
@@ -78,7 +78,7 @@ def regression_of(record: Mapping[str, Any]) -> Regression:
         covariance = [[np.nan if v is None else v for v in row] for row in record["covariance"]]
         return Regression(
             kind=str(record["kind"]),
-            powers=tuple(float(p) for p in record["powers"]),
+            powers=_powers_of(record["powers"], count),
             coefficients=np.array(record["coefficients"], dtype=np.float64),
             covariance=np.array(covariance, dtype=np.float64).reshape(count, count),
             dof=int(record["dof"]),
@@ -93,6 +93,14 @@ def regression_of(record: Mapping[str, Any]) -> Regression:
         ) from error
 
 
+def _powers_of(said: Sequence[float], count: int) -> tuple[float, ...]:
+    """Return the powers of a record: one for each coefficient, or none for the power law, which has two coefficients."""
+    powers = tuple(float(p) for p in said)
+    if len(powers) != (count if powers else 0) or (not powers and count != 2):
+        raise ValueError(f"{len(powers)} powers for {count} coefficients")
+    return powers
+
+
 def fit_powers(
     kind: str, powers: tuple[float, ...], speed: FloatArray, value: FloatArray, std_error: FloatArray | None
 ) -> Regression:
@@ -100,7 +108,8 @@ def fit_powers(
 
     With weights the covariance is widened by the scatter when that exceeds the errors given (Birge ratio), never narrowed.
     """
-    x = np.stack([speed**p for p in powers], axis=1)
+    with np.errstate(over="ignore"):  # what overflows is refused below
+        x = np.stack([speed**p for p in powers], axis=1)
     coefficients, covariance, dof = _least_squares(x, value, std_error, rounding_of(value))
     error = value - x @ coefficients
     return Regression(kind, powers, coefficients, covariance, dof, _r2(value, error), _rms(error))
@@ -130,6 +139,11 @@ def _least_squares(
 ) -> tuple[FloatArray, FloatArray, int]:
     weight = np.ones_like(y) if std_error is None else 1.0 / std_error
     q, r = np.linalg.qr(x * weight[:, None])
+    if not bool(np.all(np.abs(np.diag(r)) > 0.0) and np.all(np.isfinite(r))):
+        raise DataError(
+            "no law can be drawn through these points", found="speeds or standard errors that are zero or beyond all bounds",
+            hint="check the column of speeds and those of standard errors",
+        )  # fmt: skip
     coefficients = np.linalg.solve(r, q.T @ (y * weight))
     inverse = np.linalg.inv(r)
     dof = y.size - x.shape[1]

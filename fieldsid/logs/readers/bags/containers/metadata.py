@@ -52,7 +52,7 @@ def _metadata_of(file: Path, only: str | None) -> Metadata | None:
         topics: list[Any] = [(t["topic_metadata"], t["message_count"]) for t in about["topics_with_message_count"]]
         counts = {str(t["name"]): int(count) for t, count in topics}
         serializations = {str(t["name"]): str(t["serialization_format"]) for t, _ in topics}
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise FieldsidError("it is no description of a bag", found=f"{type(error).__name__}: {error}") from error
     return Metadata(counts, serializations) if only is None or names in ([only], [f"{only}.zstd"]) else None
 

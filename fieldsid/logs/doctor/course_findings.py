@@ -1,0 +1,109 @@
+"""Findings on the way made good: its course is the heading, and its slope the pitch, but for a current and a drift.
+
+With x north and y east the course atan2(dy, dx) goes with the heading; with x east and y north it goes against it, to pi/2. A
+vehicle dives by its pitch: d(depth)/dt = -u sin(pitch) + w cos(pitch) (Fossen 2011, eq. 2.30, without roll).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fieldsid.logs.run import Note, Run
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.trapezoid import trapezoid_integral
+
+WINDOW_S = 3.0
+AGREES = 0.9
+"""Length of the mean unit vector of the angle between two directions from which on they agree."""
+TURNED = 0.2
+"""How much better the one must agree than the other: the heading must have turned for that."""
+TRUSTED = 0.8
+"""Correlation from which on a sign is believed."""
+ALL_BUT = 0.95
+"""Share of the windows in which the vehicle must have moved for its course to be followed round."""
+RATIO = 2.0
+"""How much further than the heading the course may turn: a hull that slides in a turn turns as far as its course in the end."""
+LEAST_WAY_M, LEAST_DIVE_M = 0.3, 0.1
+"""Way and depth made in a window below which they are the sensors' noise."""
+
+
+def course_findings(run: Run) -> list[Note]:
+    """Return the findings on the course and the slope of the way of a run."""
+    found = _course(run) if all(run.has(s) for s in ("x_m", "y_m", "yaw_rad")) else []
+    return [*found, *(_dive(run) if all(run.has(s) for s in ("depth_m", "pitch_rad", "surge_m_s")) else [])]
+
+
+def _windows(run: Run, *signals: str) -> tuple[FloatArray, int, list[FloatArray]] | None:
+    """Return the times (n,) at which all signals are there, the samples of a window, and the signals; None where too few."""
+    good = np.all([np.isfinite(run[s]) for s in signals], axis=0)
+    if good.sum() < 50:
+        return None
+    time = run.time[good]
+    width = max(1, round(WINDOW_S / float(np.median(np.diff(time)))))
+    return (time, width, [run[s][good] for s in signals]) if time.size > 4 * width else None
+
+
+def _course(run: Run) -> list[Note]:
+    found = _windows(run, "x_m", "y_m", "yaw_rad")
+    if found is None:
+        return []
+    time, width, (x, y, yaw) = found
+    dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
+    moved = np.hypot(dx, dy) > LEAST_WAY_M
+    if moved.sum() < 20:
+        return []
+    heading = trapezoid_integral(time, yaw)
+    course, mean = np.arctan2(dy, dx)[moved], ((heading[width:] - heading[:-width]) / (time[width:] - time[:-width]))[moved]
+    along, against = (complex(np.mean(np.exp(1j * (course - sign * mean)))) for sign in (1.0, -1.0))
+    if abs(against) > AGREES and abs(against) - abs(along) > TURNED:
+        message = (
+            f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "
+            f"along it, limit {TURNED:g} between them): x is east and y north where the heading counts from north; "
+            "set `frame: ENU` at both, or turn yaw's sign"
+        )
+        return [Note("course_against", message, {"signal": "yaw_rad", "value": abs(against) - abs(along), "limit": TURNED})]
+    slope = _slope_of(np.unwrap(course), mean) if moved.mean() > ALL_BUT else None
+    if slope is not None and not 1.0 / RATIO < slope < RATIO:
+        message = (
+            f"the course made from x_m and y_m turns {slope:.3g} times as far as yaw_rad (limits {1 / RATIO:g} and {RATIO:g}): "
+            "a degree is 0.01745 rad; check the unit of the heading"
+        )
+        return [Note("course_slope", message, {"signal": "yaw_rad", "value": slope, "limit": RATIO})]
+    off = math.remainder(float(np.angle(along)), math.tau)
+    if abs(along) > AGREES and abs(off) > math.pi / 4:
+        message = (
+            f"the course made from x_m and y_m is {math.degrees(off):.0f} deg from yaw_rad (limit 45 deg): the heading counts "
+            "from another direction than north, or x is not north; set `frame`"
+        )
+        return [Note("course_offset", message, {"signal": "yaw_rad", "value": abs(off), "limit": math.pi / 4})]
+    return []
+
+
+def _slope_of(course: FloatArray, heading: FloatArray) -> float | None:
+    """Return how far a course (n,) turns for a turn of the heading, None where the two do not go together."""
+    c, h = course - course.mean(), heading - heading.mean()
+    power = math.sqrt(float(c @ c) * float(h @ h))
+    if power == 0.0 or float(c @ h) / power < AGREES or float(np.std(c)) < TURNED:
+        return None
+    return math.sqrt(float(c @ c) / float(h @ h))
+
+
+def _dive(run: Run) -> list[Note]:
+    found = _windows(run, "depth_m", "pitch_rad", "surge_m_s")
+    if found is None:
+        return []
+    time, width, (depth, pitch, surge) = found
+    said = trapezoid_integral(time, -surge * np.sin(pitch))
+    made, wanted = depth[width:] - depth[:-width], said[width:] - said[:-width]
+    if float(np.std(made)) < LEAST_DIVE_M or float(np.std(wanted)) < LEAST_DIVE_M:
+        return []
+    trust = float(np.corrcoef(made, wanted)[0, 1])
+    if trust > -TRUSTED:
+        return []
+    message = (
+        f"depth_m goes against what surge_m_s and pitch_rad make of it (correlation {trust:.2f}, limit {-TRUSTED:g}): "
+        "nose up is positive, and depth downwards; set `sign: -1` at one of them"
+    )
+    return [Note("dive_sign", message, {"signal": "depth_m", "value": trust, "limit": -TRUSTED})]

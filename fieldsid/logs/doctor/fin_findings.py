@@ -1,0 +1,96 @@
+"""Findings on fins and what follows them: a range no fin has, and a motion that comes before the fin that makes it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fieldsid.logs.run import Note, Run
+from fieldsid.numerics.arrays import FloatArray
+
+WIDEST = 0.8
+"""Deflection in rad, 46 deg, that no fin of a vehicle has: the flow leaves it at half of that."""
+LARGE = 0.25
+"""Share of a fin's range from which on a change is a step."""
+ALONE_S = 1.5
+"""How long before a step the fin must have been still, for what moves then to be the step's."""
+BEFORE_S, AFTER_S = 0.5, 1.0
+EARLY = 0.15
+"""Share of the answer to a step that may come before it, by what is left of the motion before."""
+SPREADS = 4.0
+FEWEST = 5
+ROLLED = math.acos(0.9)
+"""Roll in rad from which on the rate about the body's axis is a tenth off that of the heading: r = psi' cos(phi)."""
+_AXES = (("rudder_rad", "yaw_rate_rad_s"), ("elevator_rad", "pitch_rate_rad_s"))
+
+
+def fin_findings(run: Run) -> list[Note]:
+    """Return the findings on the fins of a run, and on the roll under which they were used."""
+    found = []
+    for fin, rate in _AXES:
+        if run.has(fin):
+            found += [*_range(run, fin), *(_early(run, fin, rate) if run.has(rate) else [])]
+    return [*found, *(_roll(run) if run.has("roll_rad") else [])]
+
+
+def _range(run: Run, fin: str) -> list[Note]:
+    largest = float(np.nanpercentile(np.abs(run[fin]), 99))
+    if not WIDEST < largest <= 1.6:
+        return []
+    message = (
+        f"{fin} reaches {largest:.3g} rad, {math.degrees(largest):.0f} deg (limit {WIDEST:g} rad): no fin does; where -1 .. 1 is "
+        "its whole range, set `unit: counts` with `centre: 0` and its largest angle in rad as `scale`"
+    )
+    return [Note("fin_range", message, {"signal": fin, "value": largest, "limit": WIDEST})]
+
+
+def _early(run: Run, fin: str, rate: str) -> list[Note]:
+    """The mean answer of the rate about steps of the fin: what comes before the step cannot be its answer."""
+    seen = np.isfinite(run[fin]) & np.isfinite(run[rate])
+    if seen.sum() < 50:
+        return []
+    time, moves, answer = run.time[seen], run[fin][seen], run[rate][seen]
+    at, size = _steps(time, moves)
+    inside = (at > time[0] + BEFORE_S) & (at < time[-1] - AFTER_S)
+    at, side = at[inside], np.sign(size[inside])
+    if at.size < FEWEST:
+        return []
+    value = np.interp(at, time, answer)
+    before = side * (value - np.interp(at - BEFORE_S, time, answer))
+    after = side * (np.interp(at + AFTER_S, time, answer) - value)
+    whole = float(np.mean(before + after))
+    error = float(np.std(before, ddof=1)) / math.sqrt(at.size)
+    share = float(np.mean(before)) / whole if whole != 0.0 else 0.0
+    of_whole = float(np.std(before + after, ddof=1)) / math.sqrt(at.size)
+    is_clear = abs(float(np.mean(before))) > SPREADS * error and abs(whole) > SPREADS * of_whole
+    if not is_clear or share <= EARLY:
+        return []
+    message = (
+        f"{rate} answers before {fin} moves: {100 * share:.0f} % of its answer to {at.size} steps comes in the {BEFORE_S:g} s "
+        f"before them (limit {100 * EARLY:.0f} %): the fin's clock is late"
+    )
+    return [Note("fin_late", message, {"signal": fin, "value": share, "limit": EARLY, "count": int(at.size)})]
+
+
+def _steps(time: FloatArray, fin: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the last times before steps of a fin, and their sizes (k,), of those before which it was still."""
+    change = np.diff(fin)
+    moved = np.flatnonzero(np.abs(change) > 1e-3 * float(np.ptp(fin)))
+    if not moved.size:
+        return np.zeros(0), np.zeros(0)
+    still = np.diff(time[moved + 1], prepend=time[0])
+    kept = moved[(np.abs(change[moved]) > LARGE * float(np.ptp(fin))) & (still > ALONE_S)]
+    return time[kept], change[kept]
+
+
+def _roll(run: Run) -> list[Note]:
+    roll = np.abs(run["roll_rad"][np.isfinite(run["roll_rad"])])
+    share = float(np.mean((roll > ROLLED) & (roll < math.pi - ROLLED)))
+    if share <= 0.05 or float(np.percentile(roll, 99)) > math.pi:
+        return []
+    message = (
+        f"roll_rad is beyond {math.degrees(ROLLED):.0f} deg for {100 * share:.0f} % of the run (limit 5 %): there yaw and pitch "
+        "answer to both fins, and no model of one axis holds; leave it out with `--from` and `--to`"
+    )
+    return [Note("rolled", message, {"signal": "roll_rad", "value": share, "limit": 0.05})]
