@@ -101,7 +101,7 @@ def _opaque(parts: Iterator[tuple[int, memoryview]]) -> int:
 def _held(parts: Iterator[tuple[int, memoryview]], order: str, word: int) -> int:
     """Check the dimensions, the name and the numbers of an array with such flags; return how many arrays follow."""
     size = _next(parts, INTEGERS)
-    dimensions = struct.unpack(f"{order}{len(size) // 4}i", size[: len(size) // 4 * 4])
+    dimensions: tuple[int, ...] = struct.unpack(f"{order}{len(size) // 4}i", size[: len(size) // 4 * 4])
     if not 1 <= len(dimensions) <= MOST_DIMENSIONS or min(dimensions) < 0:
         raise _DamagedError(f"an array of {dimensions}")
     _next(parts, NAMES)
@@ -159,7 +159,7 @@ def _fields(parts: Iterator[tuple[int, memoryview]], order: str, *, has_class: b
     width = _next(parts, INTEGERS)
     if len(width) != 4:
         raise _DamagedError(f"the length of a field's name in {len(width)} bytes")
-    (longest,) = struct.unpack(f"{order}i", width)
+    longest = int(struct.unpack(f"{order}i", width)[0])
     names = _next(parts, NAMES)
     if longest <= 0 or len(names) % longest:
         raise _DamagedError(f"names of {longest} bytes in {len(names)}")
