@@ -19,7 +19,7 @@ ORDER = (
     "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "diagnosis", "extension", "plant", "turning", "schedule", "exports",
-    "trial_folder", "change", "figures", "views", "face",
+    "trial_folder", "change", "report", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""

@@ -75,20 +75,28 @@ def _model(state: FolderState) -> tuple[str, str] | None:
             ["sysid", "identify", *_left_out(state, *run_words(state)), "--axis", axis, *_joint(runs)]
         )
     diagnosis = next((e for e in reversed(state.entries) if e.command[1:2] == ("diagnose",) and e.exit in DONE), None)
-    if diagnosis is None:
+    kept = state.of_kind("diagnosis")
+    if diagnosis is None and not kept:
         if not (words := run_words(state)):
             return None
         return "no diagnosis yet", shlex.join(["sysid", "diagnose", *_left_out(state, *words), "--axis", axis])
     best = state.models[0]
     have = set((best.body or {}).get("effects", ()))
-    lacking = [e for e in diagnosis.named if e not in have]
-    tried = any(e.command[1:2] == ("extend",) and e.time > diagnosis.time and e.exit in DONE for e in state.entries)
+    named = diagnosis.named if diagnosis is not None else _named(max(kept, key=lambda i: state.place(i).stat().st_mtime_ns))
+    lacking = [e for e in named if e not in have]
+    since = "" if diagnosis is None else diagnosis.time
+    tried = any(e.command[1:2] == ("extend",) and e.time >= since and e.exit in DONE for e in state.entries)
     if lacking and not tried:
         add = [w for e in lacking for w in ("--add", e)]
         return f"the diagnosis names {', '.join(lacking)}", shlex.join(
             ["sysid", "extend", *_left_out(state, best.path, *trained_runs(state, best)), *add]
         )
     return None
+
+
+def _named(diagnosis: Item) -> list[str]:
+    """Return the effects that a diagnosis file names."""
+    return [str(e) for e in (diagnosis.body or {}).get("effects", ())]
 
 
 def _use(state: FolderState) -> tuple[str, str] | None:
@@ -117,6 +125,13 @@ def chosen_models(state: FolderState, axis: str = "") -> list[str]:
     if joint:
         return [max(joint, key=lambda i: (len((i.body or {}).get("effects", ())), state.place(i).stat().st_mtime_ns)).path]
     return [i.path for i in models]
+
+
+def single_models(state: FolderState, axis: str) -> list[str]:
+    """Return the models of one run each, with the most effects of any of them: points of the laws over speed."""
+    models = [i for i in state.models if (i.body or {}).get("axis") == axis and len((i.body or {}).get("runs", ())) == 1]
+    most = max((len((i.body or {}).get("effects", ())) for i in models), default=0)
+    return [i.path for i in models if len((i.body or {}).get("effects", ())) == most]
 
 
 def unseen_runs(state: FolderState, model: Item) -> list[str]:

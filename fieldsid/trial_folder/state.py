@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -72,11 +72,12 @@ class FolderState(Brief):
         return tuple(sorted(leaves, key=lambda i: (len(_body(i).get("runs", ())) < 2, i.path)))
 
 
-def state_of(folder: Path) -> FolderState:
-    """Return what a folder holds; files that are neither logs nor this program's own are left out."""
+def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
+    """Return what a folder holds, or those of its files that are given; what is neither a log nor this program's is left out."""
     entries, broken = read(folder)
     hashes = Hashes(folder, entries)
-    items = {i.path: i for i in _items(folder)}
+    wanted = None if files is None else {p.resolve() for p in files}
+    items = {i.path: i for i in _items(folder) if wanted is None or (folder / i.path).resolve() in wanted}
     done: dict[str, Item] = {}
     for path in items:
         _judge(path, items, done, hashes, folder)

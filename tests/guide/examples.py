@@ -42,6 +42,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         Example("What there is, what follows from what, and what comes next.", "sysid status demo"),
         Example("Of a new trial.", "sysid status pandan"),
     ),
+    "report": (Example("Everything of a folder in one file.", "sysid report demo --force"),),
     "plan": (
         Example(
             "What to fly at one speed, as a logger of commands takes it.",

@@ -14,6 +14,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 SHAPES: dict[str, Any] = {
     "init": logs.Init,
     "status": logs.Status,
+    "report": logs.Report,
     "plan": planning.Plan,
     "inspect": logs.Inspection,
     "import": logs.Import,

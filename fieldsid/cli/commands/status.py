@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 NAMES = {
     "log": "log", "run": "run", "model": "model", "fit": "laws", "schedule": "gains", "turn-radius": "turning radius",
-    "plan": "plan", "vehicle": "vehicle", "mapping": "mapping",
+    "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping",
 }  # fmt: skip
-ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "fit", "turn-radius", "schedule")
+ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule")
 MOST_SOURCES = 2
 LAST = 3
 
@@ -77,7 +77,7 @@ def _verdict(state: FolderState) -> str:
 
 
 def _many(count: int, name: str) -> str:
-    return f"{count} {name}" if count == 1 or name in ("laws", "gains") else f"{count} {name}s"
+    return f"{count} {name}" if count == 1 or name in ("laws", "gains", "diagnosis") else f"{count} {name}s"
 
 
 def _entry(item: Item) -> dict[str, Any]:

@@ -35,6 +35,13 @@ def _output(parsed: Parsed, folder: str) -> list[str]:
     return [] if parsed.values.get("output") else ["-o", folder]
 
 
+def _diagnose(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the runs, and a file that is free for the diagnosis: the report shows it, and `plan --from` takes it."""
+    names = (f"{MODELS}/diagnosis_{parsed.values.get('axis')}{f'-{i}' if i > 1 else ''}.yaml" for i in range(1, 10_000))
+    free = next(n for n in names if not (state.folder / n).exists())
+    return [*_runs(parsed, state), *_output(parsed, free)]
+
+
 def _import(parsed: Parsed, _state: FolderState) -> list[str]:
     return _output(parsed, RUNS)
 
@@ -80,7 +87,7 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
         "import": _import,
         "identify": _identify,
         "compare": _of_model(unseen_runs),
-        "diagnose": _runs,
+        "diagnose": _diagnose,
         "extend": _extend,
         "history": _model,
         "simulate": _model,

@@ -87,6 +87,35 @@ class Status(Shape):
     """What to do next."""
 
 
+class ReportVerdict(Shape):
+    """One verdict of a report."""
+
+    what: str
+    """What it is of."""
+    says: str
+    """What it says."""
+
+
+class Report(Shape):
+    """The report that was written."""
+
+    schema_: Literal["fieldsid/report/1"] = schema_field("fieldsid/report/1")
+    file: str
+    """The file."""
+    bytes: int
+    """Its size."""
+    verdicts: list[ReportVerdict]
+    """What it says first."""
+    runs: list[str]
+    """Runs in it."""
+    models: list[str]
+    """Models whose free runs are drawn, the best of an axis first."""
+    figures: int
+    """Figures in it."""
+    skipped: list[str]
+    """What could not be used and why."""
+
+
 class FieldInfo(Shape):
     """One field of a channel."""
 

@@ -1,0 +1,108 @@
+"""sysid report: one HTML file for the log book, or PDF: verdicts, figures, numbers, lineage."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, say
+from fieldsid.cli.options import Force, JsonFlag
+from fieldsid.cli.progress import get_ready, refuse_existing
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.trial_folder.state import FolderState
+
+Files = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="[FOLDER|FILE...]", help="A trial folder, or files of one; the folder it is run in if not given."),
+]
+Page = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="report.html in the folder if not given; .pdf is printed by a browser."),
+]
+
+
+def command(files: Files = None, output: Page = None, force: Force = False, as_json: JsonFlag = False) -> Mapping[str, Any]:
+    """Write what a trial has come to into one file: HTML that needs no network, or PDF.
+
+    Verdicts first; the runs with the doctor's findings; each model against its measurement, to zoom and read off; where it fails;
+    the effects tried; the falling error; parameters, laws, radius and gains; what was made from what; the commands to repeat it.
+    A PDF needs Chromium, Chrome, Edge or Brave; without one print the HTML from any browser.
+
+    Example: sysid report
+
+    Example: sysid report pandan -o pandan.pdf
+    """
+    from fieldsid.errors import UsageError
+
+    given = files or [Path()]
+    state = _state(given)
+    path = output or state.folder / "report.html"
+    if path.suffix not in (".html", ".pdf"):
+        raise UsageError("a report is HTML or PDF", found=f"`{path}`", hint=f"write `{path.with_suffix('.html')}`")
+    refuse_existing(path, force=force)
+    from fieldsid.report.pdf import check_browser
+
+    if path.suffix == ".pdf":
+        check_browser(path)
+    get_ready()
+    from fieldsid.report.material import material_of
+    from fieldsid.report.sections import context_of
+
+    context = context_of(material_of(state))
+    text = _written(context, path, force=force)
+    body = {
+        "schema": "fieldsid/report/1",
+        "file": str(path),
+        "bytes": path.stat().st_size,
+        "verdicts": [{"what": v["what"], "says": v["says"]} for v in context["verdicts"]],
+        "runs": [r["name"] for r in context["runs"]],
+        "models": [m["path"] for a in context["axes"] for m in a["models"]],
+        "figures": text.count('<svg class="chart"') + text.count('<svg class="bars"'),
+        "skipped": context["skipped"],
+    }
+    if not as_json:
+        for line in context["skipped"]:
+            say(f"warning: {line} [not_in_report]")
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+
+
+def _state(given: Sequence[Path]) -> FolderState:
+    from fieldsid.errors import UsageError
+    from fieldsid.trial_folder.state import state_of
+
+    missing = [p for p in given if not p.exists()]
+    if missing:
+        raise UsageError(f"`{missing[0]}` is not there", found="no such file or folder", hint="`sysid report FOLDER`")
+    if len(given) == 1 and given[0].is_dir():
+        return state_of(given[0])
+    if any(p.is_dir() for p in given):
+        raise UsageError("one folder, or files", found=", ".join(map(str, given)), hint="give the folder alone")
+    above = Path(os.path.commonpath([p.resolve().parent for p in given]))
+    here = Path()
+    return state_of(here if above == here.resolve() else above, files=given)
+
+
+def _written(context: Mapping[str, Any], path: Path, *, force: bool) -> str:
+    from fieldsid.artifacts import write_text
+    from fieldsid.report.page import html_of
+    from fieldsid.report.pdf import print_pdf
+
+    text = html_of(context)
+    if path.suffix == ".pdf":
+        print_pdf(text, path, force=force)
+    else:
+        write_text(path, text, force=force)
+    return text
+
+
+def _render(to: Console, body: Mapping[str, Any]) -> None:
+    for v in body["verdicts"]:
+        to.print(f"{v['what']}: {v['says']}", markup=False, soft_wrap=True)
+    to.print(f"report: {body['file']} ({body['bytes'] / 1e6:.2f} MB, {body['figures']} figures)", markup=False, soft_wrap=True)

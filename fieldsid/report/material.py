@@ -1,0 +1,144 @@
+"""What a report is made of: the files of a folder, or those given, read and compared; what cannot be used is said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fieldsid.comparison.compare import Comparison, compare_one
+from fieldsid.display import Brief
+from fieldsid.errors import FieldsidError, UsageError
+from fieldsid.extension import Generation, history_of
+from fieldsid.logs import Run, load_run
+from fieldsid.models.model import Model, load_model
+from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
+from fieldsid.trial_folder.next_step import chosen_models, next_step, single_models
+from fieldsid.trial_folder.state import MODEL, RUN, FolderState, Item
+from fieldsid.vehicle import Vehicle, find_vehicle
+
+MOST_RUNS, MOST_MODELS = 12, 4
+"""Runs and models whose free runs are drawn: what is left out is said."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Shown(Brief):
+    """One model over the runs: its path from the folder, the model, its comparisons, and those that it was fitted to."""
+
+    path: str
+    model: Model
+    found: tuple[Comparison, ...]
+
+    def was_fitted_to(self, run: str) -> bool:
+        """Whether the model has seen a run."""
+        return run in self.model.runs
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class AxisMaterial(Brief):
+    """All of one axis: the models shown, the best first; its line; the points over speed; diagnosis, turns and gains as files."""
+
+    axis: str
+    shown: tuple[Shown, ...]
+    line: tuple[Generation, ...]
+    source: ParameterSource | None
+    diagnosis: Item | None
+    turning: Item | None
+    schedule: Item | None
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Material(Brief):
+    """A folder's state, its runs, its axes, notes and vehicle; `skipped` says what could not be used and why."""
+
+    state: FolderState
+    runs: tuple[Run, ...]
+    axes: tuple[AxisMaterial, ...]
+    notes: str
+    vehicle: Vehicle | None
+    skipped: tuple[str, ...]
+    next_step: tuple[str, str]
+
+
+def material_of(state: FolderState) -> Material:
+    """Return what a report of a folder's files is made of; raises UsageError where there is neither a run nor a model."""
+    if not (state.of_kind(RUN) or state.of_kind(MODEL)):
+        found = f"{len(state.items)} files of other kinds" if state.items else "nothing"
+        raise UsageError(
+            f"there is nothing to report in `{state.folder}`", found=found, hint="begin with `sysid import LOG -o runs/`"
+        )
+    skipped: list[str] = []
+    runs = _runs(state, skipped)
+    axes = tuple(a for axis in ("yaw", "pitch") if (a := _axis(state, axis, runs, skipped)) is not None)
+    notes = state.folder / "notes.md"
+    return Material(
+        state, tuple(runs), axes, notes.read_text(encoding="utf-8", errors="replace") if notes.is_file() else "",
+        find_vehicle(state.folder), tuple(skipped), next_step(state),
+    )  # fmt: skip
+
+
+def _runs(state: FolderState, skipped: list[str]) -> list[Run]:
+    places = [state.place(i) for i in state.of_kind(RUN)]
+    if not places:  # the runs that the models name
+        sources = [s.path for i in state.of_kind(MODEL) for s in i.sources if s.path is not None]
+        places = [p for p in dict.fromkeys(sources) if p.suffix != ".yaml"]
+    if len(places) > MOST_RUNS:
+        skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: the first {MOST_RUNS} by name are")
+    found = []
+    for place in places[:MOST_RUNS]:
+        try:
+            found.append(load_run(place))
+        except FieldsidError as error:
+            skipped.append(f"{place.name}: {error.what}")
+    return found
+
+
+def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]) -> AxisMaterial | None:
+    best = chosen_models(state, axis)
+    if not best:
+        return None
+    line = history_of(state.folder / best[0]) if len(best) == 1 else ()
+    ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
+    paths = [*(state.folder / b for b in best), *ancestors][:MOST_MODELS]
+    if len(best) > MOST_MODELS:
+        skipped.append(f"{len(best) - MOST_MODELS} of {len(best)} {axis} models are not drawn")
+    singles = [state.folder / p for p in single_models(state, axis)]
+    return AxisMaterial(
+        axis,
+        tuple(_shown(state, p, runs, skipped) for p in paths),
+        line,
+        _source(singles if len(singles) > 1 else [state.folder / b for b in best], skipped),
+        *(_last(state, kind, axis) for kind in ("diagnosis", "turn-radius", "schedule")),
+    )
+
+
+def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown:
+    model = load_model(path)
+    found = []
+    for run in runs:
+        try:
+            found.append(compare_one(model, run))
+        except FieldsidError as error:
+            skipped.append(f"{path.name} on {run.name}: {error.what}")
+    inside = path.resolve().is_relative_to(state.folder.resolve())
+    name = path.resolve().relative_to(state.folder.resolve()) if inside else path
+    return Shown(str(name), model, tuple(found))
+
+
+def _source(paths: Sequence[Path], skipped: list[str]) -> ParameterSource | None:
+    try:
+        return load_parameter_source(paths)
+    except FieldsidError as error:
+        skipped.append(f"no laws over speed: {error.what}")
+        return None
+
+
+def _last(state: FolderState, kind: str, axis: str) -> Item | None:
+    """Return the newest file of a kind for an axis; a turning radius is that of the yaw."""
+    items = [i for i in state.of_kind(kind) if _axis_of(i) == axis]
+    return max(items, key=lambda i: state.place(i).stat().st_mtime_ns, default=None)
+
+
+def _axis_of(item: Item) -> Any:
+    return (item.body or {}).get("axis", "yaw")

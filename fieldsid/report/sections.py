@@ -1,0 +1,296 @@
+"""What the report says: verdicts first, then each part with its numbers, as plain data that the templates lay out."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from math import exp, log
+from typing import Any
+
+import numpy as np
+
+from fieldsid._version import __version__
+from fieldsid.comparison.compare import DOWN_TO_NOISE
+from fieldsid.report import figures
+from fieldsid.report.material import AxisMaterial, Material, Shown
+from fieldsid.rounding import in_unit, interval, number, with_error
+from fieldsid.trial_folder.journal import Entry, made_by
+from fieldsid.trial_folder.state import FolderState, Item
+
+DONE = (0, 1)
+MOST_CANDIDATES = 12
+
+
+def context_of(material: Material) -> dict[str, Any]:
+    """Return what the page's template shows of a report's material."""
+    state = material.state
+    name = material.vehicle.name if material.vehicle is not None else state.folder.resolve().name
+    return {
+        "name": name,
+        "folder": state.folder.resolve().name,
+        "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "tool": f"fieldsid {__version__}",
+        "verdicts": [v for a in material.axes for v in _verdicts(a)] + _state_verdict(state),
+        "next": {"why": material.next_step[0], "command": material.next_step[1]},
+        "runs": [_run(r) for r in material.runs],
+        "axes": [_axis(a) for a in material.axes],
+        "vehicle": _vehicle(material),
+        "files": [_file(i, state) for i in state.items],
+        "commands": _commands(state),
+        "notes": material.notes.strip(),
+        "skipped": list(material.skipped),
+    }
+
+
+def _verdicts(axis: AxisMaterial) -> list[dict[str, str]]:
+    best = axis.shown[0]
+    out = []
+    if best.found:
+        seen, unseen = _split(best)
+        judged = unseen or seen
+        over = exp(sum(log(c.leading.over_floor) for c in judged) / len(judged))
+        on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
+        good = max(c.leading.over_floor for c in judged) <= DOWN_TO_NOISE
+        tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
+        says = f"error {over:.2f} x the noise on {on}{tail}"
+        effects = f" with {', '.join(best.model.effects)}" if best.model.effects else ""
+        out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
+    if axis.diagnosis is not None and axis.diagnosis.body is not None:
+        body = axis.diagnosis.body
+        out.append({"what": f"{axis.axis} diagnosis: {body['verdict']}", "says": str(body.get("says", "")), "state": "plain"})
+    if axis.turning is not None and axis.turning.body is not None:
+        out.append(_turn_verdict(axis.turning.body))
+    if axis.schedule is not None and axis.schedule.body is not None:
+        out.append(_gain_verdict(axis.axis, axis.schedule.body))
+    return out
+
+
+def _split(shown: Shown) -> tuple[list[Any], list[Any]]:
+    seen = [c for c in shown.found if shown.was_fitted_to(c.run)]
+    return seen, [c for c in shown.found if not shown.was_fitted_to(c.run)]
+
+
+def _turn_verdict(body: Mapping[str, Any]) -> dict[str, str]:
+    row = min(body["rows"], key=lambda r: float(r["radius_m"]))
+    low, high = row["interval95"]
+    says = (
+        f"{number(row['radius_m'], 3)} m at {number(row['speed_m_s'], 3)} m/s to {row['side']}, "
+        f"95 % {number(low, 3)} .. {number(high, 3)} m; {row['trust']}"
+    )
+    return {"what": "tightest turn", "says": says, "state": "warn" if row["extrapolated"] else "good"}
+
+
+def _gain_verdict(axis: str, body: Mapping[str, Any]) -> dict[str, str]:
+    rows = body["rows"]
+    worst = min(rows, key=lambda r: np.inf if r["phase_margin_deg"] is None else float(r["phase_margin_deg"]))
+    phase, wanted = float(worst["phase_margin_deg"] or np.inf), float(body["phase_margin_wanted_deg"])
+    says = (
+        f"least phase margin {phase:.0f} deg at {number(worst['speed_m_s'], 3)} m/s, {wanted:.0f} deg asked for, by the estimate"
+    )
+    return {"what": f"{axis} gains at {len(rows)} speeds", "says": says, "state": "good" if phase >= wanted - 0.5 else "warn"}
+
+
+def _state_verdict(state: FolderState) -> list[dict[str, str]]:
+    stale = [i for i in state.items if i.stale]
+    if not stale:
+        return []
+    said = "; ".join(f"{i.path}: {i.stale}" for i in stale[:3]) + (f" and {len(stale) - 3} more" if len(stale) > 3 else "")
+    return [{"what": f"{len(stale)} stale file{'s' * (len(stale) > 1)}", "says": said, "state": "warn"}]
+
+
+def _run(run: Any) -> dict[str, Any]:
+    surge = run.signals.get("surge_m_s")
+    speed = float(np.nanmedian(surge)) if surge is not None and np.isfinite(surge).any() else float("nan")
+    return {
+        "name": run.name,
+        "seconds": f"{run.time[-1] - run.time[0]:.1f}",
+        "samples": len(run),
+        "speed": number(speed, 3),
+        "signals": ", ".join(n for n in run.signals if run.has(n)),
+        "findings": [f"{n.message} [{n.code}]" for n in run.notes],
+    }
+
+
+def _axis(axis: AxisMaterial) -> dict[str, Any]:
+    best = axis.shown[0]
+    failing = [(c.run, ch, c) for c in best.found for ch in c.failing]
+    return {
+        "name": axis.axis,
+        "pairs": [_pair(shown, c, axis) for shown in axis.shown for c in shown.found],
+        "models": [{"path": s.path, "effects": ", ".join(s.model.effects) or "none", "rows": _errors(s)} for s in axis.shown],
+        "failures": [
+            {
+                "title": f"{run}: the {channel.name}, {channel.over_floor:.1f} x its noise",
+                "chart": figures.failures(channel, f"where the {channel.name} of {run} fails"),
+                "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
+            }
+            for run, channel, c in failing[:6]
+        ],
+        "candidates": _candidates(axis.diagnosis),
+        "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
+        "fall": figures.fall(axis.line, f"the error of the {axis.axis} model over the noise"),
+        "parameters": [row for s in axis.shown[:1] for row in _parameters(s)] if len(axis.shown) == 1 or axis.line else
+        [row for s in axis.shown for row in _parameters(s)],
+        "laws": _laws(axis),
+        "radius": None if axis.turning is None else _radius(axis.turning),
+        "gains": None if axis.schedule is None else _gains(axis.schedule),
+    }  # fmt: skip
+
+
+def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
+    title = f"{shown.path} on {found.run}"
+    drawn, key = figures.free_run(found, f"{title}: free run and measurement")
+    over = ", ".join(f"{c.name} {c.over_floor:.2f} x its noise" for c in found.channels)
+    return {
+        "model": shown.path, "run": found.run, "chart": drawn, "legend": key, "over": over,
+        "fitted": shown.was_fitted_to(found.run), "first": shown is axis.shown[0],
+    }  # fmt: skip
+
+
+def _errors(shown: Shown) -> list[dict[str, str]]:
+    return [
+        {
+            "run": c.run,
+            "speed": number(c.shown.record.speed, 3),
+            "angle": number(np.degrees(c.merit.angle_rms), 2),
+            "angle_noise": number(np.degrees(c.floor.angle), 2),
+            "rate": number(np.degrees(c.merit.rate_rms), 2),
+            "rate_noise": number(np.degrees(c.floor.rate), 2),
+            "fit": f"{number(c.merit.angle_fit, 3)} / {number(c.merit.rate_fit, 3)}",
+            "over": f"{c.leading.over_floor:.2f}",
+            "fitted": "yes" if shown.was_fitted_to(c.run) else "no",
+        }
+        for c in shown.found
+    ]
+
+
+def _candidates(item: Item | None) -> list[dict[str, str]]:
+    if item is None or item.body is None:
+        return []
+    body = item.body
+    floor = body["noise_floor"]
+    rows: list[tuple[str, float | None, Any, Any, float | None, float | None]] = [
+        ("as it is", None, body["base"]["train"], body["base"]["validation"], None, None)
+    ]
+    rows += [
+        (c["effect"], c["probability"], c["train"], c["validation"], c["explained"], c.get("log_evidence"))
+        for c in body["candidates"][:MOST_CANDIDATES]
+    ]
+    return [
+        {
+            "effect": name,
+            "probability": "" if p is None else "< 0.001" if p < 0.001 else f"{p:.3f}",
+            "fitted": _over(train, floor),
+            "unseen": _over(unseen, floor),
+            "explained": "" if share is None else f"{100 * share:.0f} %" if share >= 0 else "worse",
+            "evidence": "" if evidence is None else f"{evidence:+.0f}",
+        }
+        for name, p, train, unseen, share, evidence in rows
+    ]
+
+
+def _over(errors: Mapping[str, Any], floor: Mapping[str, Any]) -> str:
+    """Return an error over the noise floor, the channels' root mean square."""
+    pairs = [(errors.get("angle_rms_rad"), floor["angle_rad"]), (errors.get("rate_rms_rad_s"), floor["rate_rad_s"])]
+    ratios = [float(e) / float(f) for e, f in pairs if e and f]
+    return f"{(sum(r * r for r in ratios) / len(ratios)) ** 0.5:.2f}" if ratios else ""
+
+
+def _parameters(shown: Shown) -> list[dict[str, str]]:
+    model = shown.model
+    return [
+        {
+            "model": shown.path,
+            "name": model.shown(n),
+            "value": with_error(v, model.std_error(n)),
+            "interval": interval(v - 1.96 * model.std_error(n), v + 1.96 * model.std_error(n)),
+            "unit": in_unit(model.units.get(n, "")),
+        }
+        for n, v in model.values.items()
+    ]
+
+
+def _laws(axis: AxisMaterial) -> list[dict[str, str]]:
+    if axis.source is None:
+        return []
+    out = []
+    for name, unit in figures.parameters_of(axis.axis):
+        drawn = figures.over_speed(axis.source, name, unit)
+        law = None if axis.source.laws is None else axis.source.laws.by_name.get(name)
+        said = f"|{name}| grows as {law.exponent.says}" if law is not None and law.exponent else ""
+        if drawn:
+            out.append({"name": name, "chart": drawn, "says": said})
+    return out
+
+
+def _radius(item: Item) -> dict[str, Any]:
+    body: Mapping[str, Any] = item.body or {}
+    drawn, key = figures.radius(body)
+    rows = [
+        {
+            "side": r["side"], "speed": number(r["speed_m_s"], 3), "radius": number(r["radius_m"], 3),
+            "interval": f"{number(r['interval95'][0], 3)} .. {number(r['interval95'][1], 3)}",
+            "rate": number(np.degrees(r["yaw_rate_max_rad_s"]), 3), "trust": r["trust"],
+        }
+        for r in body["rows"]
+    ]  # fmt: skip
+    return {"chart": drawn, "legend": key, "rows": rows, "rudder": number(body.get("rudder_max_rad")), "path": item.path}
+
+
+def _gains(item: Item) -> dict[str, Any]:
+    body: Mapping[str, Any] = item.body or {}
+    rows = [
+        {
+            "speed": number(r["speed_m_s"], 3), "kp": f"{r['kp']:.4f}", "ki": f"{r['ki']:.4f}", "kd": f"{r['kd']:.4f}",
+            "forward": f"{r['feed_forward_rad']:.4f}", "limit": f"{r['fin_limit_rad']:.3f}",
+            "phase": number(r["phase_margin_deg"], 3),
+            "gain": number(r["gain_margin_db"], 3), "delay": number(r["delay_margin_s"], 3),
+            "supported": "yes" if r["supported"] else "no",
+        }
+        for r in body["rows"]
+    ]  # fmt: skip
+    words = {"lag_s": ("lag", "s"), "delay_s": ("delay", "s"), "fin_rate_rad_s": ("fin rate", "rad/s")}
+    counted = [f"{words[k][0]} {number(v, 3)} {words[k][1]}" for k, v in body["actuator"].items() if v and k in words]
+    return {
+        "chart": figures.gains(body), "rows": rows, "path": item.path, "controller": body["controller"],
+        "signs": str((body.get("provenance") or {}).get("sign_convention", "")),
+        "actuator": ", ".join(counted),
+    }  # fmt: skip
+
+
+def _vehicle(material: Material) -> list[tuple[str, str]]:
+    v = material.vehicle
+    if v is None:
+        return []
+    pairs = (
+        ("length", v.length_m, "m"), ("rudder limit", v.rudder_max_rad, "rad"), ("elevator limit", v.elevator_max_rad, "rad"),
+        ("fin rate", v.fin_rate_rad_s, "rad/s"), ("slowest", v.speed_min_m_s, "m/s"), ("fastest", v.speed_max_m_s, "m/s"),
+    )  # fmt: skip
+    return [(name, f"{number(value, 3)} {unit}") for name, value, unit in pairs if value is not None]
+
+
+def _file(item: Item, state: FolderState) -> dict[str, str]:
+    maker = made_by(state.entries, item.path)
+    return {
+        "path": item.path,
+        "kind": item.kind,
+        "made_from": ", ".join(f"{s.named} ({s.sha256[:8]})" if s.sha256 else s.named for s in item.sources),
+        "by": "" if maker is None else " ".join(maker.command[:3]),
+        "state": f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else "",
+    }
+
+
+def _commands(state: FolderState) -> list[dict[str, str]]:
+    """Return the commands that made what is there: those of the journal that ended well and wrote something or gave a result."""
+    return [
+        {"line": shlex.join(e.command), "verdict": e.verdict, "time": _when(e)} for e in _told(state.entries) if e.exit in DONE
+    ]
+
+
+def _told(entries: Sequence[Entry]) -> list[Entry]:
+    return [e for e in entries if e.command[1:2] not in (("report",), ("status",))]
+
+
+def _when(entry: Entry) -> str:
+    return datetime.fromisoformat(entry.time).astimezone().strftime("%Y-%m-%d %H:%M")

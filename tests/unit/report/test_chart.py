@@ -1,0 +1,75 @@
+"""Charts as SVG: well-formed, every word escaped, what is drawn where the data say."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from fieldsid.report.chart import MOST_POINTS, WIDTH, Band, Panel, Series, bars, chart, legend, nice_ticks, thinned
+
+X = np.linspace(0.0, 10.0, 11)
+
+
+def parsed(text):
+    return ET.fromstring(text)  # noqa: S314 - our own
+
+
+def test_a_chart_is_well_formed_whatever_a_run_is_called():
+    evil = Series(X, X, "simulated", '<script>"&')
+    root = parsed(chart([Panel("a < b", (evil,))], "time, s", '"quoted" & <b>'))
+    assert root.find("title").text == '"quoted" & <b>'
+    assert root.find(".//polyline").get("data-name") == '<script>"&'
+    assert "<script>" not in legend([evil])
+
+
+def test_a_line_lies_where_its_data_are():
+    root = parsed(chart([Panel("y", (Series(X, 2 * X, "simulated"),), height=100)], "x", "t"))
+    (panel,) = root.findall("svg")
+    low, high = (float(panel.get(f"data-y{i}")) for i in (0, 1))
+    first, *_, last = ([float(v) for v in p.split(",")] for p in root.find(".//polyline").get("points").split())
+    width = float(panel.get("width"))
+    assert (first[0], last[0]) == pytest.approx((0.0, width))
+    assert high - (high - low) * last[1] / 100 == pytest.approx(20.0, abs=0.02)
+    assert high - (high - low) * first[1] / 100 == pytest.approx(0.0, abs=0.02)
+
+
+def test_what_was_not_measured_is_not_drawn():
+    y = np.where(X < 5, X, np.nan)
+    root = parsed(chart([Panel("y", (Series(X, y, "measured", "m", "dots"),))], "x", "t"))
+    assert root.find(".//path").get("d").count("M") == 5
+
+
+def test_a_band_goes_there_and_back_and_points_have_their_errors():
+    points = Series(X, X, "measured", "m", "points", np.full(11, 0.5))
+    root = parsed(chart([Panel("y", (points,), (Band(X, X - 1, X + 1, "simulated"),))], "x", "t"))
+    assert len(root.find(".//polygon").get("points").split()) == 22
+    assert [p.get("class") for p in root.findall(".//path")] == ["errors measured", "marks measured"]
+
+
+def test_panels_share_one_axis_and_stand_below_each_other():
+    root = parsed(chart([Panel("a", (Series(X, X, "simulated"),)), Panel("b", (Series(X, -X, "second"),))], "time, s", "t"))
+    first, second = root.findall("svg")
+    assert float(second.get("y")) >= float(first.get("y")) + float(first.get("height"))
+    assert root.get("viewBox").split()[2] == str(WIDTH)
+    assert [t.text for t in root.find("g").findall("text")] == ["0", "2", "4", "6", "8", "10"]
+
+
+def test_bars_are_as_long_as_their_values():
+    root = parsed(bars([("a", 4.0, "4"), ("b", 1.0, "1")], "t", mark=(1.0, "noise")))
+    long, short = (float(r.get("width")) for r in root.findall("rect"))
+    assert long == pytest.approx(4 * short, rel=0.01)
+    assert root.find("line").get("x1") == root.find("line").get("x2")
+
+
+def test_ticks_are_round_and_inside():
+    assert nice_ticks(0.13, 0.87, 4) == [0.2, 0.4, 0.6, 0.8]
+    assert nice_ticks(5.0, 5.0, 4) == [5.0]
+    assert nice_ticks(-20.0, 20.0, 4) == [-20.0, -10.0, 0.0, 10.0, 20.0]
+
+
+def test_a_long_line_is_thinned_and_keeps_its_ends_near():
+    x, y = thinned(np.arange(100_000.0), np.zeros(100_000))
+    assert x.size == y.size <= MOST_POINTS
+    assert x[-1] > 99_000
