@@ -92,7 +92,7 @@ def _gain_verdict(axis: str, body: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _state_verdict(state: FolderState) -> list[dict[str, str]]:
-    stale = [i for i in state.items if i.stale]
+    stale = sorted((i for i in state.items if i.stale), key=lambda i: i.stale.endswith(" is stale"))  # causes first
     if not stale:
         return []
     said = "; ".join(f"{i.path}: {i.stale}" for i in stale[:3]) + (f" and {len(stale) - 3} more" if len(stale) > 3 else "")
