@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import Formatter
-from typing import Any
 
+from fieldsid.demo import briefs
 from fieldsid.demo.trial import CHECK_SPEEDS, PLANNED_SPEED
 from fieldsid.demo.vehicle import LIMITS
 from fieldsid.maneuvers import pick_maneuver
@@ -20,7 +20,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.planning.design.leg import error_in_words
 from fieldsid.rounding import number, with_error
 
-Result = Mapping[str, Any]
+Result = briefs.Result
 NEAR_NOISE = 1.15
 CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
 """The runs that judge; the option stands before each, as a shell gives only the first of a pattern's files to an option."""
@@ -28,13 +28,14 @@ CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step: its heading, its command line after `sysid`, what the result means, and the axes it makes sense for.
+    """One step: its heading, its command line after `sysid`, its result in a few words and what it means, and its axes.
 
     learns gives, from the result, what later lines may name.
     """
 
     title: str
     line: str
+    brief: Callable[[Result], str]
     means: Callable[[Result], str]
     axes: tuple[Axis, ...] = tuple(Axis)
     learns: Callable[[Result], Mapping[str, str]] = lambda _result: {}
@@ -47,6 +48,7 @@ class Step:
 def places(folder: Path, axis: str) -> dict[str, str]:
     """Return what the lines' templates stand for."""
     return {
+        "folder": str(folder),
         "plan": str(folder / "plan"),
         "trial": str(folder / "trial"),
         "mapping": str(folder / "mapping.yaml"),
@@ -107,14 +109,14 @@ def _identified(result: Result) -> str:
         f"{number(f['speed_m_s'], 2)} m/s: {with_error(f['parameters'][name]['value'], f['parameters'][name]['std_error'])}"
         for f in fits
     )
-    return f"{name} over speed is {parts} 1/s. " + _verdict(max(_over_noise(f, f["noise_floor"]) for f in fits))
+    return f"{name} over speed is {parts} 1/s. " + _verdict(max(briefs.over_noise(f, f["noise_floor"]) for f in fits))
 
 
 def _joined(result: Result) -> str:
     fit = result["fits"][0]
     return (
         f"One model for {len(fit['runs'])} speeds: damping shared, authority by speed. "
-        + _verdict(_over_noise(fit, fit["noise_floor"]))
+        + _verdict(briefs.over_noise(fit, fit["noise_floor"]))
         + " Its judge are runs it has not seen."
     )
 
@@ -179,18 +181,16 @@ def _held(result: Result) -> str:
 
 
 def _refitted(result: Result) -> str:
-    left = max(_over_noise(f, f["noise_floor"]) for f in result["fits"])
+    left = max(briefs.over_noise(f, f["noise_floor"]) for f in result["fits"])
     name = next(iter(result["fits"][0]["parameters"]))
-    said = {f["run"]: f"{100 * _relative(f['parameters'][name]):.1f} %" for f in result["fits"] if f["run"].startswith("learn")}
+    said = {
+        f["run"]: f"{100 * briefs.relative(f['parameters'][name]):.1f} %" for f in result["fits"] if f["run"].startswith("learn")
+    }
     planned = said.pop(f"learn_{PLANNED_SPEED:.1f}")
     return (
         "With the effect in the model every run may be fitted, those that judged too, which gives two more speeds. The planned "
         f"run tells {name} to {planned}, the other two to {' and '.join(said.values())}. " + _verdict(left)
     )
-
-
-def _relative(parameter: Result) -> float:
-    return abs(float(parameter["std_error"]) / float(parameter["value"]))
 
 
 def _replaced(result: Result) -> Mapping[str, str]:
@@ -224,15 +224,11 @@ def _scheduled(result: Result) -> str:
 
 
 def _verified(result: Result) -> str:
-    ours, constant = (max(_settled(c) for c in result[part]) for part in ("scheduled", "constant"))
+    ours, constant = (max(briefs.settled(c) for c in result[part]) for part in ("scheduled", "constant"))
     return (
         f"The least phase margin over speeds and errors is {result['worst']['phase_margin_deg']:.0f} deg. A heading step settles "
         f"within {ours:.0f} s at every speed, with one constant gain within {constant:.0f} s."
     )
-
-
-def _settled(check: Result) -> float:
-    return float(check["settling_s"])
 
 
 def _exported(result: Result) -> str:
@@ -242,9 +238,11 @@ def _exported(result: Result) -> str:
     )
 
 
-def _over_noise(fit: Result, floor: Result) -> float:
-    pairs = ((fit["angle_rms_rad"], floor["angle_rad"]), (fit["rate_rms_rad_s"], floor["rate_rad_s"]))
-    return max(float(rms) / float(noise) for rms, noise in pairs if rms and noise)
+def _reported(result: Result) -> str:
+    return (
+        f"{result['file']} is one page of {result['bytes'] / 1e6:.1f} MB that needs no network: verdicts first, then "
+        f"{result['figures']} figures to zoom and read off, every number, what was made from what, and how to repeat it."
+    )
 
 
 def _verdict(ratio: float) -> str:
@@ -256,56 +254,76 @@ def _verdict(ratio: float) -> str:
 PLAN = Step(
     "What to fly?",
     f"plan --axis {{axis}} --speeds {PLANNED_SPEED} --fin-rate {LIMITS.fin_rate:g} --write csv -o {{plan}}",
+    briefs.planned,
     _planned,
 )
 STEPS: tuple[Step, ...] = (
-    Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", _inspected),
-    Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", _imported),
-    Step("A model for each speed", "identify {runs}/learn_*.parquet --axis {axis} -o {models} --no-figures", _identified),
-    Step("One model for all speeds", "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures", _joined),
+    Step("What is in the log?", "inspect {trial}/learn_1.4.csv --write-mapping {mapping}", briefs.inspected, _inspected),
+    Step("From log to run", "import {trial}/*.csv --mapping {mapping} -o {runs}", briefs.imported, _imported),
+    Step(
+        "A model for each speed",
+        "identify {runs}/learn_*.parquet --axis {axis} -o {models} --no-figures",
+        briefs.fitted,
+        _identified,
+    ),
+    Step(
+        "One model for all speeds",
+        "identify {runs}/learn_*.parquet --axis {axis} --joint -o {models} --no-figures",
+        briefs.fitted,
+        _joined,
+    ),
     Step(
         "Does it hold on runs it has not seen?",
         "compare {models}/joint_{axis}.yaml {runs}/check_*.parquet -o {models}",
+        briefs.compared,
         _compared,
     ),
     Step(
         "Which physical effect is missing?",
-        f"diagnose {{runs}}/learn_*.parquet --axis {{axis}} {CHECKED} --figure {{models}}/diagnosis.png",
+        f"diagnose {{runs}}/learn_*.parquet --axis {{axis}} {CHECKED} -o {{models}}/diagnosis.yaml "
+        "--figure {models}/diagnosis.png",
+        briefs.diagnosed,
         _diagnosed,
         learns=_named,
     ),
     Step(
         "Add it, and watch the error fall",
         f"extend {{models}}/joint_{{axis}}.yaml {{runs}}/learn_*.parquet --add {{effects}} {CHECKED}",
+        briefs.extended,
         _extended,
         learns=_grown,
     ),
-    Step("How did this model come about?", "history {extended} --figure {models}/history.png", _remembered),
-    Step("Does it hold now?", "compare {extended} {runs}/check_*.parquet -o {final}", _held),
+    Step("How did this model come about?", "history {extended} --figure {models}/history.png", briefs.remembered, _remembered),
+    Step("Does it hold now?", "compare {extended} {runs}/check_*.parquet -o {final}", briefs.compared, _held),
     Step(
         "A better model for each speed",
         "identify {runs}/*.parquet --axis {axis} --effects {effects} -o {final}/speeds --no-figures",
+        briefs.refitted,
         _refitted,
         learns=_replaced,
     ),
-    Step("How do the numbers change with speed?", "fit {fits} -o {final}/law_{axis}.yaml", _lawful),
-    Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", _turned, (Axis.YAW,)),
+    Step("How do the numbers change with speed?", "fit {fits} -o {final}/law_{axis}.yaml", briefs.lawful, _lawful),
+    Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", briefs.turned, _turned, (Axis.YAW,)),
     Step(
         "Gains for every speed",
         "schedule design {fits} --fin-limit 0.26 -o {turning}/gains.yaml",
+        briefs.scheduled,
         _scheduled,
         (Axis.YAW,),
     ),
     Step(
         "Are they good, also between the speeds?",
         "schedule verify {turning}/gains.yaml --require-phase-margin 30 -o {turning}/gains.png",
+        briefs.verified,
         _verified,
         (Axis.YAW,),
     ),
     Step(
         "Into the vehicle",
         "schedule export {turning}/gains.yaml --to ros2 -o {turning}/heading_ros2.yaml",
+        briefs.exported,
         _exported,
         (Axis.YAW,),
     ),
+    Step("All of it in one file", "report {folder}", briefs.reported, _reported),
 )

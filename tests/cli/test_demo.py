@@ -33,6 +33,27 @@ def tour(tmp_path_factory):
     return json.loads(told.getvalue())
 
 
+def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour):
+    pairs = zip((PLAN, *STEPS), tour["steps"], strict=True)
+    told = "".join(f"{i:2d}. {step.title} {step.brief(s['result'])}\n" for i, (step, s) in enumerate(pairs, 1))
+    assert sum(1 + len(line) // 80 for line in told.splitlines()) <= 30
+    assert tour["steps"][-1]["command"] == f"sysid report {tour['folder']}"
+    assert Path(tour["folder"], "report.html").is_file()
+    assert "servo_lag, probability 1.0" in told
+
+
+def test_briefly_each_command_is_a_line_and_verbosely_all_that_it_says(run_cli, tmp_path, monkeypatch):
+    few = tuple(s for s in STEPS if s.line.split()[0] in {"inspect", "import"})
+    monkeypatch.setattr(steps, "STEPS", few)
+    brief = run_cli("demo", "-o", tmp_path / "a")
+    assert brief.code == 0
+    assert " 3. From log to run: 5 runs: SI and radians, one clock\n" in brief.out
+    assert "$ sysid" not in brief.out
+    verbose = run_cli("demo", "-o", tmp_path / "b", "--verbose")
+    assert f"\n3. From log to run\n$ sysid import {tmp_path}/b/trial/*.csv" in verbose.out
+    assert "=> Each log is now a run" in verbose.out
+
+
 def results_of(tour, command):
     return [s["result"] for s in tour["steps"] if s["command"].split()[1] == command]
 
@@ -104,7 +125,7 @@ def test_a_comparison_that_is_down_to_the_noise_sends_nobody_looking():
 
 
 def test_a_step_that_needs_what_nobody_learned_is_left_out():
-    step = Step("", "extend {models}/a.yaml --add {effects}", str)
+    step = Step("", "extend {models}/a.yaml --add {effects}", str, str)
     assert not step.possible({"models": "m"})
     assert step.possible({"models": "m", "effects": "stall"})
 

@@ -42,7 +42,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         Example("What there is, what follows from what, and what comes next.", "sysid status demo"),
         Example("Of a new trial.", "sysid status pandan"),
     ),
-    "report": (Example("Everything of a folder in one file.", "sysid report demo --force"),),
+    "report": (Example("Everything of a folder in one file.", "sysid report demo"),),
     "plan": (
         Example(
             "What to fly at one speed, as a logger of commands takes it.",
@@ -103,7 +103,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
     "diagnose": (
         Example(
             "Fitted to three runs, judged by two others.",
-            f"sysid diagnose {LEARN} --axis yaw {CHECKED} --figure demo/models/diagnosis.png",
+            f"sysid diagnose {LEARN} --axis yaw {CHECKED} -o demo/models/diagnosis.yaml --figure demo/models/diagnosis.png",
         ),
         Example(
             "The same, from a model that has the effect already.",
@@ -152,7 +152,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ),
         Example("In the vehicle's own format.", f"sysid schedule export {GAINS} --to dune"),
     ),
-    "demo": (Example("The tour, here its first two steps and its end.", TOUR, head=58, tail=13),),
+    "demo": (Example("The tour with all that its commands say, here its first two steps and its end.", TOUR, head=58, tail=13),),
     "guide": (
         Example("One page.", "sysid guide schemas/init | head -20"),
         Example("A mistyped topic.", 'sysid guide sevo_lag; echo "exit code $?"'),

@@ -30,7 +30,7 @@ from fieldsid.logs import save_run
 from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.model import save_model
 
-TOUR = "sysid demo -o demo"
+TOUR = "sysid demo -o demo --verbose"
 STEP = re.compile(r"^\d+\. .*\n\$ (?P<line>sysid .*)\n\n(?P<said>(?:.*\n)*?)\n=> ", re.MULTILINE)
 """A step of the tour as it prints it: its heading, its line, what the command says, and what that means."""
 OF_A_SHELL = re.compile(r"[|<>;&$`]")

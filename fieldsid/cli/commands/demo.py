@@ -37,24 +37,37 @@ OPENING = (
     "which. The first one asks what to fly."
 )
 
+SHORT_OPENING = (
+    "A small vehicle waits on deck, with one effect more than the textbook's model. Each line is one command; "
+    "`sysid demo --verbose` prints them with all they say."
+)
+BRIEF, VERBOSE, JSON = "brief", "verbose", "json"
+"""How much of the tour is told while it goes on."""
+
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print each command with all that it says, and what it means.")]
 EffectName = Annotated[str, typer.Option("--effect", metavar="NAME", help="The effect to hide: see `sysid effects list`.")]
 
 
 def command(
-    context: typer.Context, effect: EffectName = HIDDEN, output: OutputDir = None, force: Force = False, as_json: JsonFlag = False
+    context: typer.Context,
+    effect: EffectName = HIDDEN,
+    output: OutputDir = None,
+    verbose: Verbose = False,
+    force: Force = False,
+    as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
-    """Take a tour: the command of each step as you would type it, with its result and what it means.
+    """Take a tour of all commands: a line for each with its result, or with `--verbose` all that they say and what it means.
 
     The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
     """
     began = perf_counter()
     with compiling(context, _compile_loops) as warmup:
-        body = _tour(effect, output, began, warmup, force=force, quiet=as_json)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+        body = _tour(effect, output, began, warmup, force=force, told=JSON if as_json else VERBOSE if verbose else BRIEF)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body, figures=verbose))
 
 
-def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, quiet: bool) -> dict[str, Any]:
+def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> dict[str, Any]:
     from fieldsid.demo.steps import PLAN, STEPS, places
     from fieldsid.demo.trial import make_trial
     from fieldsid.demo.vehicle import hidden_vehicle
@@ -63,16 +76,17 @@ def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, for
     folder = _folder(output, force=force)
     vehicle = hidden_vehicle(effect)
     known = dict(places(folder, vehicle.axis))
-    _told(OPENING, quiet=quiet)
+    _told(OPENING if told == VERBOSE else SHORT_OPENING, told)
     with BackgroundTasks() as tasks:
         session = Session(warmup, tasks)
-        done = [_taken(1, PLAN, known, session, force=force, quiet=quiet)]
+        done = [_taken(1, PLAN, known, session, force=force, told=told)]
         (leg,) = load_plan(folder / "plan" / "plan.yaml").legs
         trial = make_trial(vehicle, folder / "trial", leg, force=force)
-        _told(_flown(trial, folder, leg), quiet=quiet)
+        if told == VERBOSE:
+            _told(_flown(trial, folder, leg), told)
         for step in (s for s in STEPS if vehicle.axis in s.axes):
             if step.possible(known):
-                done.append(_taken(len(done) + 1, step, known, session, force=force, quiet=quiet))
+                done.append(_taken(len(done) + 1, step, known, session, force=force, told=told))
                 known |= step.learns(done[-1]["result"])
     return {
         "schema": "fieldsid/demo/1",
@@ -105,17 +119,21 @@ def _folder(asked: Path | None, *, force: bool) -> Path:
     return asked
 
 
-def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, quiet: bool) -> dict[str, Any]:
+def _taken(place: int, step: Step, known: Mapping[str, str], session: Session, *, force: bool, told: str) -> dict[str, Any]:
     from fieldsid.demo.steps import expanded, words_of
 
     words = words_of(step.line, known)
-    if not quiet:
+    if told == VERBOSE:
         sys.stdout.write(f"\n{place}. {step.title}\n$ sysid {' '.join(words)}\n\n")
     began = perf_counter()
-    with _silence() if quiet else _aloud():
+    with _aloud() if told == VERBOSE else _silence():
         result = run([*expanded(words), *(["--force"] if force else [])], session)
     meaning = step.means(result)
-    if not quiet:
+    if told == BRIEF:
+        said = f"{place:2d}. {step.title}{'' if step.title.endswith('?') else ':'} {step.brief(result)}"
+        sys.stdout.write(f"{fill(said, WIDTH, subsequent_indent='    ', break_on_hyphens=False)}\n")
+        sys.stdout.flush()
+    if told == VERBOSE:
         sys.stdout.write(f"\n{fill(meaning, WIDTH, initial_indent='=> ', subsequent_indent='   ', break_on_hyphens=False)}\n")
         sys.stdout.flush()
     return {"command": "sysid " + " ".join(words), "seconds": perf_counter() - began, "means": meaning, "result": result}
@@ -134,9 +152,9 @@ def _aloud() -> Iterator[None]:
     sys.stderr.flush()
 
 
-def _told(text: str, *, quiet: bool) -> None:
-    if not quiet:
-        sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n")
+def _told(text: str, told: str) -> None:
+    if told != JSON:
+        sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n" + ("\n" if told == BRIEF else ""))
         sys.stdout.flush()
 
 
@@ -151,16 +169,16 @@ def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
     )
 
 
-def _render(to: Console, body: Mapping[str, Any]) -> None:
+def _render(to: Console, body: Mapping[str, Any], *, figures: bool) -> None:
     from fieldsid.models.axis import NAMES, Axis
 
     hidden = body["hidden"]
     own = {n: v for n, v in hidden["values"].items() if n not in NAMES[Axis(hidden["axis"])].base}
     numbers = ", ".join(f"{n} = {v:.3g}" for n, v in own.items())
-    figures = [f for f in body["files"] if f.endswith(".png")]
     named = " and ".join(body["named"]) or "nothing"
     to.print(f"\nHidden in the trial was {hidden['effect']} ({numbers}); diagnose named {named}.", soft_wrap=True)
-    to.print(f"{len(body['files'])} files are in {body['folder']}, {len(figures)} of them figures:", soft_wrap=True)
-    for file in figures:
+    drawn = [f for f in body["files"] if f.endswith(".png")]
+    to.print(f"{len(body['files'])} files are in {body['folder']}, {len(drawn)} of them figures{':' * figures}", soft_wrap=True)
+    for file in drawn if figures else ():
         to.print(f"  {file}", soft_wrap=True)
     to.print(f"The tour took {body['seconds']:.1f} s. `sysid --help` lists every command.")

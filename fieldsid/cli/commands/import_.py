@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -48,7 +49,7 @@ def command(
     ] = "parquet",
     force: Force = False,
     as_json: JsonFlag = False,
-) -> None:
+) -> Mapping[str, Any]:
     """Turn logs into Runs: SI and radians, NED and forward-starboard-down, one clock, gaps left as gaps.
 
     What is not under way is left out, and said; several stretches of one log are runs of their own.
@@ -77,11 +78,12 @@ def command(
     for _, place in placed:
         check_output(place, force=force)
     done = [importer.write(run, place, force=force) for run, place in placed]
-    body = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
+    body: dict[str, Any] = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
     emit(body, as_json=as_json, render=lambda c: _render(done, c))
     for item in done:
         warn(item.warnings, of=item.run.name)
     skips.end(len(done))
+    return body
 
 
 def _fin_limits(vehicle: Path | None) -> dict[str, float]:
