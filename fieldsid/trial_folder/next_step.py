@@ -110,6 +110,8 @@ def _use(state: FolderState) -> tuple[str, str] | None:
         )
     if not any(e.command[1:3] == ("schedule", "verify") and e.exit in DONE for e in state.entries):
         return "the gains are not verified", shlex.join(["sysid", "schedule", "verify", *_left_out(state, schedules[-1].path)])
+    if is_trial(state.folder) and not any(e.command[1:2] == ("report",) and e.exit in DONE for e in state.entries):
+        return "there is no report yet", "sysid report"
     return None
 
 

@@ -39,7 +39,7 @@ def test_one_line_says_what_changed_and_what_follows(run_cli, tmp_path):
 def test_json_holds_every_number_and_two_folders_do_as_well(run_cli, tmp_path):
     saved(tmp_path / "a" / "models" / "m.yaml")
     saved(tmp_path / "a" / "models" / "p.yaml", axis=Axis.PITCH)
-    saved(tmp_path / "b" / "m.yaml", b2=-1.2)
+    saved(tmp_path / "b" / "m.yaml", b2=-1.2, error=0.011)
     saved(tmp_path / "b" / "p.yaml", axis=Axis.PITCH, d2=1.8)
     body = run_cli("compare", tmp_path / "a", tmp_path / "b", "--json").json
     assert body["schema"] == "fieldsid/compare-models/1"
@@ -49,8 +49,26 @@ def test_json_holds_every_number_and_two_folders_do_as_well(run_cli, tmp_path):
     assert yaw["next"] is None
 
 
+def test_a_model_beside_itself_is_refused(run_cli, tmp_path):
+    one = saved(tmp_path / "old.yaml")
+    (tmp_path / "copy.yaml").write_bytes(one.read_bytes())
+    answer = run_cli("compare", one, tmp_path / "copy.yaml")
+    assert answer.code == 2
+    assert "the models of both sides are the same" in answer.err
+
+
+def test_two_models_of_one_run_are_said_to_be_that(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    for method in ("output_error", "svf_ls"):
+        asked = ("identify", run, "--axis", "yaw", "--method", method, "-o", tmp_path / method, "--no-figures")
+        assert run_cli(*asked).code == 0
+    answer = run_cli("compare", tmp_path / "output_error", tmp_path / "svf_ls")
+    assert answer.code == 0
+    assert "both sides were fitted to run7.parquet" in answer.err
+
+
 def test_the_gate_and_the_mapping_are_for_runs(run_cli, tmp_path):
-    answer = run_cli("compare", saved(tmp_path / "a.yaml"), saved(tmp_path / "b.yaml"), "--min-fit", 90)
+    answer = run_cli("compare", saved(tmp_path / "a.yaml"), saved(tmp_path / "b.yaml", error=0.02), "--min-fit", 90)
     assert answer.code == 2
     assert "are for runs" in answer.err
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from guide.sameness import ELIDED
-from guide.session import TOUR
+from guide.session import SWAPPED, TOUR
 
 LEARN, CHECK = "demo/runs/learn_*.parquet", ("demo/runs/check_1.2.parquet", "demo/runs/check_1.6.parquet")
 JOINT, LAGGED = "demo/models/joint_yaw.yaml", "demo/models/joint_yaw+servo_lag.yaml"
@@ -88,10 +88,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             "Two models over the same runs: which follows them best.",
             f"sysid compare {JOINT} {LAGGED} demo/runs/check_*.parquet",
         ),
-        Example(
-            "Before and after a swap. Here nothing was swapped: two runs of the same vehicle, an hour apart.",
-            "sysid compare demo/final/speeds/learn_1.4_yaw.yaml demo/models/learn_1.4_yaw.yaml",
-        ),
+        Example("Before and after a swap, here of a payload that costs the rudder 18 % of its authority.", SWAPPED),
     ),
     "simulate": (
         Example(

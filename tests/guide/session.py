@@ -34,6 +34,7 @@ TOUR = "sysid demo -o demo --verbose"
 STEP = re.compile(r"^\d+\. .*\n\$ (?P<line>sysid .*)\n\n(?P<said>(?:.*\n)*?)\n=> ", re.MULTILINE)
 """A step of the tour as it prints it: its heading, its line, what the command says, and what that means."""
 OF_A_SHELL = re.compile(r"[|<>;&$`]")
+SWAPPED = "sysid compare before/pulses_yaw.yaml after/pulses_yaw.yaml"
 CIRCLE_SEED, FIX_M = 7, 0.05
 CONFIG = "# autopilot\ncontrol:\n  heading:\n    speed_m_s: [1.0]\n    kp: [-0.5]\n  depth: {kp: 0.2}  # not ours\n"
 
@@ -99,7 +100,23 @@ def begun(folder: Path) -> Session:
     save_run(circle(), folder / "circle.csv")
     save_model(hidden_vehicle("heave_coupling"), folder / "pitch.yaml")
     (folder / "config.yaml").write_text(CONFIG)
+    for place, share, seed in (("before", 1.0, 11), ("after", 0.82, 12)):
+        swapped(folder / place, share, seed)
     return session
+
+
+def swapped(folder: Path, share: float, seed: int) -> None:
+    """Write the model of a run by the tour's vehicle with a share of its authority."""
+    from dataclasses import replace
+
+    from fieldsid.fitting.identify import identify
+    from fieldsid.models.axis import Axis
+
+    vehicle = hidden_vehicle(HIDDEN)
+    weaker = replace(vehicle, values={**vehicle.values, "b2": share * vehicle.values["b2"]})
+    run = replace(flown(weaker, pick_maneuver("square_pulses"), SPEED, seed), name="pulses")
+    (fit,) = identify([run], Axis.YAW, effects=(HIDDEN,))
+    save_model(fit.model, folder / "pulses_yaw.yaml", inputs=[save_run(run, folder / "pulses.parquet")])
 
 
 def circle() -> Any:

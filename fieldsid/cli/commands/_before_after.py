@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fieldsid.change.record import CHANGED, TRIM_ANGLE, shown
 from fieldsid.cli.console import emit, table, warn
 from fieldsid.errors import UsageError
+from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
     if not axes:
         there = " and ".join(", ".join(s.files) for s in sides)
         raise UsageError("there is no axis with models on both sides", found=there, hint="give two models of one axis")
+    twice = _in_both(sides)
     found = [_compared(sides, axis) for axis in axes]
     drawn = [_drawn(c, (old, new), output if figures else None, force=force) for c in found]
     changes = [
@@ -57,6 +59,8 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
     if not as_json:
         for c in found:
             warn(c.notes, of=c.axis.value)
+        if twice:
+            warn([Note("shared_runs", f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone")])
     return body
 
 
@@ -71,6 +75,19 @@ def _side(path: Path) -> Side:
     state = state_of(path)
     files = {axis: [path / name for name in chosen_models(state, axis)] for axis in ("yaw", "pitch")}
     return Side(path, {axis: names for axis, names in files.items() if names})
+
+
+def _in_both(sides: Sequence[Side]) -> list[str]:
+    """Return the logs that models of both sides were fitted to; raises UsageError where the models themselves are the same."""
+    from fieldsid.artifacts import read_yaml, sha256_of
+
+    files = [[p for names in s.files.values() for p in names] for s in sides]
+    if {sha256_of(p) for p in files[0]} == {sha256_of(p) for p in files[1]}:
+        raise UsageError(
+            "the models of both sides are the same", found=", ".join(map(str, files[0])), hint="identify what was flown after"
+        )
+    logs = [{e["sha256"]: Path(e["path"]).name for p in names for e in read_yaml(p).get("inputs") or ()} for names in files]
+    return sorted(name for digest, name in logs[0].items() if digest in logs[1])
 
 
 def _compared(sides: Sequence[Side], axis: str) -> Change:
