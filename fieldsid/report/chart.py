@@ -78,9 +78,9 @@ def chart(panels: Sequence[Panel], x_label: str, title: str) -> str:
 
 def bars(rows: Sequence[tuple[str, float, str]], title: str, *, mark: tuple[float, str] | None = None) -> str:
     """Return horizontal bars, each with its name and a label, from zero; `mark` is a value drawn as a line with its name."""
-    left, step = 170, 24
+    left, step, right = 186, 24, 112
     most = max([v for _, v, _ in rows] + ([mark[0]] if mark else []), default=1.0) or 1.0
-    scale = (WIDTH - left - 70) / most
+    scale = (WIDTH - left - right) / most
     height = step * len(rows) + 8 + (18 if mark else 0)
     parts = [f'<svg class="bars" viewBox="0 0 {WIDTH} {height}" role="img"><title>{escape(title)}</title>']
     for i, (name, value, label) in enumerate(rows):
