@@ -75,6 +75,17 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             "sysid identify demo/runs/learn_1.4.parquet --axis yaw --method svf_rls -o demo/recursive",
         ),
     ),
+    "live": (
+        Example(
+            "A log replayed without waiting, one look every 10 s; on a terminal it is one table that changes.",
+            "sysid live demo/runs/learn_1.4.parquet --axis yaw --speed 0 --every 10",
+        ),
+        Example(
+            "Lines as a vehicle sends them, up to the moment when there is enough.",
+            'tail -n +2 demo/trial/learn_1.4.csv | head -2; printf \'{"time_s": 0, "rudder_deg": 5, "yaw_deg": 91}\\n\' '
+            "| sysid live - --axis yaw",
+        ),
+    ),
     "compare": (
         Example(
             "On runs the fit has not seen.", f"sysid compare {JOINT} demo/runs/check_*.parquet -o demo/models", head=18, tail=3

@@ -6,7 +6,7 @@ import json
 from functools import cache
 from typing import Any
 
-from guide.shapes import change, diagnosis, fits, gains, logs, planning, rest, turning
+from guide.shapes import change, diagnosis, fits, gains, live, logs, planning, rest, turning
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter
 
@@ -18,6 +18,7 @@ SHAPES: dict[str, Any] = {
     "inspect": logs.Inspection,
     "import": logs.Import,
     "identify": fits.Identify,
+    "live": live.Live,
     "compare": fits.Compare | change.CompareModels | change.CompareSeveral,
     "simulate": logs.Simulation,
     "diagnose": diagnosis.Diagnose,

@@ -5,6 +5,7 @@ from __future__ import annotations
 COMMAND_ORDER: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Before the dive", ("init", "plan")),
     ("The trial so far", ("status",)),
+    ("During the dive", ("live",)),
     ("From log to run", ("inspect", "import")),
     ("From run to model", ("identify", "compare", "simulate")),
     ("The missing effect", ("diagnose", "extend", "history", "effects")),
