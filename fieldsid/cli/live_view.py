@@ -56,7 +56,7 @@ def _parameters(body: Mapping[str, Any]) -> Table:
     for name, p in body["parameters"].items():
         wanted, unit = _error(p["goal_std_error"], p["value"]), in_unit(p["unit"])
         if p["std_error"] is None:
-            made.add_row(name, "-", unit, "-", "-", wanted, "")
+            made.add_row(name, "-", unit, "-", "-", "-", "")
             continue
         band, error = interval(*p["interval95"]), _error(p["std_error"], p["value"])
         state = Text("settled", style="green") if p["settled"] else Text("moving", style="yellow")

@@ -19,7 +19,7 @@ import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_share
-from fieldsid.fitting.regression.recursive_ls import WEIGHT, corrected, noise_of
+from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE, WEIGHT, corrected, noise_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_floor
 from fieldsid.numerics.arrays import FloatArray
@@ -138,7 +138,10 @@ class OnlineIdentifier:
         values = np.array(corrected(fed.memory, fed.packed, noise_of(share)) if share else fed.packed[:4])
         covariance = self._covariance(values, share.gram if share else np.zeros((4, 4)), keep)
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if covariance is not None else np.full(len(keep), nan)
-        known = values[keep] if fed.counts["used"] > 2 * len(keep) else np.full(len(keep), nan)
+        # a direction that nothing has excited keeps its start: P says so, its residual's covariance would be zero
+        excited = fed.packed[[4, 8, 11, 13]][keep] <= MAX_VARIANCE_SHARE * INITIAL_VARIANCE
+        known = np.where(excited & (fed.counts["used"] > 2 * len(keep)), values[keep], nan)
+        errors = np.where(excited & (errors > 0.0), errors, nan)
         counts = {**fed.counts, "spikes": fed.angle_gate.spikes + fed.rate_gate.spikes}
         used = counts.pop("used")
         return OnlineEstimate(

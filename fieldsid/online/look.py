@@ -83,7 +83,7 @@ def said(progress: Progress) -> str:
 
 def _last(progress: Progress) -> str:
     (p,) = (p for p in progress.parameters if p.name == progress.limited_by)
-    return f"{_known(p)}, wanted {_share(p.goal, p.value)}"
+    return f"{_known(p)}, wanted {_share(p.goal, p.value)}" if isfinite(p.std_error) else f"nothing is known of {p.name} yet"
 
 
 def _known(p: ParameterProgress) -> str:

@@ -131,7 +131,7 @@ class Watch:
         if not looks or now.time - looks[-1].time >= LOOK_BACK_S / 20.0:
             looks.append(now)
         known = tuple(self._of(name, now) for name in now.values)
-        wanted = [p for p in known if isfinite(p.goal)] or [p for p in known if p.name in self.goals]
+        wanted = [p for p in known if p.name in self.goals]
         least = min(wanted, key=lambda p: p.share, default=None)
         fin, rate = self.excitation.rms()
         left = self._left(least, now) if least else nan
@@ -158,14 +158,14 @@ class Watch:
         before = then.std_errors[least.name]
         if least.share >= 1.0:
             return 0.0
-        if not (isfinite(before) and isfinite(least.std_error) and now.time > then.time):
+        if not (isfinite(before) and isfinite(least.std_error) and isfinite(least.goal) and now.time > then.time):
             return nan
         gained = least.std_error**-2 - before**-2
         return (now.time - then.time) * (least.goal**-2 - least.std_error**-2) / gained if gained > 0.0 else inf
 
     def _verdict(self, known: tuple[ParameterProgress, ...], share: float, fin: float) -> Verdict:
         if not any(isfinite(p.std_error) for p in known):
-            return "starting"
+            return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "starting"
         if share >= 1.0:
-            return "enough" if all(p.is_settled for p in known if isfinite(p.goal)) else "moving"
+            return "enough" if all(p.is_settled for p in known if p.name in self.goals) else "moving"
         return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "collecting"

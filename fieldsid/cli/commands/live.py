@@ -51,14 +51,14 @@ Want = Annotated[
 ]
 StateFile = Annotated[
     Path | None,
-    typer.Option("--state", metavar="FILE", help="Go on from this file where it is there; saved every 5 s.", show_default=False),
+    typer.Option("--state", metavar="FILE", help="Go on from this file where it is there; saved every second.", show_default=False),
 ]
 Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
 Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
 Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor; 1 forgets nothing.")]
 UntilEnough = Annotated[bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.")]
 
-SAVE_EVERY_S = 5.0
+SAVE_EVERY_S = 1.0
 
 
 def command(

@@ -158,6 +158,13 @@ def test_before_anything_came_there_is_no_estimate():
     assert all(np.isnan(v) for v in now.values.values())
 
 
+def test_of_what_was_not_excited_nothing_is_said():
+    time, fin, angle, rate = flown()
+    now = fed(OnlineIdentifier("yaw"), (time, 0.0 * fin, angle, rate)).estimate()
+    assert np.isnan(now.values["b2"])
+    assert np.isnan(now.std_errors["b2"])
+
+
 def test_forgetting_follows_a_vehicle_that_changes():
     first, then = flown(count=2000), flown(count=2000, seed=2)
     online = OnlineIdentifier("yaw", forgetting=0.995)
