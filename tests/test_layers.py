@@ -18,7 +18,7 @@ PACKAGE = ROOT / "fieldsid"
 ORDER = (
     "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
-    "comparison", "planning", "online", "diagnosis", "extension", "plant", "turning", "schedule", "exports",
+    "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
     "trial_folder", "change", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip

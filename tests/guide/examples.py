@@ -162,6 +162,13 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ),
         Example("In the vehicle's own format.", f"sysid schedule export {GAINS} --to dune"),
     ),
+    "batch": (
+        Example("The runs of a trial.", "sysid batch demo/runs/*.parquet --axis yaw -o demo/batch --no-diagnose --workers 1"),
+        Example(
+            "Once more: what is known is not asked again.",
+            "sysid batch demo/runs/*.parquet --axis yaw -o demo/batch --no-diagnose --workers 1 --trend",
+        ),
+    ),
     "demo": (Example("The tour, here its first two steps and its end.", TOUR, head=58, tail=13),),
     "guide": (
         Example("One page.", "sysid guide schemas/init | head -20"),

@@ -6,7 +6,7 @@ import json
 from functools import cache
 from typing import Any
 
-from guide.shapes import change, diagnosis, fits, gains, live, logs, planning, rest, turning
+from guide.shapes import batch, change, diagnosis, fits, gains, live, logs, planning, rest, turning
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter
 
@@ -32,6 +32,7 @@ SHAPES: dict[str, Any] = {
     "schedule design": gains.Schedule,
     "schedule verify": gains.Verification,
     "schedule export": gains.Export | gains.Patch,
+    "batch": batch.Batch,
     "demo": rest.Demo,
     "guide": rest.Contents | rest.Topic,
 }

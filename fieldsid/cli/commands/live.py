@@ -51,7 +51,7 @@ Want = Annotated[
 ]
 StateFile = Annotated[
     Path | None,
-    typer.Option("--state", metavar="FILE", help="Go on from this file where it is there; saved every second.", show_default=False),
+    typer.Option("--state", metavar="FILE", help="Go on from this file, if there; saved every second.", show_default=False),
 ]
 Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
 Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]

@@ -10,6 +10,7 @@ COMMAND_ORDER: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("From run to model", ("identify", "compare", "simulate")),
     ("The missing effect", ("diagnose", "extend", "history", "effects")),
     ("Turning and gains", ("fit", "turn-radius", "schedule")),
+    ("The archive", ("batch",)),
     ("Tour and manual", ("demo", "guide")),
 )
 """Headings and, under each, the names of its commands."""
