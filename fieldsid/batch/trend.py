@@ -19,7 +19,7 @@ import numpy as np
 
 from fieldsid.batch.rows import Row
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.numerics.arrays import FloatArray, IntArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
 
 FEWEST_RUNS = 6
 SHORTEST_STRETCH = 4
@@ -74,6 +74,9 @@ def trends_of(rows: Sequence[Row], axis: Axis) -> tuple[Trend, ...]:
     speeds = np.array([_number(r.get("speed_m_s")) for r in done])
     middle = float(np.nanmedian(speeds)) if np.isfinite(speeds).any() else float("nan")
     powers = {names.damping: 1.0, names.authority: 2.0, names.trim: 2.0}
+    # files copied at once have one date, and no order
+    if len({r["start_utc"] for r in done}) < FEWEST_RUNS:
+        return ()
     found = (_trend(done, n, speeds, middle, powers.get(n, 0.0)) for n in names.base)
     return tuple(t for t in found if t is not None)
 
@@ -96,7 +99,8 @@ def _trend(rows: Sequence[Row], name: str, speeds: FloatArray, middle: float, po
     kept = [row for row, ok in zip(rows, known, strict=True) if ok]
     x, se = values[known], errors[known]
     weight = 1.0 / (se**2 + tau**2)
-    starts = change_points(x, weight)
+    start = np.array([datetime.fromisoformat(str(r["start_utc"])).timestamp() for r in kept])
+    starts = change_points(x, weight, np.diff(start, prepend=-np.inf) > 0.0)
     edges = [0, *starts.tolist(), x.size]
     parts = [slice(a, b) for a, b in pairwise(edges)]
     means = [float(np.average(x[p], weights=weight[p])) for p in parts]
@@ -105,7 +109,6 @@ def _trend(rows: Sequence[Row], name: str, speeds: FloatArray, middle: float, po
         Change(str(kept[at]["run"]), str(kept[at]["start_utc"]), means[i], means[i + 1], sqrt(variances[i] + variances[i + 1]))
         for i, at in enumerate(starts.tolist())
     )
-    start = np.array([datetime.fromisoformat(str(r["start_utc"])).timestamp() for r in kept])
     level = np.concatenate([np.full(p.stop - p.start, m) for p, m in zip(parts, means, strict=True)])
     return Trend(name, start, x, se, level, middle if power else float("nan"), tau, changes)
 
@@ -132,15 +135,18 @@ def odd_runs(values: FloatArray, spread: FloatArray) -> IntArray:
     return np.flatnonzero(np.abs(values - middle) > ODD * spread)
 
 
-def change_points(values: FloatArray, weight: FloatArray) -> IntArray:
-    """Return the places (k,) at which a series (n,) of inverse variances (n,) takes another value, by optimal partitioning."""
-    n = values.size
+def change_points(values: FloatArray, weight: FloatArray, allowed: BoolArray) -> IntArray:
+    """Return the places (k,) at which a series (n,) of inverse variances (n,) takes another value, by optimal partitioning.
+
+    allowed (n,): where a stretch may begin; runs of one date have no order.
+    """
+    n, allowed = values.size, np.append(allowed, True)
     w, wx, wxx = (np.concatenate([[0.0], np.cumsum(v)]) for v in (weight, weight * values, weight * values**2))
     price = PRICE * float(np.log(n))
     best, last = np.full(n + 1, np.inf), np.zeros(n + 1, dtype=np.intp)
     best[0] = -price
     for end in range(SHORTEST_STRETCH, n + 1):
-        begin = np.arange(0, end - SHORTEST_STRETCH + 1)
+        begin = np.flatnonzero(allowed[: end - SHORTEST_STRETCH + 1])
         cost = wxx[end] - wxx[begin] - (wx[end] - wx[begin]) ** 2 / (w[end] - w[begin])
         total = best[begin] + cost + price
         place = int(np.argmin(total))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from cli import trial
 def archive(tmp_path_factory):
     folder = tmp_path_factory.mktemp("archive")
     for i in range(7):
-        trial.flown(folder, seed=i, name=f"run{i}")
+        os.utime(trial.flown(folder, seed=i, name=f"run{i}"), (1.7e9 + 1e5 * i, 1.7e9 + 1e5 * i))
     (folder / "broken.csv").write_text("time_s,yaw_rad\n0,1\n")
     (folder / "notes.txt").write_text("calm\n")
     return folder

@@ -125,7 +125,9 @@ def command(
     }
     emit(body, as_json=as_json, render=lambda to: _render(to, body))
     if (trend or figure is not None) and not trends:
-        say(f"no trend: fewer than 6 runs know a parameter of {axis.value}")
+        say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
+    if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):
+        say(f"{dated} of {len(rows)} runs have no date in their log: theirs is that of the file's last change")
     if unusable:
         raise typer.Exit(GATE_FAILED)
     return body

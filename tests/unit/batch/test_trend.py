@@ -73,8 +73,16 @@ def test_one_odd_run_is_no_change_and_a_run_that_knows_nothing_is_left_out():
 
 def test_several_changes_are_cut_as_the_least_sum_wants():
     values = np.r_[np.zeros(10), np.full(10, 5.0), np.full(10, -3.0)]
-    assert change_points(values, np.ones(30)).tolist() == [10, 20]
-    assert change_points(np.zeros(30), np.ones(30)).tolist() == []
+    anywhere = np.ones(30, dtype=bool)
+    assert change_points(values, np.ones(30), anywhere).tolist() == [10, 20]
+    assert change_points(np.zeros(30), np.ones(30), anywhere).tolist() == []
+    anywhere[10] = False
+    assert change_points(values, np.ones(30), anywhere).tolist() != [10, 20]
+
+
+def test_runs_of_one_date_have_no_order_and_no_trend():
+    rows = archive(np.r_[np.full(10, -1.2), np.full(10, -0.6)])
+    assert trends_of([row | {"start_utc": DAY.isoformat()} for row in rows], Axis.YAW) == ()
 
 
 def test_few_runs_have_no_trend():
