@@ -46,8 +46,8 @@ class Change:
 
     @property
     def share(self) -> float:
-        """The change as a share of the value before, NaN where that is zero."""
-        return (self.after - self.before) / abs(self.before) if self.before else float("nan")
+        """The change as a share of the value before: -0.18 is 18 % less of it, of either sign; NaN where it was zero."""
+        return (self.after - self.before) / self.before if self.before else float("nan")
 
 
 @dataclass(frozen=True, slots=True)

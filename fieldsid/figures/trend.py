@@ -51,7 +51,7 @@ def draw(trend: Trend, ax: Axes) -> None:
         at = 0.5 * (dates[cut - 1] + dates[cut])
         ax.axvline(at, color=canvas.SIMULATED, linestyle="--", linewidth=1.2, label="_" if i else "change")
         ax.annotate(
-            _by(change.share), (at, 1.0), xycoords=("data", "axes fraction"), xytext=(4, -12), textcoords="offset points",
+            _by(change.share), (at, 0.5), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points",
             fontsize=9, color=canvas.SIMULATED,
         )  # fmt: skip
     at_speed = f" at {trend.speed:.2f} m/s" if isfinite(trend.speed) else ""

@@ -229,9 +229,12 @@ def _said(body: Mapping[str, Any]) -> str:
 
 
 def _render_trend(to: Console, trend: Mapping[str, Any]) -> None:
+    from fieldsid.rounding import number, with_error
+
     for c in trend["changes"]:
-        share = 100.0 * c["share"]
-        error = 100.0 * c["std_error"] / abs(c["before"]) if c["before"] else float("nan")
-        to.print(f"{trend['parameter']} changed by {share:+.0f} +- {error:.0f} % on {c['start_utc'][:10]}, from `{c['run']}` on")
+        by = f"{number(c['after'] - c['before'], 2)} {trend['parameter']}"
+        if c["before"]:
+            by = f"{with_error(100.0 * c['share'], 100.0 * c['std_error'] / abs(c['before']))} %"
+        to.print(f"{trend['parameter']} changed by {by} on {c['start_utc'][:10]}, from `{c['run']}` on", soft_wrap=True)
     if not trend["changes"]:
         to.print(f"{trend['parameter']}: no change beyond errors and scatter in {trend['runs']} runs")

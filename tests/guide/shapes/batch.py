@@ -28,7 +28,7 @@ class TrendChange(Shape):
     std_error: float
     """Standard error of the difference."""
     share: Number
-    """The difference over the size of the mean before."""
+    """The difference over the mean before: -0.18 is 18 % less."""
 
 
 class ParameterTrend(Shape):

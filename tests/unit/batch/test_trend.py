@@ -33,7 +33,7 @@ def test_a_swapped_payload_is_found_on_its_day_with_its_size():
     by_name = {t.name: t for t in trends_of(rows, Axis.YAW)}
     (change,) = by_name["b2"].changes
     assert change.run in {"r29", "r30", "r31"}
-    assert change.share == pytest.approx(0.22 / 1.2, abs=3.0 * change.std_error / 1.2)
+    assert change.share == pytest.approx(-0.22 / 1.2, abs=3.0 * change.std_error / 1.2)
     assert by_name["a22"].changes == ()
 
 
