@@ -101,6 +101,9 @@ def _dispatch(arguments: list[str]) -> int:
 
         sys.stdout.write(install(arguments[1:]))
         return DONE
+    from fieldsid.cli.voice import take
+
+    arguments = take(arguments)
     if os.path.isfile(JOURNAL):  # noqa: PTH113 - no import
         from fieldsid.cli.trial.journaled import run_in_trial
 
