@@ -34,7 +34,7 @@ SUB_ROOMS = {
     "planning": ("specify", "belief", "flight", "safety", "design", "discriminate", "output"),
     "plant": ("laws",),
     "turning": ("measured", "steady"),
-    "cli": ("help", "trial", "commands"),
+    "cli": ("help", "live", "trial", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its
 entry and what its folders share: of them, as of all files, no two import each other by any way round."""

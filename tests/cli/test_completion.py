@@ -7,8 +7,8 @@ import subprocess
 
 import pytest
 
-from fieldsid.cli.completion import PLACES, options, script
 from fieldsid.cli.help.catalogue import entries
+from fieldsid.cli.help.completion import PLACES, options, script
 
 
 def completed(words, folder):

@@ -258,7 +258,7 @@ def _save(state: Path, identifier: OnlineIdentifier, source: str) -> None:
 @contextmanager
 def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
     """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text."""
-    from fieldsid.cli.live_view import line, screen
+    from fieldsid.cli.live.screen import line, screen
 
     if as_json:
         import json
@@ -280,7 +280,7 @@ def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
 
 
 def _end(body: Mapping[str, Any]) -> None:
-    from fieldsid.cli.live_view import final
+    from fieldsid.cli.live.screen import final
 
     if body:
         final(out(), body)
