@@ -10,7 +10,9 @@ import os
 import sys
 from typing import Any
 
-ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "FIELDSID_IS_COPY": "1"}
+from fieldsid.runtime.worker_pool import IS_WORKER
+
+ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", IS_WORKER: "1"}
 """One core for each: the processes share the machine, and none of them makes copies of itself."""
 
 
