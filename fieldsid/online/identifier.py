@@ -5,7 +5,8 @@
     online.estimate().values                       # {"a22": ..., "b2": ..., "C0": ...}
 
 The recursion and its filter are those of `--method svf_rls`; errors allow for the residuals' colour as the block estimate's do,
-the bias of white sensor noise is taken out. NumPy and SciPy are enough: with numba a sample takes 10 us, without 0.1 ms.
+the bias of white sensor noise is taken out. NumPy and SciPy are enough: with numba a sample takes 12 us, without 31 us;
+an estimate takes 0.8 ms.
 """
 
 from __future__ import annotations
