@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from fieldsid.logs import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
+    from fieldsid.online.identifier import OnlineEstimate, OnlineIdentifier
     from fieldsid.schedule import Schedule, Verification
     from fieldsid.turning import Laws, TurnPrediction
 
@@ -48,15 +49,17 @@ _ROOMS = {
     "fieldsid.logs": ("Run",),
     "fieldsid.models.axis": ("Axis",),
     "fieldsid.models.model": ("Model",),
+    "fieldsid.online.identifier": ("OnlineEstimate", "OnlineIdentifier"),
     "fieldsid.schedule": ("Schedule", "Verification"),
     "fieldsid.turning": ("Laws", "TurnPrediction"),
 }
 """Where the names are: the same as above, which is for mypy and editors alone."""
 
 __all__ = [
-    "Axis", "Candidate", "Comparison", "Diagnosis", "Extension", "FieldsidError", "Fit", "Laws", "Model", "Run", "Schedule",
-    "Several", "TurnPrediction", "Verification", "__version__", "compare", "design_schedule", "diagnose", "extend", "fit_laws",
-    "identify", "load", "load_model", "save", "turn_radius", "verify_schedule",
+    "Axis", "Candidate", "Comparison", "Diagnosis", "Extension", "FieldsidError", "Fit", "Laws", "Model", "OnlineEstimate",
+    "OnlineIdentifier", "Run", "Schedule", "Several", "TurnPrediction", "Verification", "__version__", "compare",
+    "design_schedule", "diagnose", "extend", "fit_laws", "identify", "load", "load_model", "save", "turn_radius",
+    "verify_schedule",
 ]  # fmt: skip
 
 

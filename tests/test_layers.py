@@ -18,7 +18,7 @@ PACKAGE = ROOT / "fieldsid"
 ORDER = (
     "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
-    "comparison", "planning", "diagnosis", "extension", "plant", "turning", "schedule", "exports",
+    "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
     "trial_folder", "change", "report", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip
@@ -35,7 +35,7 @@ SUB_ROOMS = {
     "plant": ("laws",),
     "turning": ("measured", "steady", "maneuvering"),
     "schedule": ("flown",),
-    "cli": ("help", "trial", "commands"),
+    "cli": ("help", "live", "trial", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its
 entry and what its folders share: of them, as of all files, no two import each other by any way round."""

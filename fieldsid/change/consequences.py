@@ -60,7 +60,7 @@ def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, fin: F
     plant = families[1].one()
     return GainChange(
         speed, was.gains.kp, now.gains.kp, change, (float((1 + change) * low - 1.0), float((1 + change) * high - 1.0)),
-        least_damping(plant, was.gains), float(margins(plant, was.gains).phase_deg[0]),
+        float(least_damping(plant, was.gains)[0]), float(margins(plant, was.gains).phase_deg[0]),
     )  # fmt: skip
 
 

@@ -96,6 +96,14 @@ def _dispatch(arguments: list[str]) -> int:
 
         sys.stdout.write(f"fieldsid {__version__}\n")
         return DONE
+    if arguments[0] == "--install-completion":
+        from fieldsid.cli.help.completion import install
+
+        sys.stdout.write(install(arguments[1:]))
+        return DONE
+    from fieldsid.cli.voice import take
+
+    arguments = take(arguments)
     if os.path.isfile(JOURNAL):  # noqa: PTH113 - no import
         from fieldsid.cli.trial.journaled import run_in_trial
 

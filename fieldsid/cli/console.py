@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fieldsid.artifacts import plain
+from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
 
 T = TypeVar("T")
@@ -59,15 +60,29 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Renderable
 
 
 def say(text: str) -> None:
-    """Print a message on stderr."""
-    messages().print(Text(text), soft_wrap=True)
+    """Print a message on stderr, unless the command is to be quiet."""
+    if not voice().is_quiet:
+        messages().print(Text(text), soft_wrap=True)
 
 
 def warn(notes: Iterable[Note], *, of: str = "") -> None:
-    """Print warnings on stderr, each with its code."""
-    where = f"{of}: " if of else ""
+    """Print warnings on stderr, each with its code; on a terminal a line each, whole with `-v`; none where it is to be quiet."""
+    if voice().is_quiet:
+        return
+    where, to = f"{of}: " if of else "", messages()
     for note in notes:
-        messages().print(Text(f"warning: {where}{note.message} [{note.code}]", style="yellow"), soft_wrap=True)
+        said = f"{where}{note.message} [{note.code}]"
+        to.print(Text(f"warning: {folded(said, to.width) if to.is_terminal else said}", style="yellow"), soft_wrap=True)
+
+
+def folded(text: str, width: int) -> str:
+    """Return a warning as it fits a line behind `warning: `, its code kept; whole with `-v`."""
+    room = width - len("warning: ")
+    if voice().is_verbose or len(text) <= room:
+        return text
+    words, _, code = text.rpartition(" [")
+    end = f" ... [{code} -v"
+    return f"{words[: max(room - len(end), 20)].rstrip()}{end}"
 
 
 @contextmanager

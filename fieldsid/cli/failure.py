@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shlex
 import sys
@@ -37,8 +38,10 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
         error = UsageError(f"`{error.filename}` cannot be reached: {error.strerror}", hint="check the path and its permissions")
     if isinstance(error, FieldsidError):
         sys.stderr.write(f"error: {error}\n")
+        _print_json(arguments, BAD_INPUT, error.what, error.found, error.hint)
         return BAD_INPUT
     trace = _save_trace(error, arguments)
+    _print_json(arguments, OUR_BUG, f"this is a bug of fieldsid: {type(error).__name__}: {error}", f"the trace is in `{trace}`")
     sys.stderr.write(
         f"error: this is a bug of fieldsid: {type(error).__name__}: {error}\n"
         f"  found: the trace is in `{trace}`\n\nhint: send us that file with the log that caused it\n"
@@ -57,6 +60,17 @@ def tell_refused(errors: Sequence[FieldsidError], raised: Exception | None) -> N
         if not any(error is one for one in printed):
             found, hint = (f"\n  {word}: {said}" if said else "" for word, said in (("found", error.found), ("hint", error.hint)))
             sys.stderr.write(f"warning: {error.what}; it takes no part{found}{hint}\n")
+
+
+def _print_json(arguments: Sequence[str], code: int, what: str, found: str, hint: str = "") -> None:
+    """Print an error on stdout as one JSON object where the command was asked for JSON: who reads that always gets an object."""
+    if "--json" in arguments:
+        body = {"schema": "fieldsid/error/1", "exit_code": code, "what": what, "found": found, "hint": hint}
+        try:
+            sys.stdout.write(json.dumps(body) + "\n")
+            sys.stdout.flush()
+        except OSError:  # standard output itself is what is wrong, and stderr has said so
+            return
 
 
 def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageError:

@@ -16,10 +16,10 @@ import numpy as np
 from fieldsid.dynamics import integrate
 from fieldsid.dynamics.assemble import pieces_for
 from fieldsid.errors import DataError, DivergenceError
-from fieldsid.estimators.svf_ls import base_slots, finished, inverse_of_normal, median_step, parameters_of, regress
+from fieldsid.estimators.svf_ls import base_slots, finished, median_step, parameters_of, regress
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
 from fieldsid.fitting.problem.problem import Problem
-from fieldsid.fitting.regression.bias_compensation import Transfer
+from fieldsid.fitting.regression.bias_compensation import Transfer, inverse_of_normal
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.fitting.regression.svf_equation import RegressionParameters, measured_signals
 from fieldsid.logs.run import Note

@@ -18,7 +18,7 @@ from fieldsid.fitting.predict.predict import refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
 from fieldsid.fitting.problem.parameters import group_name
 from fieldsid.fitting.problem.problem import Problem
-from fieldsid.fitting.regression.bias_compensation import noise_share, transfer_of
+from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_can_go, noise_share, transfer_of
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.fitting.regression.svf_equation import Equation, Measured, RegressionParameters, filtered_equation, measured_signals
 from fieldsid.logs.run import Note
@@ -132,21 +132,6 @@ def without_noise_bias(
         cross += count * own.T @ share.cross
     inverse = inverse_of_normal(normal, gram)
     return np.asarray(found + inverse @ (gram @ found - cross)) if noise_can_go(normal, gram) else found, inverse
-
-
-def noise_can_go(normal: FloatArray, gram: FloatArray) -> bool:
-    """Whether noise, with its share gram (P, P) of a normal matrix (P, P), makes up less than half of every direction."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    least = [float(np.linalg.eigvalsh(m * np.outer(scale, scale))[0]) for m in (normal - gram, normal)]
-    return least[0] > 0.5 * least[1]
-
-
-def inverse_of_normal(normal: FloatArray, gram: FloatArray) -> FloatArray:
-    """Return the inverse of a normal matrix (P, P) with the share of noise taken out of it, where that can be done."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    clean = normal - gram if noise_can_go(normal, gram) else normal
-    inverse = np.linalg.pinv(clean * np.outer(scale, scale), rcond=1e-13, hermitian=True)
-    return np.asarray(inverse * np.outer(scale, scale), dtype=np.float64)
 
 
 def base_slots(problem: Problem) -> dict[str, int]:

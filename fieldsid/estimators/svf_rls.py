@@ -15,14 +15,13 @@ from fieldsid.estimators.svf_ls import (
     bandwidth_notes,
     base_slots,
     finished,
-    inverse_of_normal,
     median_step,
     parameters_of,
     regress,
 )
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.problem import Problem
-from fieldsid.fitting.regression.bias_compensation import NoiseShare, noise_share, transfer_of
+from fieldsid.fitting.regression.bias_compensation import NoiseShare, inverse_of_normal, noise_share, transfer_of
 from fieldsid.fitting.regression.recursive_ls import MEMORY, A, B, C, K, initial_memory, noise_of, sweep
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.fitting.regression.svf_equation import Measured, RegressionParameters, measured_signals

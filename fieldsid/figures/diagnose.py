@@ -87,7 +87,7 @@ def draw(bars: list[Bar], ax: Axes) -> None:
         place = (min(max(error, b.fitted), end), row)
         ax.annotate(words_of(b, error), place, xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
     ax.set_yticks(rows, [fill(b.effect.replace("+", " +"), LABEL_WIDTH) for b in bars], fontsize=9)
-    ax.set_xlim(0.0, 1.65 * end)
+    ax.set_xlim(0.0, 1.95 * end)
     ax.grid(visible=False, axis="y")
     canvas.legend_above(ax, 3)
 
@@ -97,8 +97,8 @@ def words_of(b: Bar, error: float) -> str:
     if b.probability is None:
         return f"{error:.2f} x"
     does = "worse" if b.worse else f"{100 * b.explained:.0f} % explained"
-    return f"{error:.2f} x, {does}, p {_chance(b.probability)}"
+    return f"{error:.2f} x, {does}, probability {_chance(b.probability)}"
 
 
 def _chance(p: float) -> str:
-    return f"= {p:.2f}" if p >= 0.005 else "< 0.01"
+    return f"{p:.2f}" if p >= 0.005 else "below 0.01"

@@ -6,7 +6,7 @@ from math import isfinite
 
 from matplotlib.figure import Figure
 
-from fieldsid.figures import motion, rls
+from fieldsid.figures import correlation, motion, rls
 from fieldsid.fitting.fit import Fit
 from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 from fieldsid.fitting.predict.predict import Prediction
@@ -20,6 +20,12 @@ def figure(fit: Fit, index: int = 0) -> Figure:
     """Return the figure of one of the fit's runs."""
     shown = fit.predictions[index]
     return motion.panels(view_of(shown, fit), heading(fit.model, shown.record.name), facts(fit, shown))
+
+
+def residual_figure(fit: Fit, index: int = 0) -> Figure:
+    """Return the correlations of what the fit leaves of one of its runs."""
+    shown = fit.predictions[index]
+    return correlation.figure(view_of(shown, fit), f"{shown.record.name}, {fit.model.axis.value}: what the model leaves")
 
 
 def history_figure(fit: Fit, history: History) -> Figure:

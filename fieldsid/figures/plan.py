@@ -30,7 +30,7 @@ def draw_command(view: LegFigure, ax: Axes) -> None:
     """Draw the fin in deg, solid where it is commanded, thin where the autopilot is expected to have it."""
     canvas.dress(ax, y=f"{'rudder' if view.axis is Axis.YAW else 'elevator'}, deg", title=view.title)
     fin, ours = np.degrees(view.fin), view.autopilot < 0.5
-    ax.step(view.time, fin, where="post", color="0.6", linewidth=0.9, label="autopilot")
+    ax.step(view.time, fin, where="post", color="0.25", linewidth=0.9, linestyle=":", label="autopilot")
     ax.step(view.time, np.where(ours, fin, np.nan), where="post", color=canvas.SECOND, linewidth=1.6, label="commanded")
     most = float(np.degrees(view.envelope.fin))
     for side in (-most, most):
@@ -60,8 +60,8 @@ def draw_track(view: LegFigure, ax: Axes) -> None:
     """Draw the track in m, seen from above for yaw and from the side for pitch, with draws of the prior behind it."""
     yaw = view.axis is Axis.YAW
     canvas.dress(ax, y="across, m" if yaw else "depth change, m")
-    for along, across in zip(view.tracks[0], view.tracks[1], strict=True):
-        ax.plot(along, across, color=canvas.QUIET, linewidth=0.6)
+    for i, (along, across) in enumerate(zip(view.tracks[0], view.tracks[1], strict=True)):
+        ax.plot(along, across, color=canvas.QUIET, linewidth=0.6, label="_" if i else "draw of the prior")
     ax.plot(view.along, view.across, color=canvas.SIMULATED, linewidth=1.5)
     ax.plot(view.along[:1], view.across[:1], marker="o", color=canvas.SECOND, markersize=5)
     rooms = view.envelope.rooms()
@@ -85,7 +85,7 @@ def save_plan_figure(
         draw(view, row)
     for ax, label in zip(grid[-1], ("time, s", "time, s", "along, m"), strict=True):
         ax.set_xlabel(label)
-    handles = [h for ax in grid[0][:2] for h in ax.get_legend_handles_labels()[0]]
+    handles = [h for ax in grid[0] for h in ax.get_legend_handles_labels()[0]]
     handles.append(Line2D([], [], label="limit", **LIMIT))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=9)
     return canvas.save(figure, path, force=force, tasks=tasks)
@@ -93,4 +93,4 @@ def save_plan_figure(
 
 def _errors(view: LegFigure) -> str:
     """Return the expected errors in words."""
-    return "   ".join(f"{name} {error}" for name, error in view.errors.items())
+    return "std errors bought: " + "  ".join(f"{name} {error}" for name, error in view.errors.items()) if view.errors else ""

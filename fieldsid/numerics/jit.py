@@ -1,4 +1,8 @@
-"""The typed interface to numba: `@jit` compiles a function once and caches it on disk, `@inner` marks what it calls."""
+"""The typed interface to numba: `@jit` compiles a function once and caches it on disk, `@inner` marks what it calls.
+
+On a vehicle's computer without numba functions stay plain Python: the online estimate needs 31 us a sample then. Fits of whole
+logs would take minutes.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +10,27 @@ import sys
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 P = ParamSpec("P")
 R = TypeVar("R")
+HAS_NUMBA = find_spec("numba") is not None
 
 
 def jit(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function compiled by numba, without Python objects, division by zero giving inf as in NumPy."""
+    if not HAS_NUMBA:
+        return function
     numba: Any = import_module("numba")
     return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy")(function))
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function as it is, which functions of `jit` may call: compiled with them, not callable from Python."""
+    if not HAS_NUMBA:
+        return function
     numba: Any = import_module("numba.extending")
     decorator = numba.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
     return cast("Callable[P, R]", decorator(function))

@@ -30,7 +30,8 @@ from fieldsid.runtime.pickling import dumps, loads
 T = TypeVar("T")
 R = TypeVar("R")
 
-_IS_WORKER = "FIELDSID_IS_WORKER"
+IS_WORKER = "FIELDSID_IS_WORKER"
+"""What is set in the environment of a process that makes no copies of itself."""
 END_OF_ANSWER = b"end of answer"
 """The last bytes of a complete answer."""
 MAX_ITEMS = 256
@@ -143,7 +144,7 @@ def _work(work: Callable[[], bytes], target: int, parent: int) -> Never:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:  # it ended before the signal was asked for
             os._exit(0)
-        os.environ[_IS_WORKER] = "1"
+        os.environ[IS_WORKER] = "1"
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
@@ -159,7 +160,7 @@ def can_fork() -> bool:
 
     Another thread may hold a lock that the worker would wait for. The libraries of macOS do not survive a fork.
     """
-    if not sys.platform.startswith("linux") or _IS_WORKER in os.environ:
+    if not sys.platform.startswith("linux") or IS_WORKER in os.environ:
         return False
     return len(os.sched_getaffinity(0)) > 1 and threading.active_count() == 1 and not _fork_warns()
 

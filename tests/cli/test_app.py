@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import resource
 import subprocess
 import sys
@@ -175,3 +176,13 @@ def fastest(*arguments: str) -> float:
 
 def test_help_answers_in_less_than_six_times_a_bare_python():
     assert fastest("-m", "fieldsid", "--help") < 6 * fastest("-c", "pass")
+
+
+def test_an_error_under_json_is_an_object_on_stdout(run_cli, tmp_path):
+    answer = run_cli("identify", tmp_path / "nowhere.csv", "--axis", "yaw", "--json")
+    assert answer.code == 2
+    body = json.loads(answer.out)
+    assert body["schema"] == "fieldsid/error/1"
+    assert body["exit_code"] == 2
+    assert "there is no log" in body["what"]
+    assert "there is no log" in answer.err

@@ -37,7 +37,7 @@ def test_model_and_figure_are_written_beside_each_other_and_the_log_is_untouched
     run = trial.flown(tmp_path)
     before = run.read_bytes()
     body = run_cli("identify", run, "--axis", "yaw", "-o", tmp_path / "models", "--json").json
-    assert sorted(p.name for p in (tmp_path / "models").iterdir()) == ["run7_yaw.png", "run7_yaw.yaml"]
+    assert sorted(p.name for p in (tmp_path / "models").iterdir()) == ["run7_yaw.png", "run7_yaw.yaml", "run7_yaw_residuals.png"]
     assert body["fits"][0]["model"] == str(tmp_path / "models" / "run7_yaw.yaml")
     assert run.read_bytes() == before
     text = (tmp_path / "models" / "run7_yaw.yaml").read_text()

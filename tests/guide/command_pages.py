@@ -20,9 +20,10 @@ from fieldsid.cli.help.command_order import COMMAND_ORDER
 INDEX = """# Commands
 
 In the order of an engineer's day. `sysid COMMAND --help` explains one. Data go to standard output, all else to standard error;
-`--json` prints one JSON object, whose schema is linked on each page. Exit code 0 means done, 1 done but a gate that you asked for
-failed, 2 bad usage or unusable input, 3 a bug of the program (the message says where the trace is). Inputs are never changed, and
-a file that exists is replaced only with `--force`.
+`--json` prints one JSON object, whose schema is linked on each page, or what is wrong as `fieldsid/error/1` with the keys
+exit_code, what, found and hint. Exit code 0 means done, 1 done but a gate that you asked for failed, 2 bad usage or unusable
+input, 3 a bug of the program (the message says where the trace is). Inputs are never changed, and a file that exists is
+replaced only with `--force`.
 
 The output on these pages is real. It comes from the trial that `sysid demo -o demo` makes, whose vehicle hides a slow servo.
 """

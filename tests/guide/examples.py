@@ -76,6 +76,17 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             "sysid identify demo/runs/learn_1.4.parquet --axis yaw --method svf_rls -o demo/recursive",
         ),
     ),
+    "live": (
+        Example(
+            "A log replayed without waiting, one look every 10 s; on a terminal it is one table that changes.",
+            "sysid live demo/runs/learn_1.4.parquet --axis yaw --speed 0 --every 10",
+        ),
+        Example(
+            "Lines as a vehicle sends them, up to the moment when there is enough.",
+            'tail -n +2 demo/trial/learn_1.4.csv | head -2; printf \'{"time_s": 0, "rudder_deg": 5, "yaw_deg": 91}\\n\' '
+            "| sysid live - --axis yaw",
+        ),
+    ),
     "compare": (
         Example(
             "On runs the fit has not seen.", f"sysid compare {JOINT} demo/runs/check_*.parquet -o demo/models", head=18, tail=3
@@ -148,6 +159,13 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
             f"sysid schedule verify {GAINS} --require-phase-margin 30 -o demo/turning/gains.png",
         ),
         Example("In the vehicle's own format.", f"sysid schedule export {GAINS} --to dune"),
+    ),
+    "batch": (
+        Example("The runs of a trial.", "sysid batch demo/runs/*.parquet --axis yaw -o demo/batch --no-diagnose --workers 1"),
+        Example(
+            "Once more: what is known is not asked again.",
+            "sysid batch demo/runs/*.parquet --axis yaw -o demo/batch --no-diagnose --workers 1 --trend",
+        ),
     ),
     "demo": (Example("The tour with all that its commands say, here its first two steps and its end.", TOUR, head=58, tail=13),),
     "guide": (

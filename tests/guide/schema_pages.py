@@ -6,7 +6,7 @@ import json
 from functools import cache
 from typing import Any
 
-from guide.shapes import change, diagnosis, fits, gains, logs, planning, rest, turning
+from guide.shapes import batch, change, diagnosis, fits, gains, live, logs, planning, rest, turning
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter
 
@@ -19,6 +19,7 @@ SHAPES: dict[str, Any] = {
     "inspect": logs.Inspection,
     "import": logs.Import,
     "identify": fits.Identify,
+    "live": live.Live,
     "compare": fits.Compare | change.CompareModels | change.CompareSeveral,
     "simulate": logs.Simulation,
     "diagnose": diagnosis.Diagnose,
@@ -32,6 +33,7 @@ SHAPES: dict[str, Any] = {
     "schedule design": gains.Schedule,
     "schedule verify": gains.Verification,
     "schedule export": gains.Export | gains.Patch,
+    "batch": batch.Batch,
     "demo": rest.Demo,
     "guide": rest.Contents | rest.Topic,
 }

@@ -130,11 +130,12 @@ def _written(
 
 def _draw(fit: Fit, folder: Path, stem: str, tasks: BackgroundTasks, *, force: bool) -> None:
     from fieldsid.figures.canvas import save
-    from fieldsid.figures.identify import figure, history_figure
+    from fieldsid.figures.identify import figure, history_figure, residual_figure
 
     for i, shown in enumerate(fit.predictions):
         name = stem if len(fit.predictions) == 1 else f"{stem}_{shown.record.name}"
         save(figure(fit, i), folder / f"{name}.png", force=force, tasks=tasks)
+        save(residual_figure(fit, i), folder / f"{name}_residuals.png", force=force, tasks=tasks)
     if fit.history is not None:
         save(history_figure(fit, fit.history), folder / f"{stem}_over_time.png", force=force, tasks=tasks)
 

@@ -85,3 +85,18 @@ def noise_share(order: int, bandwidth: float, h: float, angle: float, rate: floa
     gram[:2, :2] = angle**2 * rows @ rows.T
     cross[:2] = angle**2 * rows @ target
     return NoiseShare(gram, cross)
+
+
+def noise_can_go(normal: FloatArray, gram: FloatArray) -> bool:
+    """Whether noise, with its share gram (P, P) of a normal matrix (P, P), makes up less than half of every direction."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    least = [float(np.linalg.eigvalsh(m * np.outer(scale, scale))[0]) for m in (normal - gram, normal)]
+    return least[0] > 0.5 * least[1]
+
+
+def inverse_of_normal(normal: FloatArray, gram: FloatArray) -> FloatArray:
+    """Return the inverse of a normal matrix (P, P) with the share of noise taken out of it, where that can be done."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    clean = normal - gram if noise_can_go(normal, gram) else normal
+    inverse = np.linalg.pinv(clean * np.outer(scale, scale), rcond=1e-13, hermitian=True)
+    return np.asarray(inverse * np.outer(scale, scale), dtype=np.float64)

@@ -189,6 +189,12 @@ def initial_memory(*, stiff: bool) -> FloatArray:
     return s
 
 
+def forget_filter(m: FloatArray) -> None:
+    """Let the filter begin anew at the next sample, as after a gap: what was estimated, its weight and its errors stay."""
+    m[:SQUARES] = 0.0
+    m[[LAST_ERROR, H, NEXT_REFRESH]] = 0.0
+
+
 def plain_update(
     theta: FloatArray, big: FloatArray, phi: FloatArray, target: float, beta: float
 ) -> tuple[FloatArray, FloatArray]:

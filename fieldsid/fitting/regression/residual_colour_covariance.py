@@ -40,16 +40,25 @@ def colour_of(parts: Sequence[FloatArray]) -> ResidualColour:
     count = sum(p.size for p in parts)
     highest = max(1, min(MAX_AR_ORDER, min(p.size for p in parts) // 10, count // 20))
     power = np.array([sum(float(p[lag:] @ p[: p.size - lag]) for p in parts) / count for lag in range(highest + 1)])
+    return autoregression(power, count)
+
+
+def autoregression(power: FloatArray, count: float, price: float | None = None) -> ResidualColour:
+    """Return the autoregression of a series of `count` samples with autocovariances (order + 1,), by Levinson's recursion.
+
+    Its order is chosen by the fit and a price per coefficient: Schwarz's log(count) without one, 2 is Akaike's.
+    """
+    price = float(np.log(count)) if price is None else price
     if power[0] <= 0.0:
         return ResidualColour(np.ones(1), 0.0, 0.0)
     best, least = ResidualColour(np.ones(1), float(power[0]), float(power[0])), count * float(np.log(power[0]))
     a, left = np.ones(1), float(power[0])
-    for order in range(1, highest + 1):
+    for order in range(1, power.size):
         reflection = -float(a @ power[order:0:-1][: a.size]) / left
         longer = np.append(a, 0.0)
         a = longer + reflection * longer[::-1]
         left *= max(1.0 - reflection * reflection, 1e-12)
-        score = count * float(np.log(left)) + order * float(np.log(count))
+        score = count * float(np.log(left)) + order * price
         if score < least:
             best, least = ResidualColour(a, left, float(power[0])), score
     return best

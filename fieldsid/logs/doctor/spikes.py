@@ -42,11 +42,9 @@ def spikes_of(values: FloatArray) -> Spikes:
     none = Spikes(np.zeros(0, dtype=np.intp), np.zeros(0), float("inf"))
     if values.size < FEWEST:
         return none
-    bend = np.diff(values, 2)
-    usual = float(np.median(np.abs(bend))) or float(np.mean(np.abs(bend)))
-    if usual == 0.0:
+    bend, limit = np.diff(values, 2), spike_limit(values)
+    if not np.isfinite(limit):
         return none
-    limit = max(SPREADS * OF_MEDIAN * 0.5 * usual, DIGITS * last_digit(values))
     before, middle, after = bend[:-2], -0.5 * bend[1:-1], bend[2:]
     sign = np.sign(middle)
     alone = np.minimum(np.minimum(before * sign, after * sign), np.abs(middle)) > limit
@@ -54,6 +52,14 @@ def spikes_of(values: FloatArray) -> Spikes:
     if places.size > max(FEW * values.size, 1.0):
         return none
     return Spikes(places + 2, np.abs(middle[places]), limit)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def spike_limit(values: FloatArray) -> float:
+    """Return the distance from all three lines beyond which a sample of a signal (n,) is a spike; inf where it never bends."""
+    bend = np.abs(np.diff(values, 2))
+    usual = float(np.median(bend)) or float(np.mean(bend))
+    return max(SPREADS * OF_MEDIAN * 0.5 * usual, DIGITS * last_digit(values)) if usual else float("inf")
 
 
 def last_digit(values: FloatArray) -> float:

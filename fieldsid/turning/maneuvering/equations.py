@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
@@ -89,7 +90,7 @@ def simulate(
     p: FloatArray,
     straight: float,
     first: FloatArray,
-    begins: FloatArray,
+    begins: npt.NDArray[np.int64],
     time: FloatArray,
     fin: FloatArray,
     thrust: FloatArray,

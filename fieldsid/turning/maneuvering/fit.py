@@ -27,7 +27,7 @@ LEAST_NOISE = np.array([1e-3, 1e-3, 2e-4, 2e-4])
 SWAY_BIAS_SD = 0.02
 """m/s: what a Doppler log may be off by across the hull."""
 START_SD = 0.3
-"""Prior of a segment's first state about the one measured: m/s, and rad/s."""
+"""Prior of a segment's first state and of the straight speed about those measured: m/s, and rad/s."""
 FIRST_SEGMENT_S = 6.0
 LEAST_SEGMENT_S, SEGMENT_LENGTHS = 12.0, 3.0
 """Segments are this long, s, or the way of so many hulls: what the water does to the vehicle is forgotten at the next one."""
@@ -68,13 +68,17 @@ class Fitted:
 def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
     """Fit the coefficients to runs; `length` of the vehicle in m where it is known."""
     mean, covariance = prior(length)
-    found = _Problem(tuple(runs), FIRST_SEGMENT_S, mean, np.linalg.inv(covariance)).solved(mean, FIRST_NOISE, keep_noise=True)
+    found = _Problem(tuple(runs), FIRST_SEGMENT_S, mean, _inverse(covariance)).solved(mean, FIRST_NOISE, keep_noise=True)
     best, speed = coefficients(found.vector), float(np.median([r.speed for r in runs]))
     growth = growth_rate(best, speed)
     segment = max(LEAST_SEGMENT_S, SEGMENT_LENGTHS * float(best[0]) / speed)
     if growth > 0.0:
         segment = min(segment, max(LONGEST_GROWTH / growth, SHORTEST_SEGMENT_S))
-    return _Problem(tuple(runs), segment, mean, np.linalg.inv(covariance)).solved(found.vector, found.noise, keep_noise=False)
+    return _Problem(tuple(runs), segment, mean, _inverse(covariance)).solved(found.vector, found.noise, keep_noise=False)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
 def _first_local(run: FlownRun, begins: npt.NDArray[np.int64]) -> FloatArray:
@@ -116,9 +120,9 @@ def _misfit(run: FlownRun, vector: FloatArray, local: FloatArray, begins: npt.ND
 
 
 def _local_prior(run: FlownRun, local: FloatArray, begins: npt.NDArray[np.int64]) -> FloatArray:
-    """Return the weighted distances of a run's nuisances from what is believed of them, (2 + 3 m,)."""
+    """Return the weighted distances of a run's nuisances from what is believed of them, (3 + 3 m,)."""
     states = (local[OWN:].reshape(-1, 3) - _measured_states(run, begins)) / START_SD
-    return np.concatenate([local[1:OWN] / _bias_sd(run), states.ravel()])
+    return np.concatenate([[(local[0] - run.speed) / START_SD], local[1:OWN] / _bias_sd(run), states.ravel()])
 
 
 def _bias_sd(run: FlownRun) -> FloatArray:
@@ -164,7 +168,7 @@ class _Problem:
         parts = [self._normal(r, vector, l, b, noise) for r, l, b in zip(self.runs, local, begins, strict=True)]
         information = self.precision + sum(p.profiled for p in parts)
         return Fitted(
-            vector, np.linalg.inv(information), self.runs, self.segment_s, noise, tuple(local),
+            vector, _inverse(information), self.runs, self.segment_s, noise, tuple(local),
             tuple(p.response for p in parts), self.mean, self.precision, cost,
         )  # fmt: skip
 
@@ -200,11 +204,9 @@ class _Problem:
                 own[of_sample == k, OWN + 3 * k + j] = column[of_sample == k]
         shared = np.stack(columns, axis=1)
         gradient = base[ok]
-        weight = np.zeros(local.size)
+        weight = np.full(local.size, 1.0 / START_SD)
         weight[1:OWN] = 1.0 / _bias_sd(run)
-        weight[OWN:] = 1.0 / START_SD
-        pull = np.zeros(local.size)
-        pull[1:] = _local_prior(run, local, begins) * weight[1:]
+        pull = _local_prior(run, local, begins) * weight
         return _Normal(
             shared.T @ shared, own.T @ shared, own.T @ own + np.diag(weight**2), shared.T @ gradient, own.T @ gradient + pull
         )
@@ -259,5 +261,5 @@ def _step(
         matrix += p.shared - p.cross.T @ inverse[:, :-1]
         gradient += p.shared_gradient - p.cross.T @ inverse[:, -1]
     matrix += damping * np.diag(np.diag(matrix))
-    step = -np.linalg.solve(matrix, gradient)
+    step = np.asarray(-np.linalg.solve(matrix, gradient), dtype=np.float64)
     return step, [-(s[:, :-1] @ step + s[:, -1]) for s in solved]

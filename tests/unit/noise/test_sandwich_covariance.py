@@ -9,10 +9,9 @@ from truth.logbook import flown
 from truth.noise import Clock
 from truth.paper import DEG, YAW, physics_of
 
-from fieldsid.estimators.svf_ls import inverse_of_normal
 from fieldsid.fitting.fit import Fit, fit
 from fieldsid.fitting.optimise.levenberg_marquardt import covariance, sandwich
-from fieldsid.fitting.regression.bias_compensation import Transfer
+from fieldsid.fitting.regression.bias_compensation import Transfer, inverse_of_normal
 from fieldsid.fitting.regression.residual_colour_covariance import Series, coloured_covariance
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis

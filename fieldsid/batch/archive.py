@@ -1,0 +1,74 @@
+"""A batch as a folder: the answer of each log in a file of its own as soon as it is there, and the table of them all.
+
+A batch that was stopped goes on where it was: what is answered is not asked again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+
+from fieldsid._version import __version__
+from fieldsid.artifacts import plain, replacing, write_text
+from fieldsid.batch.rows import Row, columns
+from fieldsid.batch.task import Task
+from fieldsid.models.axis import Axis
+
+SCHEMA = "fieldsid/batch-log/1"
+ANSWERS = "logs"
+
+Work = Callable[[Sequence[Task]], Iterator[tuple[Task, list[Row]]]]
+
+
+def known_rows(folder: Path, task: Task) -> list[Row] | None:
+    """Return the rows that an earlier batch found for a task, None where it has none or failed at it."""
+    path = _answer(folder, task)
+    try:
+        body = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    rows = body.get("rows") if isinstance(body, dict) and body.get("schema") == SCHEMA else None
+    if not isinstance(rows, list) or not rows or any(r.get("status") == "failed" for r in rows):
+        return None
+    return rows
+
+
+def all_rows(folder: Path, tasks: Sequence[Task], work: Work, done: Callable[[], None]) -> tuple[list[Row], int]:
+    """Return the rows of all tasks in their order, those that are not known worked out and kept, and how many logs were known."""
+    found = {task: rows for task in tasks if (rows := known_rows(folder, task)) is not None}
+    known = len(found)
+    for _ in range(known):
+        done()
+    for task, rows in work([task for task in tasks if task not in found]):
+        body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", "task": task.plain(), "rows": plain(rows)}
+        write_text(_answer(folder, task), json.dumps(body, allow_nan=False), force=True)
+        found[task] = rows
+        done()
+    return [row for task in tasks for row in found[task]], known
+
+
+def write_table(folder: Path, axis: Axis, rows: Iterable[Row]) -> tuple[Path, Path]:
+    """Write the table as Parquet and as CSV, both whole or not at all; raises ArtifactError."""
+    import pandas as pd
+
+    names = columns(axis)
+    frame = pd.DataFrame([{n: row.get(n) for n in names} for row in rows], columns=list(names))
+    words = {n for n in names if n in _WORDS}
+    frame = frame.astype({n: "string" if n in words else "float64" for n in names})
+    parquet, table = folder / f"batch_{axis.value}.parquet", folder / f"batch_{axis.value}.csv"
+    with replacing(parquet, force=True) as temporary:
+        frame.to_parquet(temporary, index=False)
+    with replacing(table, force=True) as temporary:
+        frame.to_csv(temporary, index=False)
+    return parquet, table
+
+
+_WORDS = frozenset(
+    ("log", "run", "status", "start_utc", "time_from", "verdict", "effects", "method", "findings", "warnings", "says", "what",
+     "found", "hint", "sha256", "tool")
+)  # fmt: skip
+
+
+def _answer(folder: Path, task: Task) -> Path:
+    return folder / ANSWERS / f"{task.key}.json"

@@ -1,0 +1,162 @@
+"""Parameters over months: what they would be at one speed, and where they changed beyond their errors and the runs' own scatter.
+
+Damping goes with u and authority with u^2, so that runs at other speeds are carried to the middle one. Changes are found by
+optimal partitioning: among all ways to cut the series into stretches of constant value that of the least
+    sum (x - mean)^2 / (se^2 + tau^2) + 3 log(n) per change
+is taken; tau, the scatter from run to run beyond the stated errors, is estimated from differences of neighbours, which a change
+hardly enters. Source: Jackson et al. 2005, IEEE Signal Processing Letters 12(2); Killick, Fearnhead and Eckley 2012, JASA 107.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import pairwise
+from math import isfinite, sqrt
+
+import numpy as np
+
+from fieldsid.batch.rows import Row
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.numerics.arrays import BoolArray, FloatArray, IntArray
+
+FEWEST_RUNS = 6
+SHORTEST_STRETCH = 4
+"""Runs on either side of a change: fewer are odd runs, not a change."""
+ODD_WINDOW, ODD = 7, 5.0
+"""Runs whose median a run is compared with, and standard deviations beyond which it is odd and left out (Hampel's rule)."""
+PRICE = 3.0
+"""Times log(n) that a change must gain: Schwarz's price of its mean and its place, and one more for the places searched."""
+OF_MEDIAN = 2.198
+"""Variance over the median of its squared normal deviates."""
+LARGEST_RELATIVE_ERROR = 0.5
+"""Standard error, as a share of the value's usual size, above which a run says nothing of a parameter's trend."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of a parameter: the first run after it and its start, means before and after, standard error of the difference."""
+
+    run: str
+    start_utc: str
+    before: float
+    after: float
+    std_error: float
+
+    @property
+    def share(self) -> float:
+        """The change as a share of the value before: -0.18 is 18 % less of it, of either sign; NaN where it was zero."""
+        return (self.after - self.before) / self.before if self.before else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """One parameter over the runs in the order of their starts, (n,): values and errors at one speed, stretches' means, changes.
+
+    `speed` is that speed in m/s (NaN where unknown), `scatter` tau.
+    """
+
+    name: str
+    start: FloatArray
+    values: FloatArray
+    std_errors: FloatArray
+    means: FloatArray
+    speed: float
+    scatter: float
+    changes: tuple[Change, ...]
+
+
+def trends_of(rows: Sequence[Row], axis: Axis) -> tuple[Trend, ...]:
+    """Return the trend of each base parameter of an axis that enough runs know."""
+    names = NAMES[axis]
+    done = sorted((r for r in rows if r.get("status") == "done"), key=lambda r: str(r["start_utc"]))
+    speeds = np.array([_number(r.get("speed_m_s")) for r in done])
+    middle = float(np.nanmedian(speeds)) if np.isfinite(speeds).any() else float("nan")
+    powers = {names.damping: 1.0, names.authority: 2.0, names.trim: 2.0}
+    # files copied at once have one date, and no order
+    if len({r["start_utc"] for r in done}) < FEWEST_RUNS:
+        return ()
+    found = (_trend(done, n, speeds, middle, powers.get(n, 0.0)) for n in names.base)
+    return tuple(t for t in found if t is not None)
+
+
+def _trend(rows: Sequence[Row], name: str, speeds: FloatArray, middle: float, power: float) -> Trend | None:
+    values = np.array([_number(r.get(name)) for r in rows])
+    errors = np.array([_number(r.get(f"{name}_std_error")) for r in rows])
+    if power and isfinite(middle):
+        factor = (middle / speeds) ** power
+        values, errors = values * factor, errors * factor
+    known = np.isfinite(values) & np.isfinite(errors) & (errors > 0.0)
+    if known.sum() < FEWEST_RUNS:
+        return None
+    size = float(np.median(np.abs(values[known])))
+    known &= errors <= max(LARGEST_RELATIVE_ERROR * size, 3.0 * float(np.median(errors[known])))
+    if known.sum() < FEWEST_RUNS:
+        return None
+    tau = scatter_of(values[known], errors[known])
+    known[np.flatnonzero(known)[odd_runs(values[known], np.hypot(errors[known], tau))]] = False
+    kept = [row for row, ok in zip(rows, known, strict=True) if ok]
+    x, se = values[known], errors[known]
+    weight = 1.0 / (se**2 + tau**2)
+    start = np.array([datetime.fromisoformat(str(r["start_utc"])).timestamp() for r in kept])
+    starts = change_points(x, weight, np.diff(start, prepend=-np.inf) > 0.0)
+    edges = [0, *starts.tolist(), x.size]
+    parts = [slice(a, b) for a, b in pairwise(edges)]
+    means = [float(np.average(x[p], weights=weight[p])) for p in parts]
+    variances = [1.0 / float(weight[p].sum()) for p in parts]
+    changes = tuple(
+        Change(str(kept[at]["run"]), str(kept[at]["start_utc"]), means[i], means[i + 1], sqrt(variances[i] + variances[i + 1]))
+        for i, at in enumerate(starts.tolist())
+    )
+    level = np.concatenate([np.full(p.stop - p.start, m) for p, m in zip(parts, means, strict=True)])
+    return Trend(name, start, x, se, level, middle if power else float("nan"), tau, changes)
+
+
+def scatter_of(values: FloatArray, std_errors: FloatArray) -> float:
+    """Return the scatter from run to run beyond the stated errors, from the median squared difference of neighbours."""
+    squares = np.diff(values) ** 2
+    stated = std_errors[1:] ** 2 + std_errors[:-1] ** 2
+    # the median of squares over what they would be with tau: bisected, for the errors differ from run to run
+    low, high = 0.0, float(np.sqrt(squares.max(initial=0.0)))
+    if OF_MEDIAN * float(np.median(squares / stated)) <= 1.0:
+        return 0.0
+    for _ in range(60):
+        tau = 0.5 * (low + high)
+        low, high = (tau, high) if OF_MEDIAN * float(np.median(squares / (stated + 2.0 * tau * tau))) > 1.0 else (low, tau)
+    return high
+
+
+def odd_runs(values: FloatArray, spread: FloatArray) -> IntArray:
+    """Return the places (k,) of values (n,) far from the median of those about them, in their standard deviations (n,)."""
+    half = ODD_WINDOW // 2
+    padded = np.pad(values, half, mode="reflect")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, ODD_WINDOW), axis=1)
+    return np.flatnonzero(np.abs(values - middle) > ODD * spread)
+
+
+def change_points(values: FloatArray, weight: FloatArray, allowed: BoolArray) -> IntArray:
+    """Return the places (k,) at which a series (n,) of inverse variances (n,) takes another value, by optimal partitioning.
+
+    allowed (n,): where a stretch may begin; runs of one date have no order.
+    """
+    n, allowed = values.size, np.append(allowed, True)
+    w, wx, wxx = (np.concatenate([[0.0], np.cumsum(v)]) for v in (weight, weight * values, weight * values**2))
+    price = PRICE * float(np.log(n))
+    best, last = np.full(n + 1, np.inf), np.zeros(n + 1, dtype=np.intp)
+    best[0] = -price
+    for end in range(SHORTEST_STRETCH, n + 1):
+        begin = np.flatnonzero(allowed[: end - SHORTEST_STRETCH + 1])
+        cost = wxx[end] - wxx[begin] - (wx[end] - wx[begin]) ** 2 / (w[end] - w[begin])
+        total = best[begin] + cost + price
+        place = int(np.argmin(total))
+        best[end], last[end] = total[place], begin[place]
+    places, end = [], n
+    while last[end] > 0:
+        end = int(last[end])
+        places.append(end)
+    return np.array(places[::-1], dtype=np.intp)
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, (int, float)) else float("nan")

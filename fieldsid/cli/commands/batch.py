@@ -1,0 +1,240 @@
+"""sysid batch: an archive of logs, each identified and diagnosed: one table with a row for each run."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import emit, progress, say
+from fieldsid.cli.exit_codes import GATE_FAILED
+from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, VehicleFile
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fieldsid.batch.archive import Work
+    from fieldsid.batch.trend import Trend
+    from fieldsid.models.axis import Axis
+
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs, and folders of logs; runs that were imported, too.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the table and of each log's answer.")]
+Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
+Diagnose = Annotated[bool, typer.Option("--diagnose/--no-diagnose", help="Ask of each run which effect is missing.")]
+Whole = Annotated[bool, typer.Option("--whole", help="Take logs as one run each, and use all of it.")]
+Workers = Annotated[
+    int | None, typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; one a core.", show_default=False)
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="tcp://...", help="Work on this Dask cluster (extra `cluster`).", show_default=False),
+]
+Timeout = Annotated[float, typer.Option("--timeout", metavar="S", min=0.1, help="Longest time for one log.")]
+Memory = Annotated[float, typer.Option("--memory", metavar="MB", min=100.0, help="Most memory of one process.")]
+WithTrend = Annotated[bool, typer.Option("--trend", help="Say and draw where parameters changed over the runs' dates.")]
+
+MOST_REASONS, MOST_NAMED = 8, 4
+
+
+def command(
+    logs: Logs,
+    axis: AxisOption,
+    output: Folder = Path("batch"),
+    method: Method = "auto",
+    diagnose: Diagnose = True,
+    whole: Whole = False,
+    trend: WithTrend = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    timeout: Timeout = 600.0,
+    memory: Memory = 4000.0,
+    mapping: MappingFile = None,
+    vehicle: VehicleFile = None,
+    figure: FigureFile = None,
+    force: Force = False,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Inspect, import, identify and diagnose every log of an archive: one table with a row for each run, Parquet and CSV.
+
+    The same line again goes on where it was stopped; logs that are new or changed are added. A log that cannot be used is a row
+    that says why, and the exit code is 1.
+
+    Example: sysid batch archive/ --axis yaw -o batch/ --trend
+    """
+    from fieldsid.batch.archive import all_rows, write_table
+    from fieldsid.batch.task import Settings, Task, logs_in
+    from fieldsid.cli.inputs import mapping_of
+    from fieldsid.cli.progress import refuse_closed, refuse_figure
+
+    refuse_closed(output)
+    drawn = figure or (output / f"trend_{axis.value}.png" if trend else None)
+    refuse_figure(figure, force=force)
+    found = _logs(logs_in(logs), output)
+    mapping_of(mapping)
+    if vehicle is not None:
+        from fieldsid.vehicle import load_vehicle
+
+        load_vehicle(vehicle)
+    settings = Settings(
+        axis.value, method, diagnose, whole, *(None if p is None else str(p.resolve()) for p in (mapping, vehicle))
+    )
+    tasks = [Task(str(log), settings) for log in found]
+    work, where = _work(workers, scheduler, timeout, memory)
+    begin = time.monotonic()
+    with progress("logs", len(tasks)) as step:
+        rows, known = all_rows(output, tasks, work, step)
+    parquet, table = write_table(output, axis, rows)
+    trends = _trends(rows, axis) if trend or figure is not None else ()
+    if drawn is not None and trends:
+        from fieldsid.figures.canvas import save
+        from fieldsid.figures.trend import figure as trend_figure
+
+        save(trend_figure(trends, axis.value), drawn, force=force or figure is None)
+    unusable = [row for row in rows if row["status"] != "done"]
+    body = {
+        "schema": "fieldsid/batch/1",
+        "axis": axis.value,
+        "logs": len(tasks),
+        "known_logs": known,
+        "runs": len(rows) - len(unusable),
+        "table": str(parquet),
+        "csv": str(table),
+        "where": where,
+        "seconds": time.monotonic() - begin,
+        "verdicts": dict(Counter(r["verdict"] for r in rows if r.get("verdict")).most_common()),
+        "effects": dict(Counter(r["effects"] for r in rows if r.get("effects")).most_common()),
+        "skipped_runs": [
+            {
+                "run": r["run"],
+                "file": r["log"],
+                "status": r["status"],
+                **{k: str(r.get(k) or "") for k in ("what", "found", "hint")},
+            }
+            for r in unusable
+        ],
+        "trend": [_of_trend(t) for t in trends],
+        "figure": str(drawn) if drawn is not None and trends else None,
+        "next": _next(logs, axis, output, trend=trend),
+    }
+    emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    if (trend or figure is not None) and not trends:
+        say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
+    if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):
+        say(f"{dated} of {len(rows)} runs have no date in their log: theirs is that of the file's last change")
+    if unusable:
+        raise typer.Exit(GATE_FAILED)
+    return body
+
+
+def _logs(found: Sequence[Path], output: Path) -> list[Path]:
+    """Return the logs without what an earlier batch has written among them; raises UsageError where none is left."""
+    from fieldsid.errors import UsageError
+
+    own = output.resolve()
+    left = [log for log in found if own not in log.resolve().parents]
+    if not left:
+        raise UsageError("there are no logs here", found="no files", hint="name logs, or a folder that holds some")
+    return left
+
+
+def _work(workers: int | None, scheduler: str | None, timeout: float, memory: float) -> tuple[Work, str]:
+    """Return what works on tasks, and where that is in words."""
+    from functools import partial
+
+    if scheduler is not None:
+        from fieldsid.batch.dask_cluster import run_on_cluster
+
+        return partial(run_on_cluster, scheduler=scheduler), scheduler
+    from fieldsid.batch.local_pool import run_here
+
+    count = workers or _cores()
+    said = f"{count} process{'es' * (count != 1)} of this machine"
+    return partial(run_here, workers=count, timeout_s=timeout, memory_mb=memory), said
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if sys.platform.startswith("linux") else os.cpu_count() or 1
+
+
+def _trends(rows: Sequence[Mapping[str, Any]], axis: Axis) -> tuple[Trend, ...]:
+    from fieldsid.batch.trend import trends_of
+
+    return trends_of([dict(r) for r in rows], axis)
+
+
+def _of_trend(trend: Trend) -> dict[str, Any]:
+    return {
+        "parameter": trend.name,
+        "runs": trend.values.size,
+        "speed_m_s": trend.speed,
+        "scatter": trend.scatter,
+        "changes": [
+            {
+                "run": c.run,
+                "start_utc": c.start_utc,
+                "before": c.before,
+                "after": c.after,
+                "std_error": c.std_error,
+                "share": c.share,
+            }
+            for c in trend.changes
+        ],
+    }
+
+
+def _next(logs: Sequence[Path], axis: Axis, output: Path, *, trend: bool) -> str:
+    """Return the line that shows the trend, once there is a table; nothing after it."""
+    if trend:
+        return ""
+    if len(logs) > MOST_NAMED:
+        return "the same line with `--trend`"
+    return shlex.join(["sysid", "batch", *map(str, logs), "--axis", axis.value, "-o", str(output), "--trend"])
+
+
+def _render(to: Console, body: Mapping[str, Any]) -> None:
+    from rich.text import Text
+
+    bad = body["skipped_runs"]
+    to.print(Text(f"{body['runs']} runs identified, {len(bad)} not; {_said(body)}", style="bold"), soft_wrap=True)
+    known = f", {body['known_logs']} of them known" if body["known_logs"] else ""
+    to.print(f"{body['logs']} logs{known}, {body['seconds']:.1f} s on {body['where']}", soft_wrap=True)
+    for t in body["trend"]:
+        _render_trend(to, t)
+    why: dict[str, list[str]] = {}
+    for row in bad:
+        why.setdefault(row["what"].replace(row["file"], "LOG").replace(row["run"], "RUN"), []).append(row["run"])
+    for reason, runs in list(why.items())[:MOST_REASONS]:
+        more = f" and {len(runs) - 1} more" if len(runs) > 1 else ""
+        to.print(Text(f"not used: {runs[0]}{more}: {reason}"), soft_wrap=True)
+    if len(why) > MOST_REASONS:
+        to.print(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
+    to.print(f"table: {body['table']} and {body['csv']}", soft_wrap=True)
+    if body["figure"]:
+        to.print(f"figure: {body['figure']}", soft_wrap=True)
+    if body["next"]:
+        to.print(f"next: {body['next']}", soft_wrap=True)
+
+
+def _said(body: Mapping[str, Any]) -> str:
+    verdicts = ", ".join(f"{count} {name}" for name, count in body["verdicts"].items())
+    effects = ", ".join(f"{name} {count}" for name, count in list(body["effects"].items())[:4])
+    return (verdicts or "not diagnosed") + (f" ({effects})" if effects else "")
+
+
+def _render_trend(to: Console, trend: Mapping[str, Any]) -> None:
+    from fieldsid.rounding import number, with_error
+
+    for c in trend["changes"]:
+        by = f"{number(c['after'] - c['before'], 2)} {trend['parameter']}"
+        if c["before"]:
+            by = f"{with_error(100.0 * c['share'], 100.0 * c['std_error'] / abs(c['before']))} %"
+        to.print(f"{trend['parameter']} changed by {by} on {c['start_utc'][:10]}, from `{c['run']}` on", soft_wrap=True)
+    if not trend["changes"]:
+        to.print(f"{trend['parameter']}: no change beyond errors and scatter in {trend['runs']} runs")

@@ -1,0 +1,286 @@
+"""sysid live: the recursive estimate as the vehicle flies, and "enough data, come up"."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fieldsid.cli.console import out, say
+from fieldsid.cli.exit_codes import GATE_FAILED
+from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile
+from fieldsid.errors import UsageError
+
+if TYPE_CHECKING:
+    from fieldsid.online.identifier import OnlineIdentifier
+    from fieldsid.online.progress import Goal
+    from fieldsid.online.samples import MessageReader, Sample
+
+Log = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="LOG", help="A log to replay or follow; `-` reads JSON lines from standard input.", show_default=False
+    ),
+]
+Factor = Annotated[
+    float, typer.Option("--speed", metavar="FACTOR", min=0.0, help="How many times as fast as logged to replay; 0 does not wait.")
+]
+Follow = Annotated[bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.")]
+Port = Annotated[
+    int | None,
+    typer.Option("--udp", metavar="PORT", min=1, max=65535, help="Take JSON lines as UDP on this machine.", show_default=False),
+]
+Idle = Annotated[
+    float | None,
+    typer.Option("--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False),
+]
+PlanFile = Annotated[
+    Path | None,
+    typer.Option("--plan", metavar="YAML", help="The accuracy to reach is what this plan promised.", show_default=False),
+]
+Want = Annotated[
+    str | None,
+    typer.Option("--want", metavar="A=5%,...", help="The accuracy to reach; 5 % of each but the trim.", show_default=False),
+]
+StateFile = Annotated[
+    Path | None,
+    typer.Option("--state", metavar="FILE", help="Go on from this file, if there; saved every second.", show_default=False),
+]
+Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
+Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
+Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor; 1 forgets nothing.")]
+UntilEnough = Annotated[bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.")]
+
+SAVE_EVERY_S = 1.0
+
+
+def command(
+    axis: AxisOption,
+    log: Log = None,
+    speed: Factor = 1.0,
+    follow: Follow = False,
+    udp: Port = None,
+    idle: Idle = None,
+    plan: PlanFile = None,
+    want: Want = None,
+    state: StateFile = None,
+    every: Every = 1.0,
+    until_enough: UntilEnough = False,
+    bandwidth: Bandwidth = 4.0,
+    forgetting: Forgetting = 1.0,
+    mapping: MappingFile = None,
+    as_json: JsonFlag = False,
+) -> Mapping[str, Any]:
+    """Identify while the vehicle flies, sample by sample, and say when there is enough data.
+
+    Replays a log, follows one that grows, or takes JSON lines: `{"time_s": 1.25, "rudder_deg": 5, "yaw_deg": 91}`.
+    `--json` prints one object a look, a line each. With `--state` a program that was killed goes on where it was.
+
+    Example: sysid live run7.csv --axis yaw --speed 10 --plan plan.yaml
+    """
+    _check_source(log, udp, follow=follow)
+    feed = _Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
+    goals, goals_from = _goals(axis, plan, want)
+    identifier, skipped = _begun(feed, state, bandwidth, forgetting)
+    body: Mapping[str, Any] = {}
+    with _shown(as_json=as_json) as show:
+        try:
+            for body in _looks(feed, identifier, goals, goals_from, every, state, skipped):
+                show(body)
+                if until_enough and body["verdict"] == "enough":
+                    break
+        except KeyboardInterrupt:
+            if not body:
+                raise
+        finally:
+            if state is not None:
+                _save(state, identifier, feed.name)
+    if not as_json:
+        _end(body)
+    if until_enough and body["verdict"] != "enough":
+        raise typer.Exit(GATE_FAILED)
+    return body
+
+
+def _check_source(log: Path | None, udp: int | None, *, follow: bool) -> None:
+    if (log is None) == (udp is None):
+        raise UsageError(
+            "give either a log or `--udp PORT`",
+            found="both" if log is not None else "neither",
+            hint="`sysid live run7.csv --axis yaw`, or `sysid live - --axis yaw` for lines on standard input",
+        )
+    if follow and (log is None or str(log) == "-"):
+        raise UsageError(
+            "`--follow` needs a log", found="`--udp`" if log is None else "`-`", hint="name the log, or leave it out"
+        )
+
+
+@dataclass
+class _Feed:
+    """Where the samples come from, and what is known of them once the first has come."""
+
+    axis: AxisOption
+    log: Path | None
+    factor: float
+    follow: bool
+    udp: int | None
+    idle_s: float
+    mapping: Path | None
+    reader: MessageReader | None = None
+
+    @property
+    def name(self) -> str:
+        """The source in words, which a saved state is of."""
+        return f"udp:{self.udp}" if self.log is None else str(self.log)
+
+    @property
+    def is_log(self) -> bool:
+        """Whether it is a file, whose samples that are known already are passed over."""
+        return self.log is not None and str(self.log) != "-"
+
+    @property
+    def unreadable(self) -> int:
+        """Lines that were no JSON objects with a time."""
+        return self.reader.unreadable if self.reader else 0
+
+    @property
+    def then(self) -> str:
+        """The command that comes next."""
+        return shlex.join(["sysid", "identify", str(self.log), "--axis", self.axis.value, "-o", "models/"]) if self.is_log else ""
+
+    def samples(self, after: float) -> Iterator[Sample | None]:
+        """Yield the samples after a time in s."""
+        from fieldsid.cli.inputs import mapping_of, read_run
+        from fieldsid.online.samples import MessageReader
+        from fieldsid.online.sources import datagrams, followed, lines_of, replayed
+
+        if not self.is_log:
+            self.reader = MessageReader(self.axis)
+            if self.udp is not None:
+                return datagrams(self.udp, self.reader, idle_s=self.idle_s)
+            return lines_of(sys.stdin, self.reader)
+        if self.log is None or not self.follow:
+            run = read_run(Path(str(self.log)), mapping=self.mapping)
+            return replayed(run, self.axis, self.factor, after)
+        return followed(self.log, mapping_of(self.mapping), self.axis, idle_s=self.idle_s, after=after)
+
+
+def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Callable[[float], Mapping[str, Goal]], str]:
+    """Return the goals at a speed in m/s, and where they are from."""
+    from fieldsid.online.goals import asked_goals, planned_goals
+    from fieldsid.online.progress import DEFAULT_ACCURACY, default_goals
+
+    if plan is not None and want is not None:
+        raise UsageError("`--plan` and `--want` both say what is to be reached", found=want, hint="leave one of them out")
+    if plan is not None:
+        from fieldsid.planning.output.plan_file import load_plan
+
+        promised = load_plan(plan)
+        planned_goals(promised, axis, float("nan"))
+        return (lambda speed: planned_goals(promised, axis, speed)), f"`{plan}`"
+    if want is not None:
+        asked = asked_goals(axis, want)
+        return (lambda _speed: asked), "`--want`"
+    return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
+
+
+def _begun(feed: _Feed, state: Path | None, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
+    """Return the identifier, from its state where there is one, and the time up to which the source is known to it."""
+    from fieldsid.online.identifier import OnlineIdentifier
+    from fieldsid.online.state_file import load_state
+
+    if state is None or not state.exists():
+        return OnlineIdentifier(feed.axis, bandwidth=bandwidth, forgetting=forgetting), -inf
+    identifier, source = load_state(state, feed.axis)
+    say(f"going on from `{state}`: {identifier.estimate().used} samples up to {identifier.time:.1f} s of `{source}`")
+    if feed.is_log and source == feed.name and isfinite(identifier.time):
+        return identifier, identifier.time
+    if source != feed.name:
+        identifier.begin_again()
+    return identifier, -inf
+
+
+def _looks(
+    feed: _Feed,
+    identifier: OnlineIdentifier,
+    goals: Callable[[float], Mapping[str, Goal]],
+    goals_from: str,
+    every: float,
+    state: Path | None,
+    after: float,
+) -> Iterator[Mapping[str, Any]]:
+    """Yield a look every so many seconds of the log, one when it ends, and save the state as time goes on."""
+    import time as clock
+
+    from fieldsid.online.look import look_body
+    from fieldsid.online.progress import Watch
+
+    watch = Watch(goals(float("nan")))
+    due, saved, fresh = -inf, clock.monotonic(), True
+
+    def look() -> Mapping[str, Any]:
+        now = identifier.estimate()
+        watch.goals = dict(goals(now.speed))
+        progress = watch.look(now)
+        return look_body(now, progress, source=feed.name, goals_from=goals_from, unreadable=feed.unreadable, then=feed.then)
+
+    with closing(feed.samples(after)) as samples:  # type: ignore[type-var]
+        for sample in samples:
+            if sample is None:
+                continue
+            identifier.update(*sample[:-1], fin_is_held=sample.fin_is_held)
+            watch.excitation.hear(sample.time, sample.fin, sample.rate)
+            fresh = True
+            if sample.time >= due or sample.time < due - 2.0 * every:
+                due = sample.time + every
+                yield look()
+                fresh = False
+            if state is not None and clock.monotonic() - saved >= SAVE_EVERY_S:
+                _save(state, identifier, feed.name)
+                saved = clock.monotonic()
+    if fresh:
+        yield look()
+
+
+def _save(state: Path, identifier: OnlineIdentifier, source: str) -> None:
+    from fieldsid.online.state_file import save_state
+
+    save_state(state, identifier, source)
+
+
+@contextmanager
+def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
+    """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text."""
+    from fieldsid.cli.live.screen import line, screen
+
+    if as_json:
+        import json
+
+        def print_json(body: Mapping[str, Any]) -> None:
+            sys.stdout.write(json.dumps(body, allow_nan=False) + "\n")
+            sys.stdout.flush()
+
+        yield print_json
+        return
+    console = out()
+    if not console.is_terminal:
+        yield lambda body: console.print(line(body), soft_wrap=True)
+        return
+    from rich.live import Live
+
+    with Live(console=console, auto_refresh=False, transient=True) as live:
+        yield lambda body: live.update(screen(body), refresh=True)
+
+
+def _end(body: Mapping[str, Any]) -> None:
+    from fieldsid.cli.live.screen import final
+
+    if body:
+        final(out(), body)

@@ -1,0 +1,1 @@
+"""What a command that goes on shows meanwhile."""

@@ -1,0 +1,101 @@
+"""What `sysid live` shows: a table that is drawn again and again on a terminal, a line now and then where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite, nan, pi
+from typing import Any
+
+from rich.console import Console, Group, RenderableType
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
+BAR = 20
+
+
+def screen(body: Mapping[str, Any]) -> RenderableType:
+    """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
+    head = Text(body["said"], style=STYLE[body["verdict"]])
+    return Group(head, Text(rests_on(body), style="dim"), Text(), _parameters(body), Text(), _meters(body), _met(body))
+
+
+def line(body: Mapping[str, Any]) -> str:
+    """Return one look in a line: time, verdict, values with errors."""
+    from fieldsid.rounding import with_error
+
+    known = (
+        f"{name} {with_error(p['value'], p['std_error'])}" for name, p in body["parameters"].items() if p["std_error"] is not None
+    )
+    return f"{body['time_s'] or 0.0:8.1f} s  {body['verdict']:<11} {100.0 * body['share']:3.0f} %  {'  '.join(known)}"
+
+
+def rests_on(body: Mapping[str, Any]) -> str:
+    """Say what a verdict rests on."""
+    speed = "" if body["speed_m_s"] is None else f" at {body['speed_m_s']:.2f} m/s"
+    return f"{body['axis']}, {body['samples']} samples{speed}; goals: {body['goals_from']}"
+
+
+def final(to: Console, body: Mapping[str, Any]) -> None:
+    """Print the last look: verdict, what it rests on, the table, the next command."""
+    to.print(Text(body["said"], style=STYLE[body["verdict"]]), soft_wrap=True)
+    to.print(rests_on(body), soft_wrap=True)
+    to.print()
+    to.print(_parameters(body))
+    if body["next"]:
+        to.print(f"\nnext: {body['next']}", soft_wrap=True)
+
+
+def _parameters(body: Mapping[str, Any]) -> Table:
+    from fieldsid.rounding import in_unit, interval, with_error
+
+    made = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for name in ("", "value", "unit", "95 % band", "error", "wanted", ""):
+        made.add_column(name, justify="right" if name else "left", header_style="dim", no_wrap=True)
+    for name, p in body["parameters"].items():
+        wanted, unit = _error(p["goal_std_error"], p["value"]), in_unit(p["unit"])
+        if p["std_error"] is None:
+            made.add_row(name, "-", unit, "-", "-", "-", "")
+            continue
+        band, error = interval(*p["interval95"]), _error(p["std_error"], p["value"])
+        state = Text("settled", style="green") if p["settled"] else Text("moving", style="yellow")
+        made.add_row(name, with_error(p["value"], p["std_error"]), unit, band, error, wanted, state)
+    return made
+
+
+def _error(error: float | None, value: float | None) -> str:
+    """Return a standard error in per cent of its value, as it is where that may be zero, and a dash where there is none."""
+    if error is None:
+        return "-"
+    if value and error < 0.5 * abs(value):
+        return f"{100.0 * error / abs(value):.1f} %"
+    return f"{error:.1g}"
+
+
+def _meters(body: Mapping[str, Any]) -> Table:
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    share = body["share"]
+    grid.add_row("data", ProgressBar(total=1.0, completed=share, width=BAR), f"{100.0 * share:.0f} % of what the goal takes")
+    moved, turning = (body["excitation"][k] for k in ("fin_rms_rad", "rate_rms_rad_s"))
+    fin = nan if moved is None else moved
+    says = (
+        "not known yet" if not isfinite(fin) else f"fin {_degrees(moved)} deg rms, rate {_degrees(turning)} deg/s rms, last 10 s"
+    )
+    grid.add_row(
+        "excitation", ProgressBar(total=FULL_FIN_RAD, completed=min(fin if isfinite(fin) else 0.0, FULL_FIN_RAD), width=BAR), says
+    )
+    return grid
+
+
+FULL_FIN_RAD = 10.0 * pi / 180.0
+"""Fin, root mean square, at which the meter of the excitation is full: square pulses of 10 deg."""
+
+
+def _degrees(value: float | None) -> str:
+    return "-" if value is None else f"{value * 180.0 / pi:.1f}"
+
+
+def _met(body: Mapping[str, Any]) -> Text:
+    found = [f"{count} {name}" for name, count in body["counts"].items() if count]
+    return Text("met: " + ", ".join(found) if found else "", style="dim")

@@ -1,0 +1,66 @@
+"""The figure of an archive: each parameter over the runs' dates with its errors, its stretches, and where it changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib import import_module
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fieldsid.batch.trend import Trend
+from fieldsid.figures import canvas
+
+DATES: Any = import_module("matplotlib.dates")  # its functions have no types
+
+
+def figure(trends: Sequence[Trend], name: str) -> Figure:
+    """Return a sheet with a panel for each parameter, which share the time."""
+    sheet = canvas.sheet(10.0, 1.2 + 2.1 * len(trends))
+    sheet.suptitle(f"{name}: {summary(trends)}", x=0.01, ha="left", fontsize=11)
+    axes = sheet.subplots(len(trends), 1, squeeze=False, sharex=True)[:, 0]
+    for ax, trend in zip(axes, trends, strict=True):
+        draw(trend, ax)
+    locator = DATES.AutoDateLocator()
+    axes[-1].xaxis.set_major_locator(locator)
+    axes[-1].xaxis.set_major_formatter(DATES.ConciseDateFormatter(locator))
+    axes[-1].set_xlabel("start of the run, UTC")
+    return sheet
+
+
+def summary(trends: Sequence[Trend]) -> str:
+    """Return what changed, in words."""
+    told = [f"{t.name} {_by(c.share)} on {c.start_utc[:10]}" for t in trends for c in t.changes]
+    count = max((t.values.size for t in trends), default=0)
+    return f"{', '.join(told)}; {count} runs" if told else f"no change beyond errors and scatter in {count} runs"
+
+
+def draw(trend: Trend, ax: Axes) -> None:
+    """Draw one parameter: runs with 95 % errors, the mean of each stretch, a line at each change."""
+    dates = DATES.date2num([datetime.fromtimestamp(t, UTC) for t in trend.start.tolist()])
+    ax.errorbar(
+        dates, trend.values, 1.96 * trend.std_errors, fmt="o", markersize=3.2, color=canvas.MEASURED, elinewidth=0.8,
+        label="run, 95 % error",
+    )  # fmt: skip
+    cuts = np.flatnonzero(np.diff(trend.means)) + 1
+    for i, part in enumerate(np.split(np.arange(trend.values.size), cuts)):
+        ends = (dates[part[0]], dates[part[-1]])
+        ax.plot(ends, trend.means[part[:2]][:1].repeat(2), color=canvas.SECOND, linewidth=2.0, label="_" if i else "mean")
+    for i, (cut, change) in enumerate(zip(cuts.tolist(), trend.changes, strict=True)):
+        at = 0.5 * (dates[cut - 1] + dates[cut])
+        ax.axvline(at, color=canvas.SIMULATED, linestyle="--", linewidth=1.2, label="_" if i else "change")
+        ax.annotate(
+            _by(change.share), (at, 0.5), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points",
+            fontsize=9, color=canvas.SIMULATED,
+        )  # fmt: skip
+    at_speed = f" at {trend.speed:.2f} m/s" if isfinite(trend.speed) else ""
+    canvas.dress(ax, y=f"{trend.name}{at_speed}")
+    canvas.legend_above(ax, 3)
+
+
+def _by(share: float) -> str:
+    return f"{100.0 * share:+.0f} %" if isfinite(share) else "changed"

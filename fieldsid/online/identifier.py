@@ -1,0 +1,239 @@
+"""The identifier to run on a vehicle: one sample in, parameters with intervals out, in constant memory.
+
+    online = OnlineIdentifier("yaw")
+    online.update(time_s, rudder_rad, yaw_rad, yaw_rate_rad_s)
+    online.estimate().values                       # {"a22": ..., "b2": ..., "C0": ...}
+
+The recursion and its filter are those of `--method svf_rls`; errors allow for the residuals' colour as the block estimate's do,
+the bias of white sensor noise is taken out. NumPy and SciPy are enough: with numba a sample takes 12 us, without 31 us;
+an estimate takes 0.8 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Any, Self
+
+import numpy as np
+
+from fieldsid.errors import DataError
+from fieldsid.fitting.regression.bias_compensation import inverse_of_normal, noise_share
+from fieldsid.fitting.regression.recursive_ls import INITIAL_VARIANCE, MAX_VARIANCE_SHARE, WEIGHT, corrected, noise_of
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.white_noise import white_noise_std
+from fieldsid.online.sample_filter import SampleFilter, present_step
+
+TWO_SIDED_95 = 1.96
+"""Quantile 0.975 of the normal distribution."""
+NOISE_WINDOW, NOISE_EVERY = 1024, 256
+"""Samples that the sensors' noise is learnt from, and samples between two looks."""
+WAIT_FOR_RATE_S = 1.0
+"""Time after which a vehicle that has sent no rate has none."""
+STATE = 1
+"""Version of the saved state."""
+_UPPER = np.triu_indices(4)
+
+
+@dataclass(frozen=True, slots=True)
+class OnlineEstimate:
+    """What is known at `time` s: values and standard errors by parameter name, NaN before they exist.
+
+    `used` counts rows that joined the estimate, `speed` is the mean surge in m/s (NaN where unknown), `counts` what was met:
+    missing, repeated and late samples, gaps, restarts of the clock, spikes.
+    """
+
+    axis: Axis
+    time: float
+    values: Mapping[str, float]
+    std_errors: Mapping[str, float]
+    used: int
+    speed: float
+    counts: Mapping[str, int]
+
+    @property
+    def intervals95(self) -> dict[str, tuple[float, float]]:
+        """The 95 % intervals under normal errors: values -+ 1.96 standard errors."""
+        return {n: (v - TWO_SIDED_95 * self.std_errors[n], v + TWO_SIDED_95 * self.std_errors[n]) for n, v in self.values.items()}
+
+
+class OnlineIdentifier:
+    """Yaw or pitch parameters, sample by sample; its memory does not grow with the length of the flight.
+
+    bandwidth is the filter's lambda in rad/s, forgetting beta in (0, 1]. by_rate None: by the measured rate where one comes
+    within a second, else by the angle alone. Raises DataError for settings out of bounds.
+    """
+
+    def __init__(
+        self,
+        axis: Axis | str,
+        *,
+        bandwidth: float = 4.0,
+        forgetting: float = 1.0,
+        by_rate: bool | None = None,
+    ) -> None:
+        if not 0.0 < forgetting <= 1.0 or not 0.01 <= bandwidth <= 1000.0:
+            raise DataError(
+                "forgetting must be in (0, 1] and the bandwidth in 0.01 .. 1000 rad/s",
+                found=f"forgetting {forgetting:g}, bandwidth {bandwidth:g}",
+                hint="start with the defaults: 1 and 4",
+            )
+        self.axis = Axis(axis)
+        self._settings: dict[str, Any] = {"bandwidth": bandwidth, "forgetting": forgetting}
+        self._stiff = NAMES[self.axis].stiffness is not None
+        self._filter: SampleFilter | None = None
+        self._by_rate = by_rate
+        self._first_time = nan
+        self._window = np.full((NOISE_WINDOW, 2), nan)
+        self._seen, self._noise = 0, (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
+        self._speed_sum, self._speeds = 0.0, 0
+
+    def update(
+        self,
+        time: float,
+        fin: float,
+        angle: float = nan,
+        rate: float = nan,
+        speed: float = nan,
+        *,
+        fin_is_held: bool = True,
+    ) -> bool:
+        """Take one sample and return whether it joined the estimate.
+
+        time in s; fin in rad, a command that holds from this time on, or without `fin_is_held` a measurement, straight since the
+        last; angle in rad (a heading may wrap); rate in rad/s; surge in m/s. NaN is what was not measured.
+        Samples whose time does not go on are passed over; gaps and restarts are survived.
+        """
+        time, fin, angle, rate = float(time), float(fin), float(angle), float(rate)
+        fed = self._chosen(time, angle, rate)
+        if fed is None:
+            return False
+        if isfinite(speed):
+            self._speed_sum, self._speeds = self._speed_sum + float(speed), self._speeds + 1
+        before = fed.counts["repeated"] + fed.counts["late"]
+        used = fed.push(time, fin, angle, rate, is_held=fin_is_held)
+        if fed.counts["repeated"] + fed.counts["late"] == before and isfinite(time):
+            self._hear(angle, rate)
+        return used
+
+    @property
+    def time(self) -> float:
+        """Stamp of the newest sample in s, NaN before the first."""
+        return nan if self._filter is None else self._filter.time
+
+    def begin_again(self) -> None:
+        """Tell that the next sample does not follow the last, as in another log: the estimate goes on, the filter starts anew."""
+        if self._filter is not None:
+            self._filter.begin_again()
+
+    def estimate(self) -> OnlineEstimate:
+        """Return values and standard errors now."""
+        names = NAMES[self.axis].base
+        if self._filter is None:
+            empty = dict.fromkeys(names, nan)
+            return OnlineEstimate(self.axis, nan, empty, dict(empty), 0, nan, {})
+        fed, keep = self._filter, [0, 1, 2, 3] if self._stiff else [0, 2, 3]
+        share = self._noise_share()
+        values = np.array(corrected(fed.memory, fed.packed, noise_of(share)) if share else fed.packed[:4])
+        covariance = self._covariance(values, share.gram if share else np.zeros((4, 4)), keep)
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0)) if covariance is not None else np.full(len(keep), nan)
+        # a direction that nothing has excited keeps its start: P says so, its residual's covariance would be zero
+        excited = fed.packed[[4, 8, 11, 13]][keep] <= MAX_VARIANCE_SHARE * INITIAL_VARIANCE
+        known = np.where(excited & (fed.counts["used"] > 2 * len(keep)), values[keep], nan)
+        errors = np.where(excited & (errors > 0.0), errors, nan)
+        counts = {**fed.counts, "spikes": fed.angle_gate.spikes + fed.rate_gate.spikes}
+        used = counts.pop("used")
+        return OnlineEstimate(
+            self.axis,
+            fed.time,
+            dict(zip(names, known.tolist(), strict=True)),
+            dict(zip(names, errors.tolist(), strict=True)),
+            used,
+            self._speed_sum / self._speeds if self._speeds else nan,
+            counts,
+        )
+
+    def state(self) -> dict[str, Any]:
+        """Return all that is known as plain values, which `from_state` goes on from bit by bit."""
+        return {
+            "version": STATE,
+            "axis": self.axis.value,
+            "settings": self._settings,
+            "by_rate": self._by_rate,
+            "first_time": self._first_time if isfinite(self._first_time) else None,
+            "window": [[v if isfinite(v) else None for v in row] for row in self._window.tolist()],
+            "seen": self._seen,
+            "noise": list(self._noise),
+            "speed": [self._speed_sum, self._speeds],
+            "filter": None if self._filter is None else self._filter.state(),
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Self:
+        """Return the identifier of a state; raises DataError where it is none, or one of another version."""
+        try:
+            if state["version"] != STATE:
+                raise DataError("the state is of another version", found=str(state["version"]), hint="start without it")
+            made = cls(state["axis"], by_rate=state["by_rate"], **state["settings"])
+            made._first_time = nan if state["first_time"] is None else float(state["first_time"])
+            made._window[:] = np.array(state["window"], dtype=np.float64)
+            made._seen, made._noise = int(state["seen"]), (float(state["noise"][0]), float(state["noise"][1]))
+            made._speed_sum, made._speeds = float(state["speed"][0]), int(state["speed"][1])
+            if state["filter"] is not None:
+                made._filter = made._new_filter()
+                made._filter.restore(state["filter"])
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+            raise DataError("this is no state of an online estimate", found=f"{type(error).__name__}: {error}") from error
+        return made
+
+    def _chosen(self, time: float, angle: float, rate: float) -> SampleFilter | None:
+        """Return the filter, made at the first sample that says which signals there are."""
+        if self._filter is not None:
+            return self._filter
+        if not isfinite(time) or not (isfinite(angle) or isfinite(rate)):
+            return None
+        if self._by_rate is None:
+            self._first_time = time if not isfinite(self._first_time) or time < self._first_time else self._first_time
+            if not isfinite(rate) and time - self._first_time < WAIT_FOR_RATE_S:
+                return None
+            self._by_rate = isfinite(rate)
+        self._filter = self._new_filter()
+        return self._filter
+
+    def _new_filter(self) -> SampleFilter:
+        return SampleFilter(stiff=self._stiff, by_rate=bool(self._by_rate), **self._settings)
+
+    def _hear(self, angle: float, rate: float) -> None:
+        """Keep a sample for the noise of the sensors, and learn that now and then."""
+        place = self._seen % NOISE_WINDOW
+        unwrapped = self._filter.newest_angle if self._filter is not None and isfinite(angle) else nan
+        self._window[place] = unwrapped, rate
+        self._seen += 1
+        if self._seen % NOISE_EVERY == 0:
+            recent = np.roll(self._window, -(place + 1), axis=0)
+            found = [white_noise_std(np.nan_to_num(c), np.isfinite(c)) for c in recent.T]
+            least = MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
+            self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
+
+    def _noise_share(self) -> Any:
+        fed = self._filter
+        step = present_step(fed.memory) if fed is not None else 0.0
+        if step <= 0.0 or self._seen < NOISE_EVERY:
+            return None
+        return noise_share(1 if self._by_rate else 2, self._settings["bandwidth"], step, *self._noise)
+
+    def _covariance(self, theta: FloatArray, gram: FloatArray, keep: list[int]) -> FloatArray | None:
+        fed = self._filter
+        if fed is None or fed.counts["used"] <= 2 * len(keep):
+            return None
+        packed = np.zeros((4, 4))
+        packed[_UPPER] = fed.packed[4:]
+        inverse = (packed + np.triu(packed, 1).T)[np.ix_(keep, keep)]
+        weight = float(fed.memory[WEIGHT])
+        scale = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+        normal = np.linalg.pinv(inverse / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        clean = inverse_of_normal(normal, gram[np.ix_(keep, keep)] * weight)
+        return fed.colour.covariance(theta, clean)

@@ -1,0 +1,171 @@
+"""How far a live estimate is: against the accuracy that is wanted, whether it still moves, whether the fin is worked.
+
+With information I = 1/se^2 per parameter, the share that is in is I / I_goal = (se_goal / se)^2; its growth over the last seconds
+tells how long the rest takes if the vehicle goes on as it does. A parameter is settled while it has stayed, over those seconds,
+within 5 % of its value or within one standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, isfinite, nan, sqrt
+from typing import Literal
+
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.online.identifier import OnlineEstimate
+
+Verdict = Literal["starting", "collecting", "not_excited", "moving", "enough"]
+DEFAULT_ACCURACY = 0.05
+"""Relative standard error of damping, stiffness and authority that is asked for where nothing else is."""
+LOOK_BACK_S = 10.0
+"""Time over which a parameter must stay where it is to be settled, and over which information is seen to grow."""
+SETTLED_SHARE = 0.05
+MIN_WEIGHT = 0.2
+"""Weight of what was heard, reached after two seconds, from which on a root mean square is told."""
+QUIET_FIN_RAD = 0.005
+"""Root mean square of the fin about its mean (0.3 deg) over the last seconds below which it excites nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a parameter is to be known to: a standard error in its unit, or as a share of its value."""
+
+    std_error: float = nan
+    relative: float = nan
+
+    def error_at(self, value: float) -> float:
+        """Return the standard error that is wanted at a value, NaN while there is none."""
+        return self.std_error if isfinite(self.std_error) else self.relative * abs(value)
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterProgress:
+    """One parameter: value, standard error, the error wanted (NaN: none), share of the information that is in, settled or not."""
+
+    name: str
+    value: float
+    std_error: float
+    goal: float
+    share: float
+    is_settled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far the estimate is.
+
+    share is the least of the parameters' shares, `limited_by` whose it is, `left_s` the time to the goal at the pace of the last
+    seconds (inf where nothing grows, NaN where unknown), `fin_rms` rad and `rate_rms` rad/s the excitation of the last seconds.
+    """
+
+    verdict: Verdict
+    share: float
+    limited_by: str
+    left_s: float
+    fin_rms: float
+    rate_rms: float
+    parameters: tuple[ParameterProgress, ...]
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether every parameter that has a goal is settled."""
+        return all(p.is_settled for p in self.parameters if isfinite(p.goal))
+
+
+def default_goals(axis: Axis, relative: float = DEFAULT_ACCURACY) -> dict[str, Goal]:
+    """Return a relative goal for damping, stiffness and authority; a trim may be zero and has none."""
+    names = NAMES[axis]
+    return {n: Goal(relative=relative) for n in names.base if n != names.trim}
+
+
+class RecentExcitation:
+    """Root mean square of fin and rate about their means over the last seconds, by exponential averages."""
+
+    __slots__ = ("_means", "_squares", "_time", "_weights")
+
+    def __init__(self) -> None:
+        self._time = nan
+        self._weights, self._means, self._squares = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+
+    def hear(self, time: float, fin: float, rate: float) -> None:
+        """Take a sample of fin in rad and rate in rad/s; what is not finite is passed over."""
+        step = time - self._time if isfinite(self._time) else 0.0
+        self._time = time
+        share = min(max(step, 0.0) / LOOK_BACK_S, 1.0) if isfinite(step) else 0.0
+        for i, value in enumerate((fin, rate)):
+            if isfinite(value):
+                self._weights[i] += share * (1.0 - self._weights[i])
+                self._means[i] += share * (value - self._means[i])
+                self._squares[i] += share * (value * value - self._squares[i])
+
+    def rms(self) -> tuple[float, float]:
+        """Return both, NaN before the first seconds are over."""
+        return self._rms(0), self._rms(1)
+
+    def _rms(self, place: int) -> float:
+        weight = self._weights[place]
+        if weight < MIN_WEIGHT:
+            return nan
+        mean = self._means[place] / weight
+        return sqrt(max(self._squares[place] / weight - mean * mean, 0.0))
+
+
+class Watch:
+    """Looks at an estimate now and then, and says how far it is; keeps the looks of the last seconds only."""
+
+    __slots__ = ("_looks", "excitation", "goals")
+
+    def __init__(self, goals: Mapping[str, Goal]) -> None:
+        self.goals = dict(goals)
+        self.excitation = RecentExcitation()
+        self._looks: list[OnlineEstimate] = []
+
+    def look(self, now: OnlineEstimate) -> Progress:
+        """Return how far an estimate is, by itself and by the looks before it."""
+        looks = self._looks
+        if looks and not looks[-1].time <= now.time:
+            looks.clear()
+        while len(looks) > 1 and looks[1].time <= now.time - LOOK_BACK_S:
+            looks.pop(0)
+        if not looks or now.time - looks[-1].time >= LOOK_BACK_S / 20.0:
+            looks.append(now)
+        known = tuple(self._of(name, now) for name in now.values)
+        wanted = [p for p in known if p.name in self.goals]
+        least = min(wanted, key=lambda p: p.share, default=None)
+        fin, rate = self.excitation.rms()
+        left = self._left(least, now) if least else nan
+        share = least.share if least else 0.0
+        verdict = self._verdict(known, share, fin)
+        return Progress(verdict, share, least.name if least else "", left, fin, rate, known)
+
+    def _of(self, name: str, now: OnlineEstimate) -> ParameterProgress:
+        value, error = now.values[name], now.std_errors[name]
+        goal = self.goals[name].error_at(value) if name in self.goals else nan
+        share = min((goal / error) ** 2, 1.0) if isfinite(goal) and isfinite(error) and error > 0.0 else 0.0
+        return ParameterProgress(name, value, error, goal, share, self._is_settled(name, now))
+
+    def _is_settled(self, name: str, now: OnlineEstimate) -> bool:
+        value, error = now.values[name], now.std_errors[name]
+        if not isfinite(error) or now.time - self._looks[0].time < 0.95 * LOOK_BACK_S:
+            return False
+        band = max(SETTLED_SHARE * abs(value), error)
+        return all(abs(look.values[name] - value) <= band for look in self._looks)
+
+    def _left(self, least: ParameterProgress, now: OnlineEstimate) -> float:
+        """Return the seconds until the goal of the parameter that limits, at the pace at which its information grows."""
+        then = self._looks[0]
+        before = then.std_errors[least.name]
+        if least.share >= 1.0:
+            return 0.0
+        if not (isfinite(before) and isfinite(least.std_error) and isfinite(least.goal) and now.time > then.time):
+            return nan
+        gained = least.std_error**-2 - before**-2
+        return (now.time - then.time) * (least.goal**-2 - least.std_error**-2) / gained if gained > 0.0 else inf
+
+    def _verdict(self, known: tuple[ParameterProgress, ...], share: float, fin: float) -> Verdict:
+        if not any(isfinite(p.std_error) for p in known):
+            return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "starting"
+        if share >= 1.0:
+            return "enough" if all(p.is_settled for p in known if p.name in self.goals) else "moving"
+        return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "collecting"

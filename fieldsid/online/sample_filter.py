@@ -1,0 +1,187 @@
+"""Samples as they come, into the recursion: repeated stamps, gaps, wrapped headings and restarted clocks.
+
+The recursion's filter needs time that goes on and signals without holes. A short gap is bridged by straight lines, as in the
+block estimate; after a long one, or where the clock starts again, the filter begins anew while the estimate stays. Two samples
+late, so that spikes can be told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf, isfinite, nan, remainder, tau
+from typing import Any
+
+import numpy as np
+
+from fieldsid.fitting.regression.recursive_ls import (
+    ANGLE,
+    MEMORY,
+    RATE,
+    SAMPLES,
+    TIME,
+    H,
+    forget_filter,
+    initial_memory,
+    step,
+)
+from fieldsid.fitting.regression.svf_equation import MAX_BRIDGED_GAP_S
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.online.row_colour import RowColour
+from fieldsid.online.spike_gate import SpikeGate
+
+CLOCK_RESTART_S = 1.0
+"""A stamp so far before the last is a clock that started again; one less far is a sample that came late, and is left out."""
+MOST_MOVES = 64
+"""Moves of the fin that a bridged gap may hold; with more it counts as a long one."""
+
+
+class SampleFilter:
+    """The filter's memory `memory`, Theta and packed P `packed`, the rows' colour `colour`, and what was met on the way."""
+
+    __slots__ = (
+        "_fin", "_last_angle", "_late", "_moves", "_order", "_row", "_sample", "_settings", "_stiff", "angle_gate",
+        "colour", "counts", "memory", "packed", "rate_gate",
+    )  # fmt: skip
+
+    def __init__(self, *, stiff: bool, by_rate: bool, bandwidth: float, forgetting: float) -> None:
+        self.memory, self.packed = np.zeros(MEMORY), initial_memory(stiff=stiff)
+        self._order = 1 if by_rate else 2
+        self._stiff = stiff
+        self._settings = (bandwidth, forgetting, self._order)
+        self._sample, self._row = np.zeros((1, 6)), np.zeros((1, 5))
+        self.colour = RowColour(bandwidth, forgetting)
+        self.angle_gate, self.rate_gate = SpikeGate(), SpikeGate()
+        self._late: list[tuple[float, float, bool]] = []
+        self._moves: list[tuple[float, float]] = []
+        self._fin, self._last_angle = nan, nan
+        self.counts = {"used": 0, "missing": 0, "repeated": 0, "gaps": 0, "restarts": 0, "late": 0}
+
+    def push(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool) -> bool:
+        """Take one sample, whose fin held since the last or went there straight; return whether a row joined the estimate."""
+        if not isfinite(time):
+            self.counts["missing"] += 1
+            return False
+        last = self._late[-1][0] if self._late else -inf
+        if time <= last:
+            if time > last - CLOCK_RESTART_S:
+                self.counts["repeated" if time == last else "late"] += 1
+                return False
+            self.begin_again()
+            self.counts["restarts"] += 1
+        self._late.append((time, fin, is_held))
+        unwrapped = self._unwrapped(angle)
+        ready = self.angle_gate.push(unwrapped), self.rate_gate.push(rate)
+        if len(self._late) < 3:
+            return False
+        time, fin, is_held = self._late.pop(0)
+        return self._take(time, fin, *ready, is_held=is_held)
+
+    def begin_again(self) -> None:
+        """Let the filter start anew at the next sample; the estimate and its errors stay."""
+        forget_filter(self.memory)
+        self._late.clear()
+        self._moves.clear()
+        self._fin = nan
+
+    @property
+    def time(self) -> float:
+        """Stamp of the newest sample in s, NaN before the first."""
+        return self._late[-1][0] if self._late else nan
+
+    @property
+    def newest_angle(self) -> float:
+        """The newest measured angle in rad, a heading unwrapped."""
+        return self._last_angle
+
+    def _unwrapped(self, angle: float) -> float:
+        if not isfinite(angle):
+            return angle
+        if not self._stiff and isfinite(self._last_angle):
+            angle = self._last_angle + remainder(angle - self._last_angle, tau)
+        self._last_angle = angle
+        return angle
+
+    def _take(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool) -> bool:
+        memory = self.memory
+        fin = fin if isfinite(fin) else self._fin
+        if not isfinite(fin):
+            self.counts["missing"] += 1
+            return False
+        if not isfinite(rate if self._order == 1 else angle):
+            self.counts["missing"] += 1
+            if len(self._moves) <= MOST_MOVES:
+                self._moves.append((time, fin))
+            return False
+        if memory[SAMPLES] and (time - memory[TIME] > MAX_BRIDGED_GAP_S or len(self._moves) > MOST_MOVES):
+            self.counts["gaps"] += 1
+            forget_filter(memory)
+            self._moves.clear()
+        angle = self._angle(time, angle, rate)
+        rate = rate if isfinite(rate) else 0.0
+        used = self._through_moves(time, fin, angle, rate, is_held=is_held)
+        self._fin = fin
+        return used
+
+    def _angle(self, time: float, angle: float, rate: float) -> float:
+        """Return the angle, where none was measured that of the rate since the last."""
+        memory = self.memory
+        if isfinite(angle):
+            return angle
+        if not memory[SAMPLES]:
+            return 0.0
+        return float(memory[ANGLE] + 0.5 * (rate + memory[RATE]) * (time - memory[TIME]))
+
+    def _through_moves(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool) -> bool:
+        """Step to a measured sample, through the moves of the fin since the last on straight lines of the signals."""
+        memory, moves = self.memory, self._moves
+        if memory[SAMPLES] and moves:
+            begin, angle0, rate0 = float(memory[TIME]), float(memory[ANGLE]), float(memory[RATE])
+            for at, then in moves:
+                share = (at - begin) / (time - begin)
+                self._step(
+                    at, then, angle0 + share * (angle - angle0), rate0 + share * (rate - rate0), is_held=is_held, counts=False
+                )
+                self._fin = then
+        moves.clear()
+        return self._step(time, fin, angle, rate, is_held=is_held, counts=True)
+
+    def _step(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, counts: bool) -> bool:
+        before = self._fin if isfinite(self._fin) else fin
+        self._sample[0] = time, before, before if is_held else fin, angle, rate, float(counts)
+        if not step(self.memory, self.packed, *self._settings, self._sample, self._row, 0):
+            return False
+        self.counts["used"] += 1
+        self.colour.add(time, self._row[0])
+        return True
+
+    def state(self) -> dict[str, Any]:
+        """Return all of it as plain values."""
+        numbers = {"fin": self._fin, "last_angle": self._last_angle}
+        return {
+            "memory": self.memory.tolist(),
+            "packed": self.packed.tolist(),
+            "late": [[t, fin if isfinite(fin) else None, is_held] for t, fin, is_held in self._late],
+            "moves": [list(pair) for pair in self._moves],
+            "numbers": {k: v if isfinite(v) else None for k, v in numbers.items()},
+            "counts": dict(self.counts),
+            "colour": self.colour.state(),
+            "angle_gate": self.angle_gate.state(),
+            "rate_gate": self.rate_gate.state(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state; raises ValueError, TypeError or KeyError where it is none."""
+        self.memory[:], self.packed[:] = state["memory"], state["packed"]
+        self._late = [(float(t), nan if f is None else float(f), bool(h)) for t, f, h in state["late"]]
+        self._moves = [(float(t), float(f)) for t, f in state["moves"]]
+        fin, angle = (state["numbers"][k] for k in ("fin", "last_angle"))
+        self._fin, self._last_angle = (nan if v is None else float(v) for v in (fin, angle))
+        self.counts = {k: int(state["counts"][k]) for k in self.counts}
+        self.colour.restore(state["colour"])
+        self.angle_gate.restore(state["angle_gate"])
+        self.rate_gate.restore(state["rate_gate"])
+
+
+def present_step(memory: FloatArray) -> float:
+    """Return the sampling interval of the newest step in s, 0 before there is one."""
+    return float(memory[H])

@@ -1,0 +1,95 @@
+"""One sample of an axis, and what a message of canonical names (`rudder_deg`, `yaw_rate_rad_s`) says in SI."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from math import isfinite, nan
+from typing import NamedTuple
+
+import numpy as np
+
+from fieldsid.errors import DataError
+from fieldsid.logs.convert.units import UNITS, factor_to
+from fieldsid.logs.mapping.canonical_names import TIME, canonical
+from fieldsid.logs.run import Run
+from fieldsid.logs.segments import no_fin
+from fieldsid.models.axis import NAMES, Axis
+
+SURGE = "surge_m_s"
+
+
+class Sample(NamedTuple):
+    """Time s, fin rad, angle rad, rate rad/s and surge m/s of one axis, NaN where not measured; the fin held or is measured."""
+
+    time: float
+    fin: float
+    angle: float = nan
+    rate: float = nan
+    speed: float = nan
+    fin_is_held: bool = True
+
+
+def fin_column(run: Run, axis: Axis) -> str:
+    """Return the fin of a run's axis, the measured one where there is one; raises DataError where there is neither."""
+    names = NAMES[axis]
+    column = names.fin_measured if run.has(names.fin_measured) else names.fin
+    if not run.has(column):
+        raise no_fin(run, axis.value, column)
+    return column
+
+
+def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]:
+    """Yield the samples of a run after a time in s; raises DataError where the log has no fin, or neither angle nor rate."""
+    names, column = NAMES[axis], fin_column(run, axis)
+    if not run.has(names.angle) and not run.has(names.rate):
+        found = ", ".join(s for s in run.signals if run.has(s))
+        raise DataError(f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`", found=found, hint="map one of them")
+    nothing = np.full(len(run), nan)
+    wanted = (column, names.angle, names.rate, SURGE)
+    arrays = [run.time, *(run.signals.get(c, nothing) for c in wanted)]
+    start = int(np.searchsorted(run.time, after, side="right"))
+    for row in zip(*(a[start:].tolist() for a in arrays), strict=True):
+        yield Sample(*row)._replace(fin_is_held=column == names.fin)
+
+
+class MessageReader:
+    """JSON objects of canonical names, one a line, as samples of one axis; counts those that are none in `unreadable`."""
+
+    def __init__(self, axis: Axis) -> None:
+        self._names = NAMES[axis]
+        self.unreadable = 0
+        self.fin_is_measured: bool | None = None
+
+    def read(self, line: str | bytes) -> Sample | None:
+        """Return the sample of a line, None where it holds no time or is no JSON object; blank lines are passed over."""
+        if not line.strip():
+            return None
+        signals = _signals(line)
+        if signals is None or not isfinite(signals.get(TIME, nan)):
+            self.unreadable += 1
+            return None
+        names = self._names
+        if self.fin_is_measured is None and (names.fin in signals or names.fin_measured in signals):
+            self.fin_is_measured = names.fin_measured in signals
+        fin = signals.get(names.fin_measured if self.fin_is_measured else names.fin, nan)
+        angle, rate, speed = (signals.get(name, nan) for name in (names.angle, names.rate, SURGE))
+        return Sample(signals[TIME], fin, angle, rate, speed, not self.fin_is_measured)
+
+
+def _signals(line: str | bytes) -> dict[str, float] | None:
+    """Return what a line says by canonical signal in SI; None where it is no JSON object of numbers."""
+    try:
+        body = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(body, dict):
+        return None
+    found: dict[str, float] = {}
+    for key, value in body.items():
+        said = canonical(key)
+        if said is None or isinstance(value, bool) or not isinstance(value, (int, float)):
+            continue
+        factor = UNITS[said.unit].factor if said.signal == TIME else factor_to(said.signal, said.unit)
+        found[said.signal] = float(value) * factor
+    return found

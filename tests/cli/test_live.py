@@ -1,0 +1,117 @@
+"""`sysid live`: looks as JSON lines, a state that is gone on from, an exit code that says whether there was enough."""
+
+from __future__ import annotations
+
+import io
+import json
+
+import pytest
+from cli import trial
+
+from fieldsid.logs import load_run
+
+
+def looks(answer):
+    return [json.loads(line) for line in answer.out.splitlines()]
+
+
+def test_a_replayed_log_ends_near_the_truth_and_says_how_far_it_is(run_cli, tmp_path):
+    answer = run_cli("live", trial.flown(tmp_path), "--axis", "yaw", "--speed", "0", "--json")
+    assert answer.code == 0, answer.err
+    found = looks(answer)
+    assert found[0]["verdict"] == "starting"
+    assert [b["share"] for b in found][-1] > 0.0
+    last = found[-1]
+    for name, truth in trial.TRUTH["yaw"].items():
+        known = last["parameters"][name]
+        assert abs(known["value"] - truth) < 4.0 * known["std_error"]
+    assert last["next"].startswith("sysid identify ")
+
+
+def test_without_a_terminal_it_prints_a_line_a_look_and_the_table_at_the_end(run_cli, tmp_path):
+    answer = run_cli("live", trial.flown(tmp_path), "--axis", "yaw", "--speed", "0", "--every", "5")
+    assert answer.code == 0
+    assert "95 % band" in answer.out
+    assert "next: sysid identify" in answer.out
+    assert max(map(len, answer.out.split("\nyaw, ")[1].splitlines()[1:5])) <= 80
+
+
+def test_a_state_is_gone_on_from_and_ends_where_one_go_ends(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    table = tmp_path / "run.csv"
+    load_run(run)
+    whole = looks(run_cli("live", run, "--axis", "yaw", "--speed", "0", "--json"))[-1]
+    from fieldsid.logs import save_run
+
+    log = load_run(run)
+    half = float(log.time[len(log) // 2])
+    save_run(log.between(0.0, half), table)
+    state = tmp_path / "state.json"
+    arguments = ("live", table, "--axis", "yaw", "--speed", "0", "--json", "--state", state)
+    assert run_cli(*arguments).code == 0
+    save_run(log, table, force=True)
+    again = run_cli(*arguments)
+    assert "going on from" in again.err
+    last = looks(again)[-1]
+    assert last["samples"] == whole["samples"]
+    for name, known in whole["parameters"].items():
+        assert last["parameters"][name]["value"] == pytest.approx(known["value"], rel=1e-9)
+    other = run_cli("live", table, "--axis", "pitch", "--state", state, "--json")
+    assert other.code == 2
+    assert "is of yaw, not pitch" in other.err
+
+
+def test_a_damaged_state_is_refused(run_cli, tmp_path):
+    (tmp_path / "state.json").write_text('{"schema": "fieldsid/online/1", "state": {"version": 1}}')
+    answer = run_cli("live", trial.flown(tmp_path), "--axis", "yaw", "--state", tmp_path / "state.json")
+    assert answer.code == 2
+    assert "is no state" in answer.err
+
+
+def test_it_ends_at_enough_or_says_by_its_exit_code_that_there_was_not(run_cli, tmp_path):
+    run = trial.flown(tmp_path, spec="square_pulses")
+    easy = run_cli("live", run, "--axis", "yaw", "--speed", "0", "--want", "a22=50%,b2=50%", "--until-enough", "--json")
+    assert easy.code == 0
+    assert looks(easy)[-1]["verdict"] == "enough"
+    hard = run_cli("live", run, "--axis", "yaw", "--speed", "0", "--want", "a22=0.01%", "--until-enough", "--json")
+    assert hard.code == 1
+
+
+def test_lines_on_standard_input_are_taken(run_cli, tmp_path, monkeypatch):
+    log = load_run(trial.flown(tmp_path))
+    lines = [
+        json.dumps({"time_s": t, "rudder_rad": d, "yaw_rad": y, "yaw_rate_rad_s": r})
+        for t, d, y, r in zip(log.time, log["rudder_rad"], log["yaw_rad"], log["yaw_rate_rad_s"], strict=True)
+    ]
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(["rubbish", *lines])))
+    last = looks(run_cli("live", "-", "--axis", "yaw", "--json"))[-1]
+    assert last["counts"]["unreadable"] == 1
+    assert last["samples"] > 0.9 * len(lines)
+
+
+def test_the_goal_is_what_a_plan_promised(run_cli, tmp_path):
+    plan = run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "-o", tmp_path, "--json").json
+    file = next(tmp_path.glob("*.yaml"))
+    last = looks(run_cli("live", trial.flown(tmp_path), "--axis", "yaw", "--speed", "0", "--plan", file, "--json"))[-1]
+    promised = plan["legs"][0]["expected"]["a22"]["std_error_high"]
+    assert last["parameters"]["a22"]["goal_std_error"] == pytest.approx(promised)
+    assert file.name in last["goals_from"]
+    wrong = run_cli("live", trial.flown(tmp_path, name="b"), "--axis", "pitch", "--plan", file)
+    assert wrong.code == 2
+    assert "the plan is for yaw, not pitch" in wrong.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "either a log or `--udp PORT`"),
+        (["run.csv", "--udp", "5005"], "either a log or `--udp PORT`"),
+        (["--udp", "5005", "--follow"], "`--follow` needs a log"),
+        (["nowhere.csv"], "there is no log"),
+        (["nowhere.csv", "--plan", "p.yaml", "--want", "a22=5%"], "both say what is to be reached"),
+    ],
+)
+def test_what_cannot_be_meant_is_said(run_cli, arguments, says):
+    answer = run_cli("live", "--axis", "yaw", *arguments)
+    assert answer.code == 2
+    assert says in answer.err
