@@ -2,13 +2,13 @@
 
 A disturbance is a stationary Gaussian moment, independent of what the vehicle does. Its innovations under the fitted noise model
 are white, of constant variance, and unrelated to the fin and the motion. Three tests look for violations: whiteness (Ljung-Box);
-dependence on fin and motion (F test, the score test of diagnosis/residual_tests/memory_score_test.py, Breusch-Pagan test); and
-constant variance (largest windowed energy, homoscedasticity of the windows).
+dependence on fin and motion (F test, the score test of diagnosis/residual_tests/memory_score_test.py, Breusch-Pagan test) and on
+what else was measured (F test); and constant variance (largest windowed energy, homoscedasticity of the windows).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import factorial
 
@@ -74,8 +74,8 @@ def residual_tests(ml_fit: LikelihoodFit) -> ResidualTests:
     """
     runs = _training(ml_fit)
     memory = memory_score_test(ml_fit.fitted, ml_fit.noise)
-    relation, name = min(_dependence(runs), _breusch_pagan(runs), (memory.p, memory.what))
-    relation = min(1.0, 3.0 * relation)
+    relation, name = min(_dependence(runs), _other_signals(runs), _breusch_pagan(runs), (memory.p, memory.what))
+    relation = min(1.0, 4.0 * relation)
     bursts, run, window, ratio = _maximum_energy(runs)
     start = runs[run].record.time[0] + window * ENERGY_WINDOW_S
     bursts = min(1.0, 2.0 * min(bursts, _homoscedasticity(runs)))
@@ -121,10 +121,38 @@ def _features(run: Innovations, width: int) -> dict[str, FloatArray]:
 
 def _dependence(runs: Sequence[Innovations]) -> tuple[float, str]:
     """Return the p-value of an F test of innovations against fin and motion, and the best feature."""
+    return _regression(runs, _features)
+
+
+def _other_signals(runs: Sequence[Innovations]) -> tuple[float, str]:
+    """Return the p-value of an F test of innovations against what else every run measured, and the best feature.
+
+    Roll, depth, speed and thrust enter with their rates and the squares of both with sign: a moment that follows one of them in
+    a way that no effect of the catalogue has is no disturbance.
+    """
+    shared = sorted(set.intersection(*(set(run.record.signals) for run in runs)))
+    return _regression(runs, lambda run, width: _signal_features(run, width, shared)) if shared else (1.0, "")
+
+
+def _signal_features(run: Innovations, width: int, roles: Sequence[str]) -> dict[str, FloatArray]:
+    blocks = {}
+    for role in roles:
+        value = run.record.signals[role] - run.record.signals[role].mean()
+        slope = np.gradient(value, run.record.time)
+        for name, v in ((role, value), (f"{role} rate", slope)):
+            blocks[name] = block_means(v, width)
+            blocks[f"{name} x |{name}|"] = block_means(v * np.abs(v), width)
+    return blocks
+
+
+def _regression(
+    runs: Sequence[Innovations], features_of: Callable[[Innovations, int], dict[str, FloatArray]]
+) -> tuple[float, str]:
+    """Return the p-value of an F test of slow innovations against features of all runs together, and the best feature."""
     target, columns, names = [], [], list[str]()
     for run in runs:
         slow, width = _slow(run, ENERGY_WINDOW_S / 4)
-        features = _features(run, width)
+        features = features_of(run, width)
         names = list(features)
         target.append(slow)
         columns.append(np.column_stack(list(features.values())))

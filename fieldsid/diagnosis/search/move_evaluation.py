@@ -34,7 +34,7 @@ from fieldsid.diagnosis.search.add_effect import (
 )
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.fitting.initial.effect_screen import overlay_parameters
+from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
@@ -62,6 +62,8 @@ class MoveEvaluation(SearchState):
             self._fit_from_output_error(parent)
             self.output_error_screened.add(key)
             later = self._evaluate_moves(parent, by_effect(found))
+            if key in self.textbook:
+                self._fit_from_textbook(parent, left)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
             self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
             if self.budget.remaining():
@@ -70,6 +72,27 @@ class MoveEvaluation(SearchState):
             if self.budget.remaining():
                 self._try_laws_and_variants(key, self._leading(key))
         return self._children(key)
+
+    def _fit_from_textbook(self, parent: ScoredModel, left: Sequence[Effect]) -> None:
+        """Fit the parent with each effect that its textbook variant lacks, from the output-error fit with that.
+
+        A variant may have taken up the motion of an effect that is missing; from its own solution that effect explains little.
+        """
+        textbook, fitted = self.textbook[frozenset(parent.names)], parent.likelihood_fit.fitted
+        moves = add_effect(textbook, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=False)
+        groups = by_effect([m for m in moves if m.by_output_error])
+
+        def fit_all(group: Sequence[SearchMove]) -> ScoredModel:
+            effect = group[0].screened.effect
+            problem = fitted.problem.with_effects([*parent.effects, effect])
+            for move in group:
+                free = fit_output_error(move.screened.problem, move.screened.start, fitted.weights)
+                own = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
+                start = overlay_parameters(free.problem.layout, free.x, problem.layout, own)
+                self._fit_child(parent, problem, start, effect)
+            return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()
+
+        self.tried |= {frozenset(h.names): h for h in self.parallel.map(fit_all, groups)}
 
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.

@@ -75,6 +75,9 @@ class SearchState:
 
     evidence_at_variants: dict[frozenset[str], float] = field(default_factory=dict)
 
+    textbook: dict[frozenset[str], ScoredModel] = field(default_factory=dict)
+    """Models before another variant of an effect took their place: the variant may stand for an effect that is missing."""
+
     parallel: ParallelMap = field(init=False)
 
     budget: Budget = field(init=False)
@@ -151,7 +154,10 @@ class SearchState:
             if p.model.log_evidence > self.evidence_at_variants.get(frozenset(p.model.names), -np.inf) + MIN_LIKELIHOOD_GAIN
         ]
         for h in FormSearch(self.resolution_floor, self.noise_kind, self.floor, self.parallel).try_variants(asked):
-            self.tried[frozenset(h.names)], self.evidence_at_variants[frozenset(h.names)] = h, h.log_evidence
+            key = frozenset(h.names)
+            if [e.is_formed for e in h.effects] != [e.is_formed for e in self.tried[key].effects]:
+                self.textbook.setdefault(key, self.tried[key])
+            self.tried[key], self.evidence_at_variants[key] = h, h.log_evidence
 
     def _most_evident(self) -> ScoredModel:
         """Return the model of the highest log evidence, whether or not its effects are accepted."""
