@@ -15,7 +15,7 @@ from PIL.PngImagePlugin import PngInfo
 from fieldsid.figures import canvas
 
 DPI = 96
-LARGEST = 25_000
+LARGEST = 28_000
 """Bytes of a figure at most."""
 WHOLE = (0.0, 0.0, 1.0, 1.0)
 CELL = 12
