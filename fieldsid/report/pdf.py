@@ -45,14 +45,14 @@ def check_browser(path: Path) -> str:
 def print_pdf(html: str, path: Path, *, force: bool = False) -> Path:
     """Print an HTML text to a PDF file; raises UsageError without a browser, ArtifactError where it does not print."""
     program = check_browser(path)
-    with TemporaryDirectory() as folder, replacing(path, force=force) as temporary:
-        page = Path(folder) / "report.html"
+    with TemporaryDirectory() as folder, replacing(path, force=force) as whole:
+        page, printed = Path(folder) / "report.html", Path(folder) / "report.pdf"  # a file with a name, for another program
         page.write_text(html, encoding="utf-8")
         # a browser does not open its own sandbox for the administrator, who is who works in a container
         boxed = [] if getattr(os, "geteuid", lambda: 1)() else ["--no-sandbox"]
         words = [
             program, "--headless=new", *boxed, "--disable-gpu", "--no-first-run", f"--user-data-dir={folder}/profile",
-            "--no-pdf-header-footer", "--virtual-time-budget=5000", f"--print-to-pdf={temporary}", page.as_uri(),
+            "--no-pdf-header-footer", "--virtual-time-budget=5000", f"--print-to-pdf={printed}", page.as_uri(),
         ]  # fmt: skip
         try:
             done = subprocess.run(words, capture_output=True, text=True, timeout=LONGEST_S, check=False)
@@ -60,7 +60,8 @@ def print_pdf(html: str, path: Path, *, force: bool = False) -> Path:
             raise ArtifactError(
                 f"`{program}` does not print", found=f"no end after {LONGEST_S} s", hint="print the HTML"
             ) from error
-        if not temporary.stat().st_size:
+        if not printed.exists() or not printed.stat().st_size:
             said = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
             raise ArtifactError(f"`{program}` printed nothing", found=said[:200], hint="write HTML, and print it by hand")
+        whole.write_bytes(printed.read_bytes())
     return path

@@ -49,7 +49,7 @@ def test_the_hint_can_be_pasted(run_cli, here):
     assert run_cli("fit", "models/run7_yaw.yaml").code == 2  # one speed only, but a model
 
 
-@pytest.mark.parametrize("line", ["identify MODEL --axis yaw", "inspect MODEL", "import MODEL -o runs", "compare MODEL MODEL"])
+@pytest.mark.parametrize("line", ["identify MODEL --axis yaw", "inspect MODEL", "import MODEL -o runs"])
 def test_a_model_given_for_a_log_is_called_a_model(run_cli, here, line):
     answer = run_cli(*line.replace("MODEL", "truth.yaml").split())
     assert answer.code == 2

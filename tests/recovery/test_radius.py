@@ -53,17 +53,16 @@ def test_pulses_and_zigzag_with_drag_predict_the_circle_within_five_percent_and_
     runs = [pulses, zigzag]
     prediction = turn_radius(source_of(tmp_path, runs, DRAG), [SPEED], rudder, runs=runs)
     for row in prediction.rows:
-        assert row.method == "simulated"
+        assert row.method == "maneuvering"
         assert row.radius == pytest.approx(truth, rel=0.05)
         assert row.interval95[0] <= truth <= row.interval95[1]
     assert prediction.surge.surge_measured
 
 
-def test_pulses_alone_are_called_extrapolated_and_their_band_holds_the_truth(tmp_path, pulses):
+def test_the_band_of_pulses_alone_holds_the_truth(tmp_path, pulses):
     truth = steady_turn(0.3, speed=SPEED, fins=FINS)["radius_m"]
     for effects in ((), DRAG, SWAY):
         for row in turn_radius(source_of(tmp_path, [pulses], effects), [SPEED], 0.3, runs=[pulses]).rows:
-            assert row.trust == "extrapolated"
             assert row.interval95[0] <= truth <= row.interval95[1], effects
 
 

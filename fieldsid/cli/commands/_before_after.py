@@ -34,10 +34,11 @@ class Side:
 
 
 def is_side(path: Path) -> bool:
-    """Whether a path is a model, or a folder with models in it."""
-    if path.is_dir():
-        return any(own_kind(p) == "model" for p in path.rglob("*.yaml"))
-    return own_kind(path) == "model"
+    """Whether a path is a model, or a folder with models in it; one that cannot be reached is left to what reads it."""
+    try:
+        return own_kind(path) == "model" if not path.is_dir() else any(own_kind(p) == "model" for p in path.rglob("*.yaml"))
+    except PermissionError:
+        return False
 
 
 def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, force: bool, as_json: bool) -> Mapping[str, Any]:

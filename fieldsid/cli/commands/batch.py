@@ -204,7 +204,7 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     bad = body["skipped_runs"]
     to.print(Text(f"{body['runs']} runs identified, {len(bad)} not; {_said(body)}", style="bold"), soft_wrap=True)
     known = f", {body['known_logs']} of them known" if body["known_logs"] else ""
-    to.print(f"{body['logs']} logs{known}, {body['seconds']:.1f} s on {body['where']}", soft_wrap=True)
+    to.print(f"{body['logs']} logs{known}, took {body['seconds']:.1f} s on {body['where']}", soft_wrap=True)
     for t in body["trend"]:
         _render_trend(to, t)
     why: dict[str, list[str]] = {}

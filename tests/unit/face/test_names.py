@@ -20,6 +20,8 @@ HEAVY = ("numpy", "pandas", "scipy", "numba", "matplotlib", "typer", "rich", "py
 
 OF_FILES = {"output", "figure", "figures", "force", "as_json", "undo", "keep", "format_"}
 """What a command takes for what it prints and writes; a function returns a record instead."""
+OF_SESSION = {"context"}
+"""What a command is given by the command line that runs it."""
 OF_GATES = {"min_fit", "top", "require_phase_margin", "require_gain_margin", "require_delay_margin", "max_overshoot"}
 CALLED = {"from_s": "start", "to_s": "end"}
 NOTHING = (None, ())
@@ -53,7 +55,7 @@ def in_si(default):
 def test_a_function_takes_what_its_command_takes(name):
     theirs = {CALLED.get(n, n): in_si(p.default) for n, p in signature(function_of(*COMMANDS[name])).parameters.items()}
     ours = {n: p.default for n, p in signature(getattr(fieldsid, name)).parameters.items()}
-    assert set(ours) == set(theirs) - OF_FILES - OF_GATES
+    assert set(ours) == set(theirs) - OF_FILES - OF_GATES - OF_SESSION
     assert {n for n, default in ours.items() if default not in (theirs[n], *NOTHING)} - MUST == set()
     assert {n for n in ours if theirs[n] not in (ours[n], *NOTHING)} - MUST == set()
 
