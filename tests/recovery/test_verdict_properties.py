@@ -1,0 +1,92 @@
+"""What a verdict must be whatever is hidden: consistent with its own table, and the same for the same flight told otherwise."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from truth.bank import make_case
+
+from fieldsid.diagnosis import Diagnosis, diagnose
+from fieldsid.diagnosis.verdict import SUFFICIENT_ERROR_RATIO
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+
+SEED = 4711
+CASES = (("single", 1), ("single", 5), ("single", 12), ("none", 2), ("pair", 3), ("uncatalogued", 4))
+ODD_IN_MIRROR = ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", "roll_rad", "sway_m_s", "y_m")
+"""Signals that change their sign where port and starboard are exchanged."""
+Log = dict[str, np.ndarray]
+
+
+@cache
+def case(kind: str, index: int):
+    return make_case(index, SEED, kind=kind)
+
+
+def judged(training: list[Log], validation: list[Log], axis: str) -> Diagnosis:
+    def runs(logs: list[Log], tag: str) -> list[Run]:
+        return [
+            Run(f"{tag}{i}", np.asarray(log["time_s"], float), {k: np.asarray(v, float) for k, v in log.items() if k != "time_s"})
+            for i, log in enumerate(logs)
+        ]
+
+    return diagnose(runs(training, "train"), Axis(axis), runs(validation, "unseen"))
+
+
+@cache
+def found(kind: str, index: int) -> Diagnosis:
+    c = case(kind, index)
+    return judged(c.training, c.validation, c.axis)
+
+
+def mirrored(log: Log) -> Log:
+    return {k: -np.asarray(v, float) if k in ODD_IN_MIRROR else v for k, v in log.items()}
+
+
+@pytest.mark.parametrize(("kind", "index"), CASES)
+def test_what_is_named_is_the_most_probable_of_the_table_and_nothing_listed_is_better_in_all(kind, index):
+    d = found(kind, index)
+    if d.verdict in ("effect", "undecided"):
+        named = next(c for c in d.candidates if set(c.effects) == set(d.effects))
+        assert named.probability == max(c.probability for c in d.candidates)
+        assert named.probability > 0.05
+        for c in d.candidates:
+            assert not (
+                c.score > named.score
+                and c.errors.train.over(d.noise_floor) < named.errors.train.over(d.noise_floor)
+                and c.errors.validation.over(d.noise_floor) < named.errors.validation.over(d.noise_floor)
+            ), (named.effects, c.effects)
+        assert d.final.validation.over(d.noise_floor) < d.base.validation.over(d.noise_floor)
+    else:
+        assert d.effects == ()
+
+
+@pytest.mark.parametrize(("kind", "index"), CASES)
+def test_sufficient_is_said_only_within_fifteen_percent_of_the_noise(kind, index):
+    d = found(kind, index)
+    if d.verdict == "sufficient":
+        assert max(e.over(d.noise_floor) for e in (d.base.train, d.base.validation)) <= SUFFICIENT_ERROR_RATIO + 0.005
+
+
+@pytest.mark.parametrize(("kind", "index"), CASES)
+def test_the_order_of_the_runs_changes_nothing(kind, index):
+    c, d = case(kind, index), found(kind, index)
+    again = judged(c.training[::-1], c.validation[::-1], c.axis)
+    assert (again.verdict, set(again.effects)) == (d.verdict, set(d.effects))
+
+
+@pytest.mark.parametrize(("kind", "index"), [c for c in CASES if case(*c).axis == "yaw"])
+def test_port_for_starboard_changes_nothing(kind, index):
+    c, d = case(kind, index), found(kind, index)
+    again = judged([mirrored(g) for g in c.training], [mirrored(g) for g in c.validation], c.axis)
+    assert (again.verdict, set(again.effects)) == (d.verdict, set(d.effects))
+
+
+@pytest.mark.parametrize(("kind", "index"), CASES)
+def test_the_unit_of_thrust_changes_nothing(kind, index):
+    c, d = case(kind, index), found(kind, index)
+    scaled = [[{k: 250.0 * v if k == "thrust" else v for k, v in g.items()} for g in logs] for logs in (c.training, c.validation)]
+    again = judged(scaled[0], scaled[1], c.axis)
+    assert (again.verdict, set(again.effects)) == (d.verdict, set(d.effects))
