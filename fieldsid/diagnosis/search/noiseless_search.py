@@ -2,7 +2,8 @@
 
 The likelihood compares models by the disturbance that each still needs. Residuals that follow the fin or the motion are no
 disturbance, and without noise the smallest inconsistency of the sensors outweighs the hydrodynamics: the likeliest model need not
-predict best. Here an effect is added as long as it lowers the output-error fit's error on the validation runs by a twentieth.
+predict best. So sets of effects are sought by the output-error fit's error, an effect added as long as it lowers that on training
+and validation runs by a twentieth; which of the sets found is named is a matter of their log evidence, as everywhere.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 200, 1e-7
 """Iterations of each output-error fit, and the share of its sum of squares that an iteration must gain: convergence is slow."""
 MAX_FREE_RUN_ERROR_RATIO = 0.95
 """Ratio that the error must fall to with each added effect."""
+LEADING_SETS = 6
+"""Sets of least error whose evidence is weighed, besides those without one effect of the best: more cost time alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +47,10 @@ class FreeRunFit:
 
 
 def noiseless_search(search: Search) -> ScoredModel | None:
-    """Return the model that a beam search by validation error ends at, None where no effect lowers the error enough.
+    """Return the most probable of the models that a beam search by the error finds, None where no effect lowers it enough.
 
-    The best two models of every size are extended, because the best single effect need not be part of the best set. The models
-    without one of the final effects are added to what the search has tried.
+    The best two models of every size are extended, because the best single effect need not be part of the best set. The leading
+    sets, and those without one of the effects of the last, are added to what the search has tried.
     """
     base = search.base()
     best = start = FreeRunFit(base.reported_fit, base.errors, 1.0)
@@ -66,9 +69,10 @@ def noiseless_search(search: Search) -> ScoredModel | None:
     if best is start:
         return None
     best, without = _backward_eliminate(search, best, seen)
-    found, *less = search.parallel.map(partial(_scored, search), [best.output_error_fit, *(w.output_error_fit for w in without)])
-    search.tried |= {frozenset(h.names): h for h in (found, *less)}
-    return found
+    leading = sorted(seen.values(), key=lambda f: f.error_ratio)[:LEADING_SETS]
+    fits = {frozenset(f.output_error_fit.names): f.output_error_fit for f in (best, *without, *leading)}
+    search.tried |= dict(zip(fits, search.parallel.map(partial(_scored, search), list(fits.values())), strict=True))
+    return search.best_admissible()
 
 
 def _keep(known: dict[frozenset[str], FreeRunFit], new: FreeRunFit) -> None:
@@ -124,7 +128,11 @@ def _forward_candidates(search: Search, current: FittedProblem) -> list[FreeRunF
     def followed(screened: ScreenResult) -> FreeRunFit:
         search.report("+".join((*current.names, screened.effect.name)))
         from_screen = fit_output_error(
-            screened.problem, backtrack(linearisation, screened).start, current.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE
+            screened.problem,
+            backtrack(linearisation, screened).start,
+            current.weights,
+            MAX_FREE_RUN_ITERATIONS,
+            COST_TOLERANCE,
         )
         return _evaluate(
             search, min((from_screen, _from_declared_start(screened, current)), key=lambda t: t.weights.angle * t.weights.rate)
@@ -137,7 +145,11 @@ def _from_declared_start(screened: ScreenResult, current: FittedProblem) -> Fitt
     """Return the output-error fit from the equation-error start and declared start values: the base may be biased."""
     problem = screened.problem
     return fit_output_error(
-        problem, equation_error_start(problem.records, problem.layout), current.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE
+        problem,
+        equation_error_start(problem.records, problem.layout),
+        current.weights,
+        MAX_FREE_RUN_ITERATIONS,
+        COST_TOLERANCE,
     )
 
 

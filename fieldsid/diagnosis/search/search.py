@@ -25,7 +25,7 @@ class Search(MoveEvaluation):
     def best(self) -> ScoredModel:
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
-        found = self._best_admissible()
+        found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
             self.error_ratio(found) > MISSING_ERROR_RATIO
@@ -38,13 +38,13 @@ class Search(MoveEvaluation):
             )
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
-            found = self._best_admissible()
+            found = self.best_admissible()
         if self.error_ratio(found) > MIN_ERROR_RATIO and self.budget.remaining():
             found = multistart(
                 found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
             )
             self.tried[frozenset(found.names)] = found
-        return self._best_admissible()
+        return self.best_admissible()
 
     def _expand(self) -> None:
         """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise."""
@@ -52,7 +52,7 @@ class Search(MoveEvaluation):
         while (leading := self._next_to_expand()) is not None:
             self.forward_step(leading)
             self._drop_each()
-            self.update_noise_floor(self._best_admissible().likelihood_fit.fitted)
+            self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
             if self._switch_noise_or_trim():
                 self.base()
 
@@ -94,7 +94,7 @@ class Search(MoveEvaluation):
         """
         if not self.budget.remaining():
             return False
-        found = self._best_admissible()
+        found = self.best_admissible()
         noise = partial(fit_other_noise, found, self.floor, self.noise_kinds_tried, self.parallel)
         ml_fit, again = self.trim_laws.best_alternative(
             found, self.tried, self.floor, self.resolution_floor, self.parallel, noise

@@ -185,7 +185,7 @@ class SearchState:
         """Whether every effect of a model is accepted."""
         return self.core_of(h) == frozenset(h.names)
 
-    def _best_admissible(self) -> ScoredModel:
+    def best_admissible(self) -> ScoredModel:
         """Return the model of the accepted set with the highest log evidence."""
         sums = self.evidences()
         return self.tried[max(sums, key=lambda k: sums[k])]
