@@ -26,7 +26,6 @@ from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, resi
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.verdict import (
-    MIN_EXPLAINED_SHARE,
     MIN_RIVAL_PROBABILITY_RATIO,
     Verdict,
     added_effects,
@@ -52,6 +51,11 @@ SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
 )
 FinalModel = tuple[Model, tuple[Note, ...]]
+
+
+NOISELESS_EXPLAINED_SHARE = 0.5
+"""Share of the excess error that effects must explain to be named from a log without noise: more than they leave. No p-value
+decides there, since without noise whatever is left is significant."""
 
 
 def diagnose(
@@ -85,8 +89,8 @@ def diagnose(
     work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
     work.base()
     if work.is_noiseless:
-        found = noiseless_search(work)
-        if found is not None and excess_explained(work, found) > MIN_EXPLAINED_SHARE:
+        found = noiseless_search(work, lambda h: excess_explained(work, h) > NOISELESS_EXPLAINED_SHARE)
+        if found is not None and excess_explained(work, found) > NOISELESS_EXPLAINED_SHARE:
             ending = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
             return _diagnosis(ending, skipped, notes)
         work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)

@@ -3,11 +3,12 @@
 The likelihood compares models by the disturbance that each still needs. Residuals that follow the fin or the motion are no
 disturbance, and without noise the smallest inconsistency of the sensors outweighs the hydrodynamics: the likeliest model need not
 predict best. So sets of effects are sought by the output-error fit's error, an effect added as long as it lowers that on training
-and validation runs by a twentieth; which of the sets found is named is a matter of their log evidence, as everywhere.
+and validation runs by a twentieth. Of the set found an effect is left out again where the log evidence is higher without it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -33,8 +34,6 @@ MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 200, 1e-7
 """Iterations of each output-error fit, and the share of its sum of squares that an iteration must gain: convergence is slow."""
 MAX_FREE_RUN_ERROR_RATIO = 0.95
 """Ratio that the error must fall to with each added effect."""
-LEADING_SETS = 6
-"""Sets of least error whose evidence is weighed, besides those without one effect of the best: more cost time alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +45,12 @@ class FreeRunFit:
     error_ratio: float
 
 
-def noiseless_search(search: Search) -> ScoredModel | None:
-    """Return the most probable of the models that a beam search by the error finds, None where no effect lowers it enough.
+def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) -> ScoredModel | None:
+    """Return the model that a beam search by the error ends at, None where no effect lowers it enough.
 
-    The best two models of every size are extended, because the best single effect need not be part of the best set. The leading
-    sets, and those without one of the effects of the last, are added to what the search has tried.
+    The best two models of every size are extended, because the best single effect need not be part of the best set. Effects that
+    the log evidence speaks against are left out at the end, as long as what is left still `explains` enough. That set, and those
+    without one of its effects, are added to what the search has tried.
     """
     base = search.base()
     best = start = FreeRunFit(base.reported_fit, base.errors, 1.0)
@@ -69,10 +69,15 @@ def noiseless_search(search: Search) -> ScoredModel | None:
     if best is start:
         return None
     best, without = _backward_eliminate(search, best, seen)
-    leading = sorted(seen.values(), key=lambda f: f.error_ratio)[:LEADING_SETS]
-    fits = {frozenset(f.output_error_fit.names): f.output_error_fit for f in (best, *without, *leading)}
-    search.tried |= dict(zip(fits, search.parallel.map(partial(_scored, search), list(fits.values())), strict=True))
-    return search.best_admissible()
+    while True:
+        tried = [best, *without]
+        models = search.parallel.map(partial(_scored, search), [t.output_error_fit for t in tried])
+        search.tried |= {frozenset(h.names): h for h in models}
+        found = max((models[0], *filter(explains, models[1:])), key=lambda h: h.log_evidence)
+        if found is models[0]:
+            return found
+        best = tried[models.index(found)]
+        without = _without_each(search, best, seen)
 
 
 def _keep(known: dict[frozenset[str], FreeRunFit], new: FreeRunFit) -> None:
@@ -87,16 +92,23 @@ def _backward_eliminate(
 ) -> tuple[FreeRunFit, list[FreeRunFit]]:
     """Return a fit without the effects that are no longer needed, and the fits without each of those that remain."""
     while True:
-        effects = [e for e in best.output_error_fit.effects if e.name not in search.known]
-        if len(effects) < 2:
+        less = _without_each(search, best, seen)
+        if not less:
             return best, []
-        for new in search.parallel.map(partial(_drop_effect, search, best.output_error_fit), effects):
-            _keep(seen, new)
-        less = [seen[frozenset(best.output_error_fit.names) - {e.name}] for e in effects]
         idle = min(less, key=lambda f: f.error_ratio)
         if best.error_ratio <= MAX_FREE_RUN_ERROR_RATIO * idle.error_ratio:
             return best, less
         best = idle
+
+
+def _without_each(search: Search, best: FreeRunFit, seen: dict[frozenset[str], FreeRunFit]) -> list[FreeRunFit]:
+    """Return the fits without each of a set's effects, none where it has one alone."""
+    effects = [e for e in best.output_error_fit.effects if e.name not in search.known]
+    if len(effects) < 2:
+        return []
+    for new in search.parallel.map(partial(_drop_effect, search, best.output_error_fit), effects):
+        _keep(seen, new)
+    return [seen[frozenset(best.output_error_fit.names) - {e.name}] for e in effects]
 
 
 def _drop_effect(search: Search, fitted: FittedProblem, gone: Effect) -> FreeRunFit:

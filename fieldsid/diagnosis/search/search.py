@@ -14,8 +14,11 @@ from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
 from fieldsid.diagnosis.search.multistart import MIN_ERROR_RATIO, multistart
 from fieldsid.diagnosis.search.speed_law_search import trim_follows_fin
-from fieldsid.fitting.initial.effect_screen import transfer_parameters
+from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.models.effect import Effect
+
+MAX_JOINED = 3
+"""Sets that are fitted again with what the leading model has besides: a fit each."""
 
 
 @dataclass(slots=True)
@@ -25,6 +28,7 @@ class Search(MoveEvaluation):
     def best(self) -> ScoredModel:
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
+        self._join_leaders()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -56,6 +60,31 @@ class Search(MoveEvaluation):
             if self._switch_noise_or_trim():
                 self.base()
 
+    def _join_leaders(self) -> None:
+        """Fit the sets of clearly lower error with the small effects too that the model of the highest evidence has besides.
+
+        A lag of a sample shows in the evidence more than a large effect that is slow; a set without it is compared unfairly, and
+        the search may have ended before both were tried together.
+        """
+        best = self._most_evident()
+        idle = [e for e in best.effects if e.name not in self.core_of(best)]
+        for h in self._front(best)[:MAX_JOINED]:
+            more = [e for e in idle if e.name not in h.names]
+            names = frozenset((*h.names, *(e.name for e in more)))
+            if not more or names in self.tried or len(names) > len(self.known) + MAX_EFFECTS:
+                continue
+            fitted, other = h.likelihood_fit.fitted, best.likelihood_fit.fitted
+            problem = fitted.problem.with_effects([*h.effects, *more])
+            own = transfer_parameters(other.problem.layout, other.x, problem.layout)
+            start = overlay_parameters(fitted.problem.layout, fitted.x, problem.layout, own)
+            ml_fit = fit_maximum_likelihood(problem, start, best.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+            self.tried[names] = prefer_output_error(self._keep(ml_fit), self.floor)
+
+    def _front(self, best: ScoredModel) -> list[ScoredModel]:
+        """Return the models of accepted effects whose error is clearly below that of the one with the highest evidence."""
+        least = MAX_ERROR_RATIO * best.selection_errors.mean
+        return [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
+
     def _next_to_expand(self) -> ScoredModel | None:
         """Return the leading model to expand next, None where all are expanded.
 
@@ -68,8 +97,7 @@ class Search(MoveEvaluation):
         if not self.budget.remaining():
             return None
         best = self._most_evident()
-        least = MAX_ERROR_RATIO * best.selection_errors.mean
-        front = [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
+        front = self._front(best)
         leading = [best, *front, *self._less(best)] if leaves_error(best, self.floor) else front
         return next((h for h in leading if self._is_expandable(h)), None)
 

@@ -41,7 +41,7 @@ def work():
 
 
 def test_both_hidden_effects_are_found_and_what_each_lacks_is_known(work):
-    found = noiseless_search(work)
+    found = noiseless_search(work, lambda _h: True)
     assert set(found.names) == {"servo_lag", "quadratic_damping"}
     assert found.selection_errors.mean < 0.05 * work.base().selection_errors.mean
     first, second = added_effects(work, found)
@@ -50,7 +50,7 @@ def test_both_hidden_effects_are_found_and_what_each_lacks_is_known(work):
 
 
 def test_an_effect_that_the_others_have_made_idle_is_left_out(work):
-    whole = noiseless_search(work).output_error_fit
+    whole = noiseless_search(work, lambda _h: True).output_error_fit
     problem, x = with_effect(whole.problem, whole.x, pick_effect("gyro_bias"), {})
     more = _evaluate(work, fit_output_error(problem, x, whole.weights))
     best, less = _backward_eliminate(work, more, {})
