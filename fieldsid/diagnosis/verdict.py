@@ -53,22 +53,21 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
 
     Errors are over the sensors' noise; its coloured part counts where the noise is fitted jointly with a disturbance. Without an
     effect, `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is
-    `disturbed` where the innovations pass the tests of a disturbance, else `unexplained`.
+    `disturbed` where the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the
+    training runs better leaves a visible error on the validation runs that is no smaller than without it.
     """
     noise, floor = ml_fit.noise, reported_noise_floor(search.floor, ml_fit.noise)
     least = floor if ml_fit.noise_kind == JOINT_NOISE else search.floor
     error = found.selection_errors.over(least)
     if frozenset(found.names) == search.root:
-        worst = max(error, found.train.over(least))
-        if worst <= SUFFICIENT_ERROR_RATIO:
+        if max(error, found.train.over(least)) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
-        sea = max(found.selection_errors.over(floor), found.train.over(floor))
-        p = 3.0 * left.dependence if worst < ERROR_LOW else left.p
-        odd = p < MIN_P_VALUE or sea > ERROR_HIGH or validation_error_ratio(found, least) > MAX_VALIDATION_ERROR_RATIO
-        return Verdict("unexplained" if odd else "disturbed", ())
+        return _unnamed(found, left, floor, least)
     visible = (
         found.selection_errors.over(floor) if noise.coloured_time < MAX_SENSOR_COLOUR_S else error
     ) > SUFFICIENT_ERROR_RATIO
+    if visible and found.selection_errors.mean >= search.base().selection_errors.mean:
+        return _unnamed(found, left, floor, least)
     share = excess_explained(search, found, least)
     asked = (
         VERDICT_TABLE
@@ -81,6 +80,15 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     if rivals:
         return Verdict("undecided", added_effects(search, found), rivals)
     return Verdict("effect", added_effects(search, found))
+
+
+def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise, least: Noise) -> Verdict:
+    """Return the verdict where no effect lowers the error that models are selected by: `disturbed`, or `unexplained`."""
+    worst = max(found.selection_errors.over(least), found.train.over(least))
+    sea = max(found.selection_errors.over(floor), found.train.over(floor))
+    p = 3.0 * left.dependence if worst < ERROR_LOW else left.p
+    odd = p < MIN_P_VALUE or sea > ERROR_HIGH or validation_error_ratio(found, least) > MAX_VALIDATION_ERROR_RATIO
+    return Verdict("unexplained" if odd else "disturbed", ())
 
 
 def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
