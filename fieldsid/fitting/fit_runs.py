@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+from fieldsid.fitting.checks.closed_loop import refuse_feedback_alone
 from fieldsid.fitting.fit import check
 from fieldsid.logs.run import Run
 from fieldsid.logs.several.sifting import Refused, attempt, sifted
@@ -28,4 +29,5 @@ def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] 
 def _checked(run: Run, *, axis: Axis) -> Record:
     record = record_of(run, axis)
     check([record], axis)
+    refuse_feedback_alone(record)
     return record

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from fieldsid.errors import UsageError
+from fieldsid.fitting.checks.closed_loop import refuse_feedback_alone
 from fieldsid.fitting.checks.run_checks import offset_findings, run_checks, sign_findings
 from fieldsid.fitting.fit import AUTO, Fit, check, check_signals, fit
 from fieldsid.fitting.problem.estimator import Options
@@ -42,6 +43,7 @@ def identify(
         part = run if whole else segment(run, axis).of(run)
         record = record_of(part, axis)
         check([record], axis)
+        refuse_feedback_alone(record)
         check_signals([record], effects)
         return _Judged(run, record, run_checks(part, axis, vehicle))
 

@@ -234,7 +234,7 @@ def is_told(damage: Damage, found: set[str]) -> bool:
 def table(logs: int, folder: Path, first_seed: int = 0) -> tuple[dict[str, float], dict[str, float]]:
     """Return the share of logs in which each damage is told, and the share of good logs with each finding.
 
-    Good logs have seeds from the first on, damaged ones from 1000 after it on: a fresh range tells what another range was tuned to.
+    Good logs have seeds from the first on, damaged ones from 1000 after it on.
     """
     good: dict[str, float] = {}
     false = 0

@@ -16,11 +16,15 @@ from fieldsid.artifacts import read_yaml, to_yaml
 from fieldsid.cli.app import run as command
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, LogError, MappingError, ModelError
+from fieldsid.fitting.checks.closed_loop import controller
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.mapping.mapping_file import load_mapping
 from fieldsid.logs.readers._mat_elements import refuse_damaged
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model
+from fieldsid.models.record import record_of
 from fieldsid.planning.belief.prior_file import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
 from fieldsid.schedule.record import load_schedule
@@ -286,3 +290,10 @@ def test_a_count_without_end_is_no_description_of_a_bag(tmp_path):
     at = text.index("message_count: ", text.index("topics_with_message_count"))
     file.write_text(text[:at] + "message_count: .inf\n" + text[text.index("\n", at) + 1 :])
     assert any("no description of a bag" in n.message for n in inspect_log(path).notes)
+
+
+def test_a_record_shorter_than_a_controllers_window_has_none():
+    random, n = np.random.default_rng(1), 60
+    yaw, fin = np.cumsum(0.01 * random.standard_normal((2, n)), axis=1)
+    record = record_of(Run("short", 1e-3 * np.arange(n), {"yaw_rad": yaw, "yaw_rate_rad_s": yaw, "rudder_rad": fin}), Axis.YAW)
+    assert controller(record) is None

@@ -9,18 +9,24 @@ disturbance, and an estimate without it can mistake the controller for the vehic
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.errors import DataError
+from fieldsid.logs.doctor.spikes import last_digit
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.white_noise import white_noise_std
 
 SMOOTHING_WINDOW_S = 0.3
 MAX_DELAY_S = 1.0
 MIN_EXPLAINED_SHARE = 0.9
 TRIMMED_SHARE = 0.05
+MAX_OF_NOISE = 0.5
+"""Half of the variance that noise the fin does not follow would leave at least; noise that it does follow leaves none."""
 MIN_MOVING_SHARE = 0.5
 """Share of the record over which the fin must move for a controller to be looked for."""
 
@@ -51,32 +57,82 @@ def closed_loop_note(record: Record) -> Iterator[Note]:
 
 def controller(record: Record) -> tuple[float, float, float, float] | None:
     """Return the share explained, gains on angle and rate (s) and delay (s) of the best controller; None where none can be."""
-    if not (record.angle_ok.all() and record.rate_ok.all()):
+    best = _best(record, TRIMMED_SHARE)
+    return None if best is None else (best[0].share, *best[0].gains, best[1])
+
+
+def refuse_feedback_alone(record: Record) -> None:
+    """Raise DataError where the fin is the feedback of what the log holds, and nothing of its own moves it.
+
+    Two conditions, both without leaving out any change. At least MIN_EXPLAINED_SHARE of the fin's changes is explained. What is
+    left, less the rounding of the fin, is smaller than what the sensor's noise alone must leave where the fin does not follow
+    it: of a fin y regressed on x + n with gain k, n independent of y, at least k^2 var n is left. Slow open-loop motion that
+    happens to resemble the fin meets the first condition and not the second.
+    """
+    best = _best(record, 0.0)
+    if best is None or best[0].share < MIN_EXPLAINED_SHARE or not best[0].left < MAX_OF_NOISE * best[0].noise:
+        return
+    found, delay = best
+    names = NAMES[record.axis]
+    raise DataError(
+        f"run {record.name!r} does not identify {record.axis.value}: its fin is feedback of `{names.angle}`",
+        found=f"{100 * found.share:.0f} % of the fin's changes follow it {delay:.2f} s before, with the sensor's noise "
+        f"({found.gains[0]:+.2f} rad per rad, {found.gains[1]:+.2f} rad per rad/s)",
+        hint="fly pulses on top of the controller, or with it off",
+    )
+
+
+def _best(record: Record, trimmed: float) -> tuple[_Explained, float] | None:
+    """Return the best controller with its delay in s; None where none can be looked for."""
+    if not record.angle_ok.all() or (record.rate_ok.any() and not record.rate_ok.all()):
         return None
     step = float(np.median(record.steps))
     width = max(1, round(SMOOTHING_WINDOW_S / step))
     longest = min(round(MAX_DELAY_S / step), len(record) // 4)
     moved = record.fin[width:] - record.fin[:-width]
+    if moved.size <= longest:
+        return None
     if np.mean(np.abs(moved) > 1e-3 * max(float(np.ptp(record.fin)), 1e-9)) < MIN_MOVING_SHARE:
         return None
-    best: tuple[float, float, float, float] | None = None
-    for lag in range(longest + 1):
-        found = _explained(record, moved, width, lag, longest)
-        if best is None or found[0] > best[0]:
-            best = (*found, lag * step)
-    return best
+    tried = [(_explained(record, moved, width, lag, longest, trimmed), lag * step) for lag in range(longest + 1)]
+    return max(tried, key=lambda one: one[0].share)
 
 
-def _explained(record: Record, moved: FloatArray, width: int, lag: int, longest: int) -> tuple[float, float, float]:
-    """Return the share of the fin's changes explained at one lag, robustly, and both gains."""
+@dataclass(frozen=True, slots=True)
+class _Explained:
+    """Share of the fin's changes explained, gains on angle and rate (s), variance left, and what sensor noise would leave."""
+
+    share: float
+    gains: tuple[float, float]
+    left: float
+    noise: float
+
+
+def _explained(record: Record, moved: FloatArray, width: int, lag: int, longest: int, trimmed: float) -> _Explained:
+    """Return what the motion a lag before explains of the fin's changes, the largest left out to a share."""
     target = moved[longest:]
-    columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, record.rate)])
+    step = float(np.median(record.steps))
+    measured = bool(record.rate_ok.any())
+    # a controller without a rate sensor takes differences of the angle
+    rate = record.rate if measured else np.diff(record.angle, prepend=record.angle[0]) / step
+    columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, rate)])
     free = (record.fin > record.fin.min()) & (record.fin < record.fin.max())
     free = (free[width:] & free[:-width])[longest:]
     if free.sum() < MIN_MOVING_SHARE * free.size:
-        return 0.0, 0.0, 0.0
-    keep = free & (np.abs(target) <= np.quantile(np.abs(target[free]), 1.0 - TRIMMED_SHARE))
+        return _Explained(0.0, (0.0, 0.0), 0.0, 0.0)
+    keep = free & (np.abs(target) <= np.quantile(np.abs(target[free]), 1.0 - trimmed))
     gains = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-9)[0]
     left = target[keep] - columns[keep] @ gains
     power = float(target[keep] @ target[keep])
-    return (1.0 - float(left @ left) / power if power > 0.0 else 0.0), float(gains[0]), float(gains[1])
+    on_angle, on_rate = float(gains[0]), float(gains[1])
+    of_angle = white_noise_std(record.angle, record.angle_ok) ** 2
+    if measured:
+        noise = on_angle**2 * of_angle + on_rate**2 * white_noise_std(record.rate, record.rate_ok) ** 2
+    else:
+        noise = ((on_angle + on_rate / step) ** 2 + (on_rate / step) ** 2) * of_angle
+    return _Explained(
+        1.0 - float(left @ left) / power if power > 0.0 else 0.0,
+        (on_angle, on_rate),
+        max(float(np.mean(left**2)) - last_digit(record.fin) ** 2 / 6.0, 0.0),
+        2.0 * noise,
+    )

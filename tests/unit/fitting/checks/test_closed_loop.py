@@ -1,0 +1,96 @@
+"""Which logs are refused as feedback alone: an autopilot's without excitation, never one flown open loop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldsid.diagnosis.diagnose import diagnose
+from fieldsid.errors import DataError
+from fieldsid.fitting.checks.closed_loop import controller, refuse_feedback_alone
+from fieldsid.fitting.identify import identify
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
+
+STEP, LENGTH = 0.05, 1600
+NOISE = 0.003
+
+
+def flown(seed, *, gains=(0.0, 0.0), delay=2, excitation="none", with_rate=True, counts=0.0) -> Run:
+    """A vehicle of first order in yaw under gusts, its fin feedback of the measured angle plus an excitation."""
+    random = np.random.default_rng(seed)
+    t = STEP * np.arange(LENGTH)
+    own = OPEN_LOOP[excitation](t, random)
+    angle, rate, fin, seen, turn = (np.zeros(LENGTH) for _ in range(5))
+    gust, a, b = 0.0, random.uniform(0.6, 1.5), random.choice([-1.0, 1.0]) * random.uniform(0.6, 2.0)
+    for i in range(LENGTH):
+        seen[i] = angle[i] + NOISE * random.standard_normal()
+        turn[i] = rate[i] + NOISE * random.standard_normal()
+        k = max(i - delay, 1)
+        slope = turn[k] if with_rate else (seen[k] - seen[k - 1]) / STEP
+        fin[i] = own[i] - np.sign(b) * (gains[0] * seen[k] + gains[1] * slope)
+        fin[i] = np.round(fin[i] * counts) / counts if counts else fin[i]
+        gust += STEP * (-gust) + 0.15 * np.sqrt(STEP) * random.standard_normal()
+        if i + 1 < LENGTH:
+            rate[i + 1] = rate[i] + STEP * (-a * rate[i] + b * fin[i] + gust)
+            angle[i + 1] = angle[i] + STEP * rate[i + 1]
+    return Run("flight", t, {"yaw_rad": seen, "rudder_rad": fin} | ({"yaw_rate_rad_s": turn} if with_rate else {}))
+
+
+def _holds(t, random):
+    return np.repeat(random.choice([-0.25, -0.1, 0.0, 0.1, 0.25], t.size // 60 + 1), 60)[: t.size]
+
+
+def _chirp(t, random):
+    return 0.25 * np.sin(2.0 * np.pi * (0.02 + random.uniform(0.0005, 0.003) * t) * t)
+
+
+def _sine(t, random):
+    return 0.2 * np.sin(2.0 * np.pi * random.uniform(0.03, 0.4) * t)
+
+
+def _multisine(t, random):
+    return sum(0.06 * np.sin(2.0 * np.pi * f * t + random.uniform(0.0, 6.0)) for f in (0.03, 0.07, 0.13, 0.24))
+
+
+OPEN_LOOP = {"none": lambda t, _: 0.0 * t, "holds": _holds, "chirp": _chirp, "sine": _sine, "multisine": _multisine}
+PILOTS = {
+    "P": {"gains": (1.15, 0.0), "with_rate": False},
+    "P, fin in counts": {"gains": (1.15, 0.0), "with_rate": False, "counts": 200.0},
+    "PD": {"gains": (1.0, 0.8)},
+    "PD on differences": {"gains": (1.0, 0.3), "with_rate": False},
+}
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("pilot", PILOTS.values(), ids=PILOTS)
+def test_feedback_alone_is_refused(pilot, seed):
+    with pytest.raises(DataError, match="does not identify yaw: its fin is feedback"):
+        refuse_feedback_alone(record_of(flown(seed, **pilot), Axis.YAW))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("pilot", PILOTS.values(), ids=PILOTS)
+def test_feedback_with_pulses_on_top_is_not(pilot, seed):
+    refuse_feedback_alone(record_of(flown(seed, excitation="holds", **pilot), Axis.YAW))
+
+
+@pytest.mark.parametrize("with_rate", [True, False])
+@pytest.mark.parametrize("kind", ["holds", "chirp", "sine", "multisine"])
+@pytest.mark.parametrize("seed", range(5))
+def test_open_loop_is_never_refused(kind, with_rate, seed):
+    refuse_feedback_alone(record_of(flown(seed, excitation=kind, with_rate=with_rate), Axis.YAW))
+
+
+def test_a_controller_is_found_from_the_angle_alone():
+    share, gain, _, delay = controller(record_of(flown(1, **PILOTS["P, fin in counts"]), Axis.YAW))
+    assert share > 0.9
+    assert abs(gain) == pytest.approx(1.15, rel=0.05)
+    assert delay == pytest.approx(0.1, abs=1.01 * STEP)  # a difference of the angle holds the angle one sample before as well
+
+
+@pytest.mark.parametrize("door", [lambda run: identify([run], Axis.YAW, whole=True), lambda run: diagnose([run], Axis.YAW)])
+def test_identify_and_diagnose_refuse(door):
+    with pytest.raises(DataError, match="its fin is feedback"):
+        door(flown(2, **PILOTS["P"]))
