@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -297,3 +298,11 @@ def test_a_record_shorter_than_a_controllers_window_has_none():
     yaw, fin = np.cumsum(0.01 * random.standard_normal((2, n)), axis=1)
     record = record_of(Run("short", 1e-3 * np.arange(n), {"yaw_rad": yaw, "yaw_rate_rad_s": yaw, "rudder_rad": fin}), Axis.YAW)
     assert controller(record) is None
+
+
+def test_a_heading_whose_differences_overflow_has_no_controller():
+    random, n = np.random.default_rng(1), 600
+    yaw, fin = np.cumsum(0.01 * random.standard_normal((2, n)), axis=1)
+    yaw[300] = np.inf
+    record = record_of(Run("far", 0.05 * np.arange(n), {"yaw_rad": np.zeros(n), "rudder_rad": fin}), Axis.YAW)
+    assert controller(replace(record, angle=yaw))[0] == 0.0

@@ -118,7 +118,7 @@ def _explained(record: Record, moved: FloatArray, width: int, lag: int, longest:
     columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, rate)])
     free = (record.fin > record.fin.min()) & (record.fin < record.fin.max())
     free = (free[width:] & free[:-width])[longest:]
-    if free.sum() < MIN_MOVING_SHARE * free.size:
+    if free.sum() < MIN_MOVING_SHARE * free.size or not (np.isfinite(columns).all() and np.isfinite(target).all()):
         return _Explained(0.0, (0.0, 0.0), 0.0, 0.0)
     keep = free & (np.abs(target) <= np.quantile(np.abs(target[free]), 1.0 - trimmed))
     gains = np.linalg.lstsq(columns[keep], target[keep], rcond=1e-9)[0]
