@@ -72,10 +72,18 @@ def turn_radius(
             hint="add `--method u_turn`, or leave `--law` out",
         )
     belief = before = None
+    unfitted: list[Note] = []
     if chosen in ("simulated", "maneuvering") and method != "simulated" and runs:
         rng = np.random.default_rng(SEED)
-        before = believe(runs, source.models, length, rng)
-        belief = believe((*runs, *measured), source.models, length, rng) if measured else before
+        try:
+            before = believe(runs, source.models, length, rng)
+            belief = believe((*runs, *measured), source.models, length, rng) if measured else before
+        except ModelError as error:
+            if method == "maneuvering":
+                raise
+            belief = before = None
+            words = f"{error.what}: {error.found}; each speed's own model is simulated instead"
+            unfitted.append(Note("maneuvering_not_fitted", words, {"runs": [run.name for run in runs]}))
     if method == "maneuvering" and belief is None:
         raise UsageError(
             "surge, sway and yaw cannot be fitted without runs that have a speed, a fin and a turn", found=f"{len(runs)} runs",
@@ -99,7 +107,7 @@ def turn_radius(
     compared = [_compared(turn, rows_at, least) for turn in turns]
     rows = [_with_measurement(row, compared, rudder_max) for row in rows]
     return TurnPrediction(
-        tuple(rows), tuple(compared), rudder_max, surge, (*lacking, *_notes(source, rows, chosen, surge, fin_zero))
+        tuple(rows), tuple(compared), rudder_max, surge, (*unfitted, *lacking, *_notes(source, rows, chosen, surge, fin_zero))
     )
 
 

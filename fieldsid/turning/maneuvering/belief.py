@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.dynamics.free_run import effects_of
+from fieldsid.errors import ModelError
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
@@ -111,12 +112,22 @@ class Belief:
 
 
 def believe(runs: Sequence[Run], models: Sequence[Model], length: float | None, rng: np.random.Generator) -> Belief | None:
-    """Return what runs make believe of a vehicle, its length in m where known; None where they lack fin, yaw or speed."""
+    """Return what runs make believe of a vehicle, its length in m where known; None where they lack fin, yaw or speed.
+
+    Raises ModelError where the fit or its posterior has no finite solution.
+    """
     flown = usable_runs(runs, models)
     if not flown:
         return None
-    fitted = fit_maneuvering(flown, length)
-    return Belief(fitted, draw_posterior(fitted, rng), tuple(models))
+    try:
+        fitted = fit_maneuvering(flown, length)
+        return Belief(fitted, draw_posterior(fitted, rng), tuple(models))
+    except np.linalg.LinAlgError as error:
+        raise ModelError(
+            "surge, sway and yaw cannot be fitted to all runs at once",
+            found=f"{error} ({', '.join(r.name for r in flown)})",
+            hint="look at these runs with `sysid check`, and leave out what no vehicle does",
+        ) from error
 
 
 def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> float:

@@ -5,7 +5,7 @@
     r' = (-Nv u v - (Nr u + N0 U) L r - b C J1 + a R w^2 f(alpha) cos(delta)) / (k L^2)
     Jn = int_{-1/2}^{1/2} h(x) (v + x L r)|v + x L r| x^n dx,   h = sqrt(1 - |2 x|^3)
     alpha = delta + d0 - atan((v + a L r)/u),  w^2 = u^2 + (v + a L r)^2,  f(alpha) = alpha / (1 + (alpha/c)^4)^(1/4)
-with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length, U = 1.5 m/s; R goes
+(Yv u + Y0 U) not below nil; with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length, U = 1.5 m/s; R goes
 with (s/U)^e.
 Source: Fossen 2011, sections 6.4, 6.5 and 9.4; cross-flow drag as Faltinsen 1990, chapter 6; lift that fades at the stall.
 """
@@ -78,7 +78,8 @@ def _slope(
         + p[15] * length * r * r
         - p[2] * lift * math.sin(delta) / length
     )
-    linear_sway, linear_yaw = p[7] * surge + p[18] * REFERENCE_SPEED_M_S, p[10] * surge + p[19] * REFERENCE_SPEED_M_S
+    # water takes energy from a hull that sways, and gives it none (Fossen 2011, property 6.3)
+    linear_sway, linear_yaw = max(p[7] * surge + p[18] * REFERENCE_SPEED_M_S, 0.0), p[10] * surge + p[19] * REFERENCE_SPEED_M_S
     dv = (-linear_sway * v - p[8] * length * surge * r - p[11] * j0 + cosine) / length
     moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * j1 + p[5] * cosine
     dr = moment / (p[6] * length * length)

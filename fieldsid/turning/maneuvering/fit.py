@@ -66,15 +66,29 @@ class Fitted:
 
 
 def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
-    """Fit the coefficients to runs; `length` of the vehicle in m where it is known."""
+    """Fit the coefficients to runs; `length` of the vehicle in m where it is known.
+
+    Raises LinAlgError where the normal equations are singular or what they give is not finite.
+    """
     mean, covariance = prior(length)
     found = _Problem(tuple(runs), FIRST_SEGMENT_S, mean, _inverse(covariance)).solved(mean, FIRST_NOISE, keep_noise=True)
+    _refuse_not_finite(found)
     best, speed = coefficients(found.vector), float(np.median([r.speed for r in runs]))
     growth = growth_rate(best, speed)
     segment = max(LEAST_SEGMENT_S, SEGMENT_LENGTHS * float(best[0]) / speed)
     if growth > 0.0:
         segment = min(segment, max(LONGEST_GROWTH / growth, SHORTEST_SEGMENT_S))
-    return _Problem(tuple(runs), segment, mean, _inverse(covariance)).solved(found.vector, found.noise, keep_noise=False)
+    found = _Problem(tuple(runs), segment, mean, _inverse(covariance)).solved(found.vector, found.noise, keep_noise=False)
+    _refuse_not_finite(found)
+    return found
+
+
+def _refuse_not_finite(found: Fitted) -> None:
+    """Refuse a fit with a NaN in it: residuals weighted by such a noise are nil, and the prior would be taken for a result."""
+    parts = {"noise": found.noise, "coefficients": found.vector, "covariance": found.covariance, "cost": np.array(found.cost)}
+    bad = [name for name, values in parts.items() if not np.isfinite(values).all()]
+    if bad:
+        raise np.linalg.LinAlgError(f"{' and '.join(bad)} not finite")
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:

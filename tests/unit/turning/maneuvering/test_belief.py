@@ -10,12 +10,16 @@ from truth.maneuvering.hulls import draw_hull
 from truth.maneuvering.motion import true_turn
 from truth.maneuvering.trials import training
 
+from fieldsid.errors import ModelError
+from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.turning.maneuvering.belief import believe
 from fieldsid.turning.maneuvering.posterior import weighted_quantile
+from fieldsid.turning.radius import turn_radius
 
 SEED = 5
 
@@ -78,3 +82,27 @@ def test_quantiles_are_those_of_the_weights():
     assert weighted_quantile(values, weights, 0.5) == pytest.approx(2.0)
     assert weighted_quantile(values, np.array([98.0, 1.0, 9.0, 1.0]), 0.5) == pytest.approx(3.0, abs=0.05)
     assert np.isnan(weighted_quantile(np.full(4, np.nan), weights, 0.5))
+
+
+def test_a_fit_that_is_not_finite_ends_in_a_reason():
+    _, runs = runs_of(0, "pulses")
+    broken = [replace(r, signals={**r.signals, "surge_m_s": np.where(r.time < 5.0, 1e200, r["surge_m_s"])}) for r in runs]
+    with pytest.raises(ModelError, match="cannot be fitted"), np.errstate(all="ignore"):
+        believed(broken)
+
+
+@pytest.mark.parametrize("where", ["fit_maneuvering", "draw_posterior"])
+def test_a_singular_matrix_leaves_the_models_simulated_and_says_why(monkeypatch, where):
+    def singular(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    hull, runs = runs_of(0, "pulses")
+    models = [f.model for f in identify(runs[:1], Axis.YAW, effects=("quadratic_damping",))]
+    source = source_of_models(models, ["m0"])
+    monkeypatch.setattr(f"fieldsid.turning.maneuvering.belief.{where}", singular)
+    found = turn_radius(source, hull.speeds[:1], hull.rudder_limit, runs=runs[:1])
+    assert {row.method for row in found.rows} == {"simulated"}
+    (note,) = [n for n in found.notes if n.code == "maneuvering_not_fitted"]
+    assert "Singular matrix" in note.message
+    with pytest.raises(ModelError, match="cannot be fitted"):
+        turn_radius(source, hull.speeds[:1], hull.rudder_limit, runs=runs[:1], method="maneuvering")
