@@ -17,17 +17,19 @@ from fieldsid.runtime.worker_pool import parallel_map
 def records_of(groups: Sequence[Sequence[Run]], axis: Axis, unfit: Refused[Run] | None = None) -> list[list[tuple[Run, Record]]]:
     """Return the runs of several groups with their records, without those that no estimator can use.
 
-    unfit is called with each of these, as `sifted` does for each group; without it DataError is raised for the first.
+    unfit is called with each of these, as `sifted` does for each group; without it DataError is raised for the first. It is
+    raised where a controller alone moves the fin in every run of the first group, which is fitted; the others are predicted.
     """
     runs = [run for group in groups for run in group]
     if not runs:
         check([], axis)
     made = iter(parallel_map(partial(attempt, partial(_checked, axis=axis)), runs))
-    return [sifted(group, [next(made) for _ in group], unfit) for group in groups]
+    left = [sifted(group, [next(made) for _ in group], unfit) for group in groups]
+    refuse_feedback_alone([record for _, record in left[0]])
+    return left
 
 
 def _checked(run: Run, *, axis: Axis) -> Record:
     record = record_of(run, axis)
     check([record], axis)
-    refuse_feedback_alone(record)
     return record

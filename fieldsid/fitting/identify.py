@@ -43,11 +43,11 @@ def identify(
         part = run if whole else segment(run, axis).of(run)
         record = record_of(part, axis)
         check([record], axis)
-        refuse_feedback_alone(record)
         check_signals([record], effects)
         return _Judged(run, record, run_checks(part, axis, vehicle))
 
     def fitted(group: Sequence[_Judged]) -> Fit:
+        refuse_feedback_alone([j.record for j in group])
         found = fit([j.record for j in group], axis, method=method, effects=effects, options=options)
         done()
         of_model = (*sign_findings(found.model, vehicle), *offset_findings(found.model, vehicle))

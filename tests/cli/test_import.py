@@ -176,7 +176,7 @@ def test_bad_input_is_a_three_part_error_and_leaves_everything_as_it_was(run_cli
     before = sha256_of(log)
     answer = run_cli("import", path, "-o", tmp_path / "runs", "--json")
     assert answer.code == 2
-    assert answer.json["schema"] == "fieldsid/error/1"
+    assert '"schema": "fieldsid/error/1"' in answer.out
     assert answer.err.startswith("error: ")
     assert what in answer.err.split("  found: ")[0]
     assert hint in answer.err.split("\nhint: ")[1]

@@ -8,7 +8,7 @@ disturbance, and an estimate without it can mistake the controller for the vehic
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,20 +61,27 @@ def controller(record: Record) -> tuple[float, float, float, float] | None:
     return None if best is None else (best[0].share, *best[0].gains, best[1])
 
 
-def refuse_feedback_alone(record: Record) -> None:
-    """Raise DataError where the fin is the feedback of what the log holds, and nothing of its own moves it.
+def refuse_feedback_alone(records: Sequence[Record]) -> None:
+    """Raise DataError where in every one of the runs fitted together the fin is feedback of what the log holds, and nothing else.
 
     Two conditions, both without leaving out any change. At least MIN_EXPLAINED_SHARE of the fin's changes is explained. What is
     left, less the rounding of the fin, is smaller than what the sensor's noise alone must leave where the fin does not follow
     it: of a fin y regressed on x + n with gain k, n independent of y, at least k^2 var n is left. Slow open-loop motion that
     happens to resemble the fin meets the first condition and not the second.
     """
+    errors = [_feedback_alone(record) for record in records]
+    alone = [error for error in errors if error is not None]
+    if alone and len(alone) == len(errors):
+        raise alone[0]
+
+
+def _feedback_alone(record: Record) -> DataError | None:
     best = _best(record, 0.0)
     if best is None or best[0].share < MIN_EXPLAINED_SHARE or not best[0].left < MAX_OF_NOISE * best[0].noise:
-        return
+        return None
     found, delay = best
     names = NAMES[record.axis]
-    raise DataError(
+    return DataError(
         f"run {record.name!r} does not identify {record.axis.value}: its fin is feedback of `{names.angle}`",
         found=f"{100 * found.share:.0f} % of the fin's changes follow it {delay:.2f} s before, with the sensor's noise "
         f"({found.gains[0]:+.2f} rad per rad, {found.gains[1]:+.2f} rad per rad/s)",

@@ -67,20 +67,20 @@ PILOTS = {
 @pytest.mark.parametrize("pilot", PILOTS.values(), ids=PILOTS)
 def test_feedback_alone_is_refused(pilot, seed):
     with pytest.raises(DataError, match="does not identify yaw: its fin is feedback"):
-        refuse_feedback_alone(record_of(flown(seed, **pilot), Axis.YAW))
+        refuse_feedback_alone([record_of(flown(seed, **pilot), Axis.YAW)])
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("pilot", PILOTS.values(), ids=PILOTS)
 def test_feedback_with_pulses_on_top_is_not(pilot, seed):
-    refuse_feedback_alone(record_of(flown(seed, excitation="holds", **pilot), Axis.YAW))
+    refuse_feedback_alone([record_of(flown(seed, excitation="holds", **pilot), Axis.YAW)])
 
 
 @pytest.mark.parametrize("with_rate", [True, False])
 @pytest.mark.parametrize("kind", ["holds", "chirp", "sine", "multisine"])
 @pytest.mark.parametrize("seed", range(5))
 def test_open_loop_is_never_refused(kind, with_rate, seed):
-    refuse_feedback_alone(record_of(flown(seed, excitation=kind, with_rate=with_rate), Axis.YAW))
+    refuse_feedback_alone([record_of(flown(seed, excitation=kind, with_rate=with_rate), Axis.YAW)])
 
 
 def test_a_controller_is_found_from_the_angle_alone():
