@@ -5,7 +5,7 @@
     r' = (-Nv u v - (Nr u + N0 U) L r - b C J1 + a R w^2 f(alpha) cos(delta)) / (k L^2)
     Jn = int_{-1/2}^{1/2} h(x) (v + x L r)|v + x L r| x^n dx,   h = sqrt(1 - |2 x|^3)
     alpha = delta + d0 - atan((v + a L r)/u),  w^2 = u^2 + (v + a L r)^2,  f(alpha) = alpha / (1 + (alpha/c)^4)^(1/4)
-(Yv u + Y0 U) not below nil; with s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length,
+(Yv u + Y0 U) not below nil; s the speed that the thrust holds on a straight course, t how thrust falls with speed, L the length,
 U = 1.5 m/s; R goes with (s/U)^e.
 Source: Fossen 2011, sections 6.4, 6.5 and 9.4; cross-flow drag as Faltinsen 1990, chapter 6; lift that fades at the stall.
 """
