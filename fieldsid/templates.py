@@ -19,7 +19,8 @@ def template_root() -> Path:
 def template_names() -> tuple[str, ...]:
     """Return every template's path below the folder, in order, with forward slashes."""
     root = template_root()
-    return tuple(sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file()))
+    files = (p.relative_to(root) for p in root.rglob("*") if p.is_file())
+    return tuple(sorted(p.as_posix() for p in files if "__pycache__" not in p.parts))  # an installer compiles what is Python
 
 
 def template_path(name: str) -> Path:
