@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
+from functools import wraps
 from pathlib import Path
 
 import pytest
@@ -121,6 +123,26 @@ def test_a_folder_stands_for_the_logs_in_and_below_it_each_once(tmp_path):
     assert [p.name for p in logs_in([tmp_path, tmp_path / "b.csv"])] == ["b.csv", "a.csv"]
 
 
+OWN_PROCESS = "FIELDSID_TEST_IN_OWN_PROCESS"
+
+
+def in_own_process(test):
+    """Run a test in a process of its own: Dask leaves threads and a process behind, beside which no other test may fork."""
+
+    @wraps(test)
+    def started(tmp_path):
+        if os.environ.get(OWN_PROCESS):
+            return test(tmp_path)
+        pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+        words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"{__file__}::{test.__name__}"]
+        done = subprocess.run(words, env=os.environ | {OWN_PROCESS: "1"}, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return None
+
+    return started
+
+
+@in_own_process
 def test_a_cluster_that_loses_a_worker_still_answers_for_every_log(tmp_path):
     distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     from fieldsid.batch.dask_cluster import run_on_cluster
@@ -141,7 +163,8 @@ def test_a_cluster_that_loses_a_worker_still_answers_for_every_log(tmp_path):
     assert [r[0]["status"] for t, r in rows.items() if not t.log.endswith("bad.csv")] == ["done"] * 12
 
 
-def test_an_address_without_a_scheduler_is_said():
+@in_own_process
+def test_an_address_without_a_scheduler_is_said(tmp_path):
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     from fieldsid.batch.dask_cluster import run_on_cluster
 
