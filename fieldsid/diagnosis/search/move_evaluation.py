@@ -85,9 +85,9 @@ class MoveEvaluation(SearchState):
         def fit_all(group: Sequence[SearchMove]) -> ScoredModel:
             effect = group[0].screened.effect
             problem = fitted.problem.with_effects([*parent.effects, effect])
+            own = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
             for move in group:
                 free = fit_output_error(move.screened.problem, move.screened.start, fitted.weights)
-                own = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
                 start = overlay_parameters(free.problem.layout, free.x, problem.layout, own)
                 self._fit_child(parent, problem, start, effect)
             return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()

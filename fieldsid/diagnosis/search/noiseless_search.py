@@ -69,14 +69,14 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     if best is start:
         return None
     best, without = _backward_eliminate(search, best, seen)
+    (found,) = search.parallel.map(partial(_scored, search), [best.output_error_fit])
     while True:
-        tried = [best, *without]
-        models = search.parallel.map(partial(_scored, search), [t.output_error_fit for t in tried])
-        search.tried |= {frozenset(h.names): h for h in models}
-        found = max((models[0], *filter(explains, models[1:])), key=lambda h: h.log_evidence)
-        if found is models[0]:
+        less = search.parallel.map(partial(_scored, search), [w.output_error_fit for w in without])
+        search.tried |= {frozenset(h.names): h for h in (found, *less)}
+        likelier = max((found, *filter(explains, less)), key=lambda h: h.log_evidence)
+        if likelier is found:
             return found
-        best = tried[models.index(found)]
+        best, found = without[less.index(likelier)], likelier
         without = _without_each(search, best, seen)
 
 
