@@ -36,7 +36,10 @@ def authority_check(problem: Problem, solution: Solution, floor: Noise, slot: in
     value, error = float(solution.x[slot]), float(np.sqrt(max(solution.covariance[slot, slot], 0.0)))
     if error == 0.0 or abs(value) >= MIN_STD_ERRORS * error:
         return None
-    said = f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 cannot be told from zero"
+    # its 95 % interval holds zero below two standard errors only
+    far = f"is less than {MIN_STD_ERRORS:g} standard errors from zero"
+    unclear = "cannot be told from zero" if abs(value) < 2.0 * error else far
+    said = f"{problem.layout.shown(problem.layout.names[slot])} = {value:.2g} +/- {error:.2g} 1/s^2 {unclear}"
     data = {"parameter": problem.layout.names[slot], "value": value, "std_error": error, "limit": MIN_STD_ERRORS}
     led = [problem.records[run].name for run in _runs_of(problem, slot) if any(closed_loop_note(problem.records[run]))]
     if led:
