@@ -26,7 +26,7 @@ from fieldsid.noise.noise_kinds import JOINT_NOISE, SINGLE_NOISE_KINDS
 def fit_base(
     fitted: FittedProblem, floor: Noise, resolution_floor: Noise, noise_kind: str, parallel: ParallelMap
 ) -> LikelihoodFit:
-    """Return the base model under the likeliest kind of noise, or the one given, and under both together where that is likelier.
+    """Return the base model under the kind of noise given; without one under the likeliest, or both together where that is so.
 
     White noise is a member of every kind: a later kind is taken only where it gains more than MIN_LIKELIHOOD_GAIN.
     """
@@ -36,7 +36,7 @@ def fit_base(
     )
     for other in others:
         best = other if other.log_likelihood > best.log_likelihood + MIN_LIKELIHOOD_GAIN else best
-    return joint_noise_fit(best, parallel) if has_sensor_colour(best) else best
+    return joint_noise_fit(best, parallel) if not noise_kind and has_sensor_colour(best) else best
 
 
 def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:

@@ -47,8 +47,8 @@ class MoveEvaluation(SearchState):
     def forward_step(self, parent: ScoredModel, *, forced: bool = False) -> list[ScoredModel]:
         """Return the parent with each effect that passes the screens, or with each when forced, fitted and scored, best first."""
         key = frozenset(parent.names)
-        if key not in self.expanded:
-            self.expanded.add(key)
+        if key not in self.tried.progress.expanded:
+            self.tried.progress.expanded.add(key)
             most = MAX_EFFECTS_AT_BASE if key == self.root else MAX_EFFECTS_LATER
             left = [e for e in self.catalogue if e.name not in key]
             found = add_effect(
@@ -57,13 +57,13 @@ class MoveEvaluation(SearchState):
                 None if forced else most,
                 self.parallel,
                 anew=key == self.root,
-                flown=key in self.output_error_screened,
+                flown=key in self.tried.free_runs.screened,
             )
             self._fit_from_output_error(parent)
-            self.output_error_screened.add(key)
+            self.tried.free_runs.screened.add(key)
             later = self._evaluate_moves(parent, by_effect(found))
-            if key in self.textbook:
-                self._fit_from_textbook(parent, left)
+            if (textbook := self.tried.before_variants(key)) is not None:
+                self._fit_from_textbook(parent, textbook, left)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
             self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
             if self.budget.remaining():
@@ -73,12 +73,12 @@ class MoveEvaluation(SearchState):
                 self._try_laws_and_variants(key, self._leading(key))
         return self._children(key)
 
-    def _fit_from_textbook(self, parent: ScoredModel, left: Sequence[Effect]) -> None:
+    def _fit_from_textbook(self, parent: ScoredModel, textbook: ScoredModel, left: Sequence[Effect]) -> None:
         """Fit the parent with each effect that its textbook variant lacks, from the output-error fit with that.
 
         A variant may have taken up the motion of an effect that is missing; from its own solution that effect explains little.
         """
-        textbook, fitted = self.textbook[frozenset(parent.names)], parent.likelihood_fit.fitted
+        fitted = parent.likelihood_fit.fitted
         moves = add_effect(textbook, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=False)
         groups = by_effect([m for m in moves if m.by_output_error])
 
@@ -92,7 +92,7 @@ class MoveEvaluation(SearchState):
                 self._fit_child(parent, problem, start, effect)
             return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()
 
-        self.tried |= {frozenset(h.names): h for h in self.parallel.map(fit_all, groups)}
+        self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit_all, groups)})
 
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.
@@ -111,16 +111,15 @@ class MoveEvaluation(SearchState):
     def _fit_from_output_error(self, parent: ScoredModel) -> None:
         """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""
         key = frozenset(parent.names)
-        names = [
-            n for n, free in self.output_error_fits.items() if free and len(n) == len(key) + 1 and key < n and n not in self.tried
-        ]
+        known = self.tried.free_runs.fits
+        names = [n for n, free in known.items() if free and len(n) == len(key) + 1 and key < n and n not in self.tried]
 
         def fit_all(name: frozenset[str]) -> ScoredModel:
-            for free in self.output_error_fits[name]:
+            for free in known[name]:
                 self._fit_child(parent, free.problem, free.x, next(e for e in free.effects if e.name not in key))
             return self.tried[name].evaluate_errors()
 
-        self.tried |= dict(zip(names, self.parallel.map(fit_all, names), strict=True))
+        self.tried.update(zip(names, self.parallel.map(fit_all, names), strict=True))
 
     def _evaluate_moves(
         self, parent: ScoredModel, groups: Sequence[Sequence[SearchMove]], *, every: bool = False
@@ -139,12 +138,12 @@ class MoveEvaluation(SearchState):
                     self._evaluate_move(parent, move, rival)
                 else:
                     later.append(i)
-            return self.tried[key].evaluate_errors(), self.output_error_fits.get(key, []), later
+            return self.tried[key].evaluate_errors(), self.tried.free_runs.fits.get(key, []), later
 
         left = []
         for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
             key = frozenset(found.names)
-            self.tried[key], self.output_error_fits[key] = found, free
+            self.tried[key], self.tried.free_runs.fits[key] = found, free
             left += [group[i] for i in later]
         return left
 
@@ -154,7 +153,7 @@ class MoveEvaluation(SearchState):
         self.report("+".join((*parent.names, screened.effect.name)))
         if move.by_output_error:
             free = fit_output_error(screened.problem, start, parent.likelihood_fit.fitted.weights)
-            self.output_error_fits.setdefault(frozenset(free.names), []).append(free)
+            self.tried.free_runs.fits.setdefault(frozenset(free.names), []).append(free)
             start = free.x
         self._fit_child(parent, screened.problem, start, screened.effect, rival)
 
@@ -193,10 +192,10 @@ class MoveEvaluation(SearchState):
         children = [c for c in self._children(key)[:LEADING_CHILDREN] if c.log_evidence > parent.log_evidence]
 
         def flown(child: ScoredModel) -> ScoredModel:
-            free = self.output_error_fits.get(frozenset(child.names), ())
+            free = self.tried.free_runs.fits.get(frozenset(child.names), ())
             return prefer_output_error(child, self.floor, parent, free).evaluate_errors(fitted=True)
 
-        self.tried |= {frozenset(child.names): child for child in self.parallel.map(flown, children)}
+        self.tried.update({frozenset(child.names): child for child in self.parallel.map(flown, children)})
 
     def _try_laws_and_variants(self, key: frozenset[str], names: Sequence[frozenset[str]], *, every: bool = False) -> None:
         """Try another speed law and other variants of the effects for some children, kept where they have more evidence.

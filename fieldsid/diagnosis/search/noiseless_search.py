@@ -72,7 +72,7 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     (found,) = search.parallel.map(partial(_scored, search), [best.output_error_fit])
     while True:
         less = search.parallel.map(partial(_scored, search), [w.output_error_fit for w in without])
-        search.tried |= {frozenset(h.names): h for h in (found, *less)}
+        search.tried.update({frozenset(h.names): h for h in (found, *less)})
         likelier = max((found, *filter(explains, less)), key=lambda h: h.log_evidence)
         if likelier is found:
             return found

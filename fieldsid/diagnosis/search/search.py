@@ -11,9 +11,9 @@ from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
 from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
+from fieldsid.diagnosis.search.model_spec import Assumptions
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
 from fieldsid.diagnosis.search.multistart import MIN_ERROR_RATIO, multistart
-from fieldsid.diagnosis.search.speed_law_search import trim_follows_fin
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.models.effect import Effect
 
@@ -92,7 +92,7 @@ class Search(MoveEvaluation):
         exchange that effect), and every model of accepted effects with a clearly lower error: its evidence may be lower only
         because it lacks a small effect that the best model has besides a wrong one.
         """
-        if self.root not in self.expanded:
+        if self.root not in self.tried.progress.expanded:
             return self.base()
         if not self.budget.remaining():
             return None
@@ -103,7 +103,7 @@ class Search(MoveEvaluation):
 
     def _is_expandable(self, h: ScoredModel) -> bool:
         """Whether a model is not expanded yet, is below the largest size, and leaves an error above the noise floor."""
-        is_new = frozenset(h.names) not in self.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
+        is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
         return is_new and leaves_error(h, self.floor)
 
     def _drop_each(self) -> None:
@@ -123,20 +123,18 @@ class Search(MoveEvaluation):
         if not self.budget.remaining():
             return False
         found = self.best_admissible()
-        noise = partial(fit_other_noise, found, self.floor, self.noise_kinds_tried, self.parallel)
+        noise = partial(fit_other_noise, found, self.floor, self.tried.noise_kinds, self.parallel)
         ml_fit, again = self.trim_laws.best_alternative(
             found, self.tried, self.floor, self.resolution_floor, self.parallel, noise
         )
         if ml_fit is None and again is None:
             return False
         if ml_fit is not None:
-            self.noise_kind, again = ml_fit.noise_kind, score_model(ml_fit, self.validation)
-            self.tried, self.evidence_at_variants, self.expanded = {}, {}, set()
+            again = score_model(ml_fit, self.validation)
         elif again is not None:
-            left, self.trim_of_fin = trim_follows_fin(self.base()), trim_follows_fin(again)
-            world = self.tried, self.evidence_at_variants, self.expanded, self.output_error_fits, self.output_error_screened
-            world = self.trim_laws.switch(self.noise_kind, world, law=left, other=self.trim_of_fin)
-            self.tried, self.evidence_at_variants, self.expanded, self.output_error_fits, self.output_error_screened = world
+            self.trim_laws.switches += 1
+        if again is not None:
+            self.tried.assumptions = Assumptions.of(again)
         if again is not None and frozenset(again.names) != self.root:
             known, again = self.tried.get(frozenset(again.names)), prefer_output_error(again, self.floor)
             self.tried[frozenset(again.names)] = again if known is None or again.log_evidence > known.log_evidence else known

@@ -13,7 +13,9 @@ from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, Fitt
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.search.archive import Archive
 from fieldsid.diagnosis.search.budget import MAX_EVALUATIONS_PER_RUN, Budget
+from fieldsid.diagnosis.search.model_spec import Assumptions
 from fieldsid.diagnosis.search.speed_law_search import (
     TrimLawSearch,
     error_product,
@@ -52,13 +54,8 @@ class SearchState:
 
     floor: Noise = field(init=False)
 
-    tried: dict[frozenset[str], ScoredModel] = field(default_factory=dict)
-
-    noise_kind: str = ""
-
-    noise_kinds_tried: set[str] = field(default_factory=set)
-
-    trim_of_fin: bool | None = None
+    tried: Archive = field(default_factory=Archive)
+    """Every model tried, by its spec."""
 
     trim_laws: TrimLawSearch = field(default_factory=TrimLawSearch)
 
@@ -66,17 +63,6 @@ class SearchState:
 
     is_noiseless: bool = False
     """Whether the base model's error is more than a hundred times the noise in every measured channel."""
-
-    expanded: set[frozenset[str]] = field(default_factory=set)
-
-    output_error_screened: set[frozenset[str]] = field(default_factory=set)
-
-    output_error_fits: dict[frozenset[str], list[FittedProblem]] = field(default_factory=dict)
-
-    evidence_at_variants: dict[frozenset[str], float] = field(default_factory=dict)
-
-    textbook: dict[frozenset[str], ScoredModel] = field(default_factory=dict)
-    """Models before another variant of an effect took their place: the variant may stand for an effect that is missing."""
 
     parallel: ParallelMap = field(init=False)
 
@@ -90,6 +76,11 @@ class SearchState:
         self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations)
 
     @property
+    def noise_kind(self) -> str:
+        """The kind of noise that models are compared under; empty until the base model has been fitted."""
+        return self.tried.assumptions.noise_kind if self.tried.assumptions else ""
+
+    @property
     def root(self) -> frozenset[str]:
         """The effects of the base."""
         return frozenset(self.known)
@@ -98,7 +89,8 @@ class SearchState:
         """Return the model of the known effects alone."""
         if self.root not in self.tried:
             self.report("base model")
-            laws = speed_laws(self.records, trim_of_fin=self.trim_of_fin)
+            assumed = self.tried.assumptions
+            laws = speed_laws(self.records, trim_of_fin=assumed.trim_of_fin if assumed else None)
             known = [e for e in self.catalogue if e.name in self.known]
             fits = self.parallel.map(
                 lambda groups: fit_base_output_error(self.records, self.axis, known, groups, self.floor, self.budget.evaluations),
@@ -110,7 +102,7 @@ class SearchState:
             self.update_noise_floor(fitted)
             self.resolution_floor = resolution_floor(self.floor, fitted.weights)
             ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.noise_kind, self.parallel)
-            self.noise_kind, self.noise_kinds_tried = ml_fit.noise_kind, self.noise_kinds_tried | {ml_fit.noise_kind}
+            self.tried.assumptions = Assumptions(ml_fit.noise_kind, fitted.problem.layout.groups.trim_of_fin)
             self._keep(ml_fit)
             self.tried[self.root] = prefer_output_error(self.tried[self.root], self.floor)
             self._try_other_speed_law([self.root])
@@ -144,20 +136,15 @@ class SearchState:
             other = other_speed_law(known, self.resolution_floor, self.noise_kind, asks_for_more=leaves_error(known, self.floor))
             return known if other is None else prefer_output_error(other, self.floor).evaluate_errors(fitted=True)
 
-        self.tried |= dict(zip(names, self.parallel.map(better, names), strict=True))
+        self.tried.update(zip(names, self.parallel.map(better, names), strict=True))
 
     def _try_variants(self, asked: Sequence[VariantRequest]) -> None:
         """Try other variants of the models' effects, unless that was done at the same evidence."""
-        asked = [
-            p
-            for p in asked
-            if p.model.log_evidence > self.evidence_at_variants.get(frozenset(p.model.names), -np.inf) + MIN_LIKELIHOOD_GAIN
-        ]
+        at = self.tried.progress.evidence_at_variants
+        asked = [p for p in asked if p.model.log_evidence > at.get(frozenset(p.model.names), -np.inf) + MIN_LIKELIHOOD_GAIN]
         for h in FormSearch(self.resolution_floor, self.noise_kind, self.floor, self.parallel).try_variants(asked):
             key = frozenset(h.names)
-            if [e.is_formed for e in h.effects] != [e.is_formed for e in self.tried[key].effects]:
-                self.textbook.setdefault(key, self.tried[key])
-            self.tried[key], self.evidence_at_variants[key] = h, h.log_evidence
+            self.tried[key], at[key] = h, h.log_evidence
 
     def _most_evident(self) -> ScoredModel:
         """Return the model of the highest log evidence, whether or not its effects are accepted."""

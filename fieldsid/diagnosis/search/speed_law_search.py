@@ -32,16 +32,6 @@ from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 T = TypeVar("T")
 
-SearchResults = tuple[
-    dict[frozenset[str], ScoredModel],
-    dict[frozenset[str], float],
-    set[frozenset[str]],
-    dict[frozenset[str], list[FittedProblem]],
-    set[frozenset[str]],
-]
-"""The models tried, the evidence their variants were tried at, the models expanded; output-error fits, and the models screened by
-them."""
-
 FINE_GROUP_WIDTH = 0.03
 """Log ratio of speeds up to which runs form one group while models are compared. The line |b2| = 0.33 u^2 + 0.23 of the method's
 paper goes with powers from 1.2 to 1.7 between 1 and 2 m/s, so that u^2 is off by 1 to 2 % across such a group; in wider ones what
@@ -109,20 +99,10 @@ def other_speed_law(h: ScoredModel, resolution_floor: Noise, noise_kind: str, *,
 
 @dataclass(slots=True)
 class TrimLawSearch:
-    """Models under the other trim law, each fitted once, and the number of switches to it.
-
-    `left` holds what was tried before each switch, by noise kind and trim law: a search may switch back.
-    """
+    """Models under the other trim law, each fitted once, and the number of switches to it."""
 
     known: dict[tuple[tuple[str, ...], float], ScoredModel | None] = field(default_factory=dict)
     switches: int = 0
-    left: dict[tuple[str, bool], SearchResults] = field(default_factory=dict)
-
-    def switch(self, noise_kind: str, world: SearchResults, *, law: bool, other: bool) -> SearchResults:
-        """Return what was tried under the other trim law before, and keep what was tried under the present one."""
-        self.switches += 1
-        self.left[noise_kind, law] = world
-        return self.left.get((noise_kind, other), ({}, {}, set(), {}, set()))
 
     def best_alternative(
         self,
@@ -170,11 +150,6 @@ def _predicts(h: ScoredModel, found: ScoredModel) -> bool:
     chance.
     """
     return h.selection_errors.mean < MISSING_ERROR_RATIO * found.selection_errors.mean
-
-
-def trim_follows_fin(h: ScoredModel) -> bool:
-    """Return whether the trim of a model is an offset of the fin, which scales with the authority."""
-    return h.likelihood_fit.fitted.problem.layout.groups.trim_of_fin
 
 
 def other_trim_law(h: ScoredModel, resolution_floor: Noise) -> ScoredModel | None:

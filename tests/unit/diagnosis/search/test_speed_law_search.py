@@ -89,12 +89,3 @@ def test_a_search_that_has_turned_twice_asks_no_more(asked):
         found, tried, FLOOR, FLOOR, ParallelMap((), ()), lambda: 7
     ) == (7, None)
     assert asked == []
-
-
-def test_a_search_that_comes_back_to_a_law_finds_what_it_had_tried():
-    trims, first = TrimLawSearch(), ({}, {frozenset(): 1.0}, set(), {}, set())
-    second = trims.switch("disturbance", first, law=False, other=True)
-    assert second == ({}, {}, set(), {}, set())
-    assert trims.switch("disturbance", second, law=True, other=False) is first
-    assert trims.switch("both", first, law=False, other=True) == ({}, {}, set(), {}, set())
-    assert trims.switches == 3
