@@ -6,7 +6,9 @@ whitened, |e - S d|^2 = e'e - 2 b'd + d'A d, and to first order
 
     log p(run) = -e'e/2 + (Lambda m + b)' (Lambda + A)^-1 (Lambda m + b) / 2 - m' Lambda m / 2 - log det(I + Lambda^-1 A) / 2
 
-after which Lambda <- Lambda + A, and m becomes the posterior mean. A run's own nuisances are projected out of A and b.
+after which Lambda <- Lambda + A, and m becomes the posterior mean. A run's own nuisances are projected out of A and b, and take
+their best values under the noise: at gradient g and normal matrix N of theirs, log p <- log p + g' N^-1 g / 2. Those that were
+fitted under the noise of the training runs bend a run's start to balance a drift that this noise has no room for.
 A run's speed is measured with an error e ~ N(0, 1) along c in the shared parameters, which is integrated out first,
     A <- A - A c c'A / (1 + s),  b <- b - A c t / (1 + s),  log p <- log p + t^2 / (2 + 2 s) - log(1 + s) / 2,  s = c'A c, t = c'b
 Source: MacKay 1992, Neural Computation 4(3), Bayesian interpolation; Kass and Raftery 1995, section 4.
@@ -125,7 +127,10 @@ def _under(
         product = gram_products(run.problem.records[0], noise, *d, run.linearisation)
         parts.append(product)
         if product is not None:
-            a, b = _schur_complement(product[1:, 1:], product[1:, 0], run.problem.layout.shared)
+            shared = run.problem.layout.shared
+            a, b = _schur_complement(product[1:, 1:], product[1:, 0], shared)
+            own = product[1 + shared :, 0]
+            likelihood += 0.5 * float(own @ solve_normal_equations(product[1 + shared :, 1 + shared :], own))
             a, b, averaged = _marginalise_speed(a, b, run.speed)
             likelihood += averaged
             jacobian = run.parameter_jacobian * unit
@@ -149,7 +154,7 @@ def _posterior_residual(run: ValidationRun, product: FloatArray, posterior_mean:
     step = run.parameter_jacobian @ posterior_mean
     a, b = _schur_complement(normal, product[1:, 0], shared)
     step = step + run.speed * float(run.speed @ (b - a @ step)) / (1.0 + float(run.speed @ a @ run.speed))
-    own = -solve_normal_equations(normal[shared:, shared:], normal[shared:, :shared] @ step)
+    own = solve_normal_equations(normal[shared:, shared:], product[1 + shared :, 0] - normal[shared:, :shared] @ step)
     return np.asarray(run.residual - np.tensordot(np.concatenate([step, own]), run.linearisation.sensitivity, axes=1))
 
 

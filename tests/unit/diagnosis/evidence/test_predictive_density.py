@@ -70,6 +70,19 @@ def test_it_is_the_likelihood_averaged_over_what_the_training_runs_leave_open(ju
     assert np.sum((led[0] / 0.01) ** 2) < plain
 
 
+def test_a_start_that_was_fitted_under_another_noise_costs_nothing(judged):
+    run = unseen(judged, record(YAW[1], 7))
+    dynamics, known = [(b.damping, b.stiffness) for b in [run.problem.base_of(run.x, 0)]], precision(judged)
+    expected, led = _under(NOISE, [run], dynamics, known)
+    bent = run.x.copy()
+    bent[run.problem.layout.shared :] += 0.02
+    moved = replace(run, x=bent, residual=free_run_residual(run.problem, bent), linearisation=run.problem.linearise(bent, 0))
+    assert np.sum(moved.residual**2) > 1.5 * np.sum(run.residual**2)
+    value, left = _under(NOISE, [moved], dynamics, known)
+    assert value[0] == pytest.approx(expected[0], abs=0.1)
+    np.testing.assert_allclose(left[0], led[0], atol=1e-4)
+
+
 def test_the_shared_slots_of_a_run_move_as_the_law_says(judged):
     log = record(YAW[1], 7, speed=1.15)
     run, layout = unseen(judged, log), judged.fitted.problem.layout
