@@ -25,15 +25,8 @@ from fieldsid.diagnosis.report.report_text import evidence, headline
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, residual_tests
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.verdict import (
-    MIN_RIVAL_PROBABILITY_RATIO,
-    Verdict,
-    added_effects,
-    excess_explained,
-    probabilities,
-    verdict_of,
-    worsens,
-)
+from fieldsid.diagnosis.thresholds import NOISELESS_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
+from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, probabilities, verdict_of, worsens
 from fieldsid.effects import all_effects, apart_from
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.fitting.fit_runs import records_of
@@ -51,11 +44,6 @@ SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
 )
 FinalModel = tuple[Model, tuple[Note, ...]]
-
-
-NOISELESS_EXPLAINED_SHARE = 0.5
-"""Share of the excess error that effects must explain to be named from a log without noise: more than they leave. No p-value
-decides there, since without noise whatever is left is significant."""
 
 
 def diagnose(
@@ -213,7 +201,7 @@ def confusable(
 
     def as_likely(other: ScoredModel) -> bool:
         its = p.get(frozenset(other.names), 0.0)
-        return min(own, its) > 0.0 and min(own, its) >= MIN_RIVAL_PROBABILITY_RATIO * max(own, its)
+        return min(own, its) > 0.0 and min(own, its) >= RIVAL_PROBABILITY_RATIO * max(own, its)
 
     return tuple(
         "+".join(n for n in o.names if n not in work.known)

@@ -8,35 +8,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.residual_tests.residual_tests import MIN_P_VALUE, ResidualTests
+from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.thresholds import (
+    EQUAL_ERROR_RATIO,
+    EVIDENCE_TEMPERATURE,
+    FAR_ERROR_RATIO,
+    GUSTY_ERROR_RATIO,
+    MAX_SENSOR_COLOUR_S,
+    MAX_VALIDATION_ERROR_RATIO,
+    MIN_P_VALUE,
+    MISSING_ERROR_RATIO,
+    RIVAL_LOG_ODDS,
+    SHARES_TO_EXPLAIN,
+    SHARES_TO_EXPLAIN_FAR,
+    SHARES_TO_EXPLAIN_MISSING,
+    SUFFICIENT_ERROR_RATIO,
+)
 from fieldsid.models.model import Noise
 from fieldsid.noise.noise_kinds import JOINT_NOISE
-
-EVIDENCE_TEMPERATURE = 2.0
-"""Divisor of the log evidence before it becomes a probability: the evidence of models that are never exact is overstated."""
-MAX_RIVAL_LOG_ODDS = 3.0
-"""Difference in log evidence within which two models are rivals (odds of 20 to 1 before tempering); twice that for one run."""
-VERDICT_TABLE = ((0.7, 1e-5), (0.6, 1e-3), (0.3, MIN_P_VALUE))
-"""Least share of the excess error that a named effect must explain, and the p-value of the residual tests below which it must: a
-model is never exact, but the less it explains the less it may leave."""
-HIGH_ERROR_RATIO, VERDICT_TABLE_HIGH_ERROR = 1.6, ((0.85, 1e-6),)
-"""Error over the noise floor that the right effect rarely leaves, and the share to be explained above it."""
-VERDICT_TABLE_EXTREME_ERROR = ((0.97, 1e-6),)
-"""The same for errors above ERROR_HIGH: there, any effect that bends the response explains most of the excess."""
-MIN_RIVAL_PROBABILITY_RATIO = 0.05
-"""Ratio of two models' probabilities above which they are rivals: odds of 20 to 1."""
-SUFFICIENT_ERROR_RATIO = 1.15
-"""Free-run error over the noise floor below which the model is sufficient."""
-MAX_SENSOR_COLOUR_S = 1.0
-"""Time constant of coloured sensor noise, in s, below which it counts as noise: a missing motion lasts as long as a maneuver."""
-ERROR_LOW, ERROR_HIGH = 2.0, 4.0
-"""Error over the noise floor below which only dependence on the motion tells an effect from a disturbance, since gusts come in
-bursts too; and the error above which a disturbance alone is implausible."""
-MIN_EXPLAINED_SHARE = VERDICT_TABLE[0][0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +63,9 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
         return _unnamed(found, left, floor, least)
     share = excess_explained(search, found, least)
     asked = (
-        VERDICT_TABLE
-        if error <= HIGH_ERROR_RATIO or search.is_noiseless
-        else (*VERDICT_TABLE, *(VERDICT_TABLE_HIGH_ERROR if error <= ERROR_HIGH else VERDICT_TABLE_EXTREME_ERROR))
+        SHARES_TO_EXPLAIN
+        if error <= MISSING_ERROR_RATIO or search.is_noiseless
+        else (*SHARES_TO_EXPLAIN, *(SHARES_TO_EXPLAIN_MISSING if error <= FAR_ERROR_RATIO else SHARES_TO_EXPLAIN_FAR))
     )
     if visible and any(left.p < p and share < enough for enough, p in asked):
         return Verdict("unexplained", ())
@@ -86,8 +79,8 @@ def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise, least: Noise
     """Return the verdict where no effect lowers the error that models are selected by: `disturbed`, or `unexplained`."""
     worst = max(found.selection_errors.over(least), found.train.over(least))
     sea = max(found.selection_errors.over(floor), found.train.over(floor))
-    p = 3.0 * left.dependence if worst < ERROR_LOW else left.p
-    odd = p < MIN_P_VALUE or sea > ERROR_HIGH or validation_error_ratio(found, least) > MAX_VALIDATION_ERROR_RATIO
+    p = 3.0 * left.dependence if worst < GUSTY_ERROR_RATIO else left.p
+    odd = p < MIN_P_VALUE or sea > FAR_ERROR_RATIO or validation_error_ratio(found, least) > MAX_VALIDATION_ERROR_RATIO
     return Verdict("unexplained" if odd else "disturbed", ())
 
 
@@ -106,7 +99,7 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
     """Return the models of the same size that the data cannot distinguish from the final one."""
-    margin, sums = MAX_RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * MAX_RIVAL_LOG_ODDS, search.evidences()
+    margin, sums = RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
     return tuple(
         h

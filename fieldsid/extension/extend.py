@@ -14,13 +14,13 @@ import numpy as np
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import MAX_ERROR_RATIO
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO
 from fieldsid.display import Brief, Plotted
 from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import DataError, UsageError

@@ -7,9 +7,7 @@ import re
 import pytest
 from guide.make import GUIDE
 
-from fieldsid.diagnosis import verdict
-from fieldsid.diagnosis.evidence import acceptance, scored_model
-from fieldsid.diagnosis.residual_tests import residual_tests
+from fieldsid.diagnosis import thresholds
 from fieldsid.diagnosis.search import speed_law_search
 from fieldsid.fitting import auto_method
 from fieldsid.fitting.checks import parameter_checks, score_tests
@@ -22,18 +20,18 @@ from fieldsid.turning import model_error, paper_formulas, radius
 PAGE = (GUIDE / "theory.md").read_text()
 WORDS = " ".join(PAGE.split())
 NUMBERS = {
-    "prior log odds against an effect": scored_model.EFFECT_LOG_ODDS,
-    "share the free-run error must fall to": acceptance.MAX_ERROR_RATIO,
-    "less of it for a third and each further effect": acceptance.EXTRA_ERROR_RATIO_PER_EFFECT,
-    "log evidence is divided by, for a probability": verdict.EVIDENCE_TEMPERATURE,
-    "log evidence within which hypotheses are rivals": verdict.MAX_RIVAL_LOG_ODDS,
-    "factor of error within which hypotheses predict alike": acceptance.EQUAL_ERROR_RATIO,
-    "error over the floor that is visible": verdict.SUFFICIENT_ERROR_RATIO,
-    "p-value below which what is left is no disturbance": residual_tests.MIN_P_VALUE,
-    "error over the floor below which only a relation counts": verdict.ERROR_LOW,
-    "error over the floor beyond which no sea is taken for granted": verdict.ERROR_HIGH,
-    "unseen over fitted error beyond which none is": acceptance.MAX_VALIDATION_ERROR_RATIO,
-    "share of the excess that an effect must explain": verdict.MIN_EXPLAINED_SHARE,
+    "prior log odds against an effect": thresholds.ALTERNATIVE_LOG_ODDS,
+    "share the free-run error must fall to": thresholds.MAX_ERROR_RATIO,
+    "less of it for a third and each further effect": thresholds.EXTRA_ERROR_RATIO_PER_EFFECT,
+    "log evidence is divided by, for a probability": thresholds.EVIDENCE_TEMPERATURE,
+    "log evidence within which hypotheses are rivals": thresholds.RIVAL_LOG_ODDS,
+    "factor of error within which hypotheses predict alike": thresholds.EQUAL_ERROR_RATIO,
+    "error over the floor that is visible": thresholds.SUFFICIENT_ERROR_RATIO,
+    "p-value below which what is left is no disturbance": thresholds.MIN_P_VALUE,
+    "error over the floor below which only a relation counts": thresholds.GUSTY_ERROR_RATIO,
+    "error over the floor beyond which no sea is taken for granted": thresholds.FAR_ERROR_RATIO,
+    "unseen over fitted error beyond which none is": thresholds.MAX_VALIDATION_ERROR_RATIO,
+    "share of the excess that an effect must explain": thresholds.MIN_EXPLAINED_SHARE,
     "log likelihood per number of a noise kind": reml.PENALTY_PER_PARAMETER,
     "p-value below which `auto` takes no residual for a disturbance": auto_method.MIN_P_VALUE,
     "free-run error of `pem` over that of output error, for `auto`, where a test rejects": auto_method.MAX_FREE_RUN_RATIO,
@@ -57,7 +55,7 @@ def test_the_page_gives_the_codes_numbers():
 
 @pytest.mark.parametrize("share", [0.7, 0.6, 0.3])
 def test_the_page_says_what_an_effect_must_explain(share):
-    (p,) = (p for enough, p in verdict.VERDICT_TABLE if enough == share)
+    (p,) = (p for enough, p in thresholds.SHARES_TO_EXPLAIN if enough == share)
     (said,) = re.findall(rf"less than {100 * share:.0f} % (?:of the excess error [a-z- ]* below|and) ([0-9.e-]+[0-9])", WORDS)
     assert float(said) == p
 

@@ -9,7 +9,7 @@ import pytest
 from truth.bank import make_case
 
 from fieldsid.diagnosis import Diagnosis, diagnose
-from fieldsid.diagnosis.verdict import SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import SUFFICIENT_ERROR_RATIO
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 

@@ -172,12 +172,12 @@ def _render_words(to: Console, found: Diagnosis) -> None:
     """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
     from rich.text import Text
 
-    from fieldsid.diagnosis.verdict import MIN_RIVAL_PROBABILITY_RATIO
+    from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
 
     if found.verdict in ("sufficient", "disturbed"):
         return
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
-        if i and c.probability < MIN_RIVAL_PROBABILITY_RATIO:
+        if i and c.probability < RIVAL_PROBABILITY_RATIO:
             continue
         alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
         to.print()

@@ -137,7 +137,7 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
 
 def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
     """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
-    from fieldsid.diagnosis.verdict import SUFFICIENT_ERROR_RATIO
+    from fieldsid.diagnosis.thresholds import SUFFICIENT_ERROR_RATIO
 
     fitted, unseen = found.gain.left(kept=body["kept"])
     more = any(error > SUFFICIENT_ERROR_RATIO for error in (fitted, unseen))

@@ -6,14 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldsid.diagnosis.thresholds import MIN_BASE_ERROR_SHARE, MIN_COLOUR_RATIO
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-
-MIN_BASE_ERROR_SHARE = 0.01
-"""Smallest noise that models are compared under, as a share of the base model's error. A filtered log shows almost no noise; then
-the smallest inconsistency of its sensors would outweigh everything the base model fails to follow."""
-MIN_COLOUR_RATIO = 0.5
-"""Coloured over white sensor noise above which the reported floor includes the coloured part."""
 
 
 def reported_noise_floor(floor: Noise, noise: Noise) -> Noise:

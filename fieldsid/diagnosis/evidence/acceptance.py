@@ -6,31 +6,15 @@ The log evidence holds the prior odds of what was added; the errors are those of
 from __future__ import annotations
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.thresholds import (
+    EQUAL_ERROR_RATIO,
+    EXPLAINED_ERROR_RATIO,
+    EXTRA_ERROR_RATIO_PER_EFFECT,
+    MAX_ERROR_RATIO,
+    MAX_VARIANT_ERROR_RATIO,
+    MIN_TRAINING_GAIN,
+)
 from fieldsid.models.model import Noise
-
-ALTERNATIVE_LOG_ODDS = 6.0
-"""Prior log odds against another kind of noise or another law of the speed than the usual: 400 to 1."""
-MIN_TRAINING_GAIN = 4.0
-"""Log likelihood on the training runs that an effect with nuisance parameters of each run must gain. On validation runs those
-parameters are fitted too, so that a gain there alone proves nothing. An effect without them must only not lose there."""
-MAX_ERROR_RATIO = 0.92
-"""Ratio the free-run error must fall to: a significant effect need not be important. Speed, trim and clock of a real vehicle
-always differ a little from the model's, which leaves a few percent of the noise."""
-MAX_VARIANT_ERROR_RATIO = 0.97
-"""Ratio the free-run error must fall to for another variant of an effect that has been accepted."""
-EXPLAINED_ERROR_RATIO = 1.02
-"""Error over the noise floor up to which the error counts as noise."""
-EQUAL_ERROR_RATIO = 1.03
-"""Ratio of two errors up to which two models predict equally well."""
-MAX_VALIDATION_ERROR_RATIO = 2.0
-"""Validation error over training error above which something besides a disturbance is missing: a disturbance is equal on both."""
-EXTRA_ERROR_RATIO_PER_EFFECT = 0.02
-"""By how much MAX_ERROR_RATIO is lowered for the third and each further effect: large sets of effects fit more by chance."""
-FAR_ERROR_RATIO = 4.0
-"""Error over the floor above which every leading addition is tried in its other variants: at such an error the textbook variant
-decides little."""
-MISSING_ERROR_RATIO = 1.5
-"""Error over the floor above which something is missing, even where no effect in its textbook variant gains evidence."""
 
 
 def is_accepted(without: ScoredModel, with_: ScoredModel) -> bool:

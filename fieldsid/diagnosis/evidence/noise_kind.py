@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from fieldsid.diagnosis.data.noise_floor import MIN_COLOUR_RATIO, reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import ALTERNATIVE_LOG_ODDS
+from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
     FittedProblem,
@@ -19,6 +18,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
 )
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MIN_COLOUR_RATIO
 from fieldsid.models.model import Noise
 from fieldsid.noise.noise_kinds import JOINT_NOISE, SINGLE_NOISE_KINDS
 

@@ -26,6 +26,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
 )
 from fieldsid.diagnosis.evidence.predictive_density import ValidationRun, log_predictive_density, parameter_jacobian
 from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.fitting.predict.predict import frozen_problem, refit_nuisances, with_command_timing
 from fieldsid.fitting.predict.speed_correction import correct_speed, speed_sensitivity
@@ -35,10 +36,6 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
-
-EFFECT_LOG_ODDS = 6.0
-"""Prior log odds against one effect of the catalogue, and against a variant other than the textbook's: 400 to 1, as dozens of
-both are tried."""
 
 ValidationFits = tuple[tuple[Problem, FloatArray], ...]
 
@@ -237,7 +234,7 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     own = sum(len(e.nuisance) for e in layout.effects)
     hidden = sum(1 for e in layout.effects if e.extra_states)
     count = sum(len(e.shared) for e in layout.effects) + (0 if layout.groups.by_law else len(layout.groups.speeds) - 1)
-    total = sum(EFFECT_LOG_ODDS * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects) + 0.5 * count * np.log(
+    total = sum(ALTERNATIVE_LOG_ODDS * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects) + 0.5 * count * np.log(
         measured_count(records)
     )
     for record in (*records, *validation):

@@ -9,14 +9,13 @@ import numpy as np
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.verdict import SUFFICIENT_ERROR_RATIO, Verdict
+from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.verdict import Verdict
 from fieldsid.errors import FieldsidError
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
 
 MOST_RIVALS = 3
-MIN_LOG_ODDS = 3.0
-"""Log odds below which a maneuver is not worth a dive: 20 to 1 for the right one."""
 
 
 def next_maneuver(
@@ -58,7 +57,7 @@ def _deciding(search: Search, rivals: list[ScoredModel]) -> dict[str, Any]:
         # nothing inside the limits separates them: what the effects themselves declare is still worth flying
         return {**_declared(names), **command, "note": error.what}
     odds = found.expected_log_odds
-    if odds < MIN_LOG_ODDS:
+    if odds < RIVAL_LOG_ODDS:
         tried = f"no maneuver inside the fin angles flown is expected to give log odds of more than {odds:.1f} for the right one"
         return {**_declared(names), **command, "expected_log_odds": odds, "note": tried}
     return {**found.plain(), **command, "why": f"expected log odds {odds:.0f} for the right one"}

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from math import isfinite
 
-from fieldsid.diagnosis.evidence.acceptance import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.thresholds import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO
 from fieldsid.diagnosis.verdict import Verdict, excess_explained, worsens
 from fieldsid.models.effect import effect_named, variant_of
 from fieldsid.models.model import Noise

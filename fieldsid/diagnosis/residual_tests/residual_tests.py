@@ -18,6 +18,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.residual_tests.memory_score_test import memory_score_test
+from fieldsid.diagnosis.thresholds import COLOUR_P_EXPONENT, MIN_P_VALUE
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -27,10 +28,6 @@ from fieldsid.numerics.block_means import block_means
 from fieldsid.numerics.ljung_box import ljung_box_p
 from fieldsid.numerics.tail_probabilities import chi_square_tail, f_tail, pearson3_tail
 
-MIN_P_VALUE = 2e-2
-"""p-value below which the residuals are not a disturbance."""
-COLOUR_P_EXPONENT = 0.2
-"""Power that the whiteness p-value is raised to: the model's disturbance has one time constant, a real sea a broader spectrum."""
 ENERGY_WINDOW_S = 2.0
 HISTORY_SPAN_S = 3.0
 BREUSCH_PAGAN_BLOCK_S, MIN_BLOCKS = 1.0, 20

@@ -7,14 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import (
-    FAR_ERROR_RATIO,
-    MISSING_ERROR_RATIO,
-    gains_any_evidence,
-    gains_training_evidence,
-    is_accepted,
-    leaves_error,
-)
+from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, gains_training_evidence, is_accepted, leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
     FittedProblem,
@@ -34,6 +27,7 @@ from fieldsid.diagnosis.search.add_effect import (
 )
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.variant_search import VariantRequest
+from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect

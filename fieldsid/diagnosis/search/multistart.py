@@ -14,8 +14,6 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
 
-MIN_ERROR_RATIO = 1.5
-"""Error over the noise floor above which a model may be at a local minimum."""
 MAX_SCAN_POINTS, SCREEN_ITERATIONS = 6, 6
 """Scan points that are iterated, and the iterations of each."""
 

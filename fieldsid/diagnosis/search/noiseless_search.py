@@ -25,6 +25,7 @@ from fieldsid.diagnosis.evidence.scored_model import (
 )
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, linearise_at, screen_effect, transfer_parameters
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.models.effect import Effect
@@ -32,8 +33,6 @@ from fieldsid.models.effect import Effect
 MAX_EFFECTS_TRIED, BEAM_WIDTH, MAX_EFFECTS = 5, 2, 3
 MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 200, 1e-7
 """Iterations of each output-error fit, and the share of its sum of squares that an iteration must gain: convergence is slow."""
-MAX_FREE_RUN_ERROR_RATIO = 0.95
-"""Ratio that the error must fall to with each added effect."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from fieldsid.diagnosis.evidence.acceptance import MAX_ERROR_RATIO, MISSING_ERROR_RATIO, leaves_error
+from fieldsid.diagnosis.evidence.acceptance import leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
@@ -13,7 +13,8 @@ from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
 from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
 from fieldsid.diagnosis.search.model_spec import Assumptions
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
-from fieldsid.diagnosis.search.multistart import MIN_ERROR_RATIO, multistart
+from fieldsid.diagnosis.search.multistart import multistart
+from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MISSING_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.models.effect import Effect
 
@@ -43,7 +44,7 @@ class Search(MoveEvaluation):
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
             found = self.best_admissible()
-        if self.error_ratio(found) > MIN_ERROR_RATIO and self.budget.remaining():
+        if self.error_ratio(found) > MISSING_ERROR_RATIO and self.budget.remaining():
             found = multistart(
                 found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
             )

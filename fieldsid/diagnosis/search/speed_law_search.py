@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
-from fieldsid.diagnosis.evidence.acceptance import ALTERNATIVE_LOG_ODDS, MISSING_ERROR_RATIO, leaves_error
+from fieldsid.diagnosis.evidence.acceptance import leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MISSING_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import (
     backtrack,
     linearise_at,

@@ -8,16 +8,11 @@ from itertools import product
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import (
-    MAX_VALIDATION_ERROR_RATIO,
-    gains_evidence,
-    leaves_error,
-    validation_error_ratio,
-    variant_improves,
-)
+from fieldsid.diagnosis.evidence.acceptance import gains_evidence, leaves_error, validation_error_ratio, variant_improves
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.thresholds import MAX_VALIDATION_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.initial.effect_screen import transfer_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, cost_of, levenberg_marquardt

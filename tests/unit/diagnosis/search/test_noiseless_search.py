@@ -10,8 +10,9 @@ from truth.noise import Clock
 from truth.physics import Physics
 
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
-from fieldsid.diagnosis.search.noiseless_search import MAX_FREE_RUN_ERROR_RATIO, _backward_eliminate, _evaluate, noiseless_search
+from fieldsid.diagnosis.search.noiseless_search import _backward_eliminate, _evaluate, noiseless_search
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO
 from fieldsid.diagnosis.verdict import added_effects
 from fieldsid.effects import pick_effect
 from fieldsid.fitting.initial.effect_screen import with_effect

@@ -1,0 +1,81 @@
+"""The thresholds that decide a diagnosis, each with its unit: there are no others in this room but those of the numerics.
+
+Log odds are natural logarithms, p probabilities; an error ratio is a free-run error over another, or over the noise floor. What
+20 % more or less of each costs is printed by `python tests/benchmarks/threshold_sensitivity.py`, on cases of the repository's own
+bank and, where its folder is given, of one written by other hands; README gives the table.
+"""
+
+from __future__ import annotations
+
+from math import exp
+
+# ----- prior odds
+
+ALTERNATIVE_LOG_ODDS = 6.0
+"""Log odds. Prior against one effect of the catalogue, one variant other than the textbook's, another kind of noise, or another
+law of the speed than the usual: 400 to 1, as dozens of each are tried."""
+RIVAL_LOG_ODDS = 3.0
+"""Log odds. Two models are rivals within it, and a maneuver that tells them apart is worth a dive from it on: 20 to 1."""
+RIVAL_PROBABILITY_RATIO = exp(-RIVAL_LOG_ODDS)
+"""The same as a ratio of two probabilities."""
+EVIDENCE_TEMPERATURE = 2.0
+"""Divisor of the log evidence before it becomes a probability: the evidence of models that are never exact is overstated."""
+MIN_TRAINING_GAIN = 4.0
+"""Log likelihood on the training runs that an effect with nuisance parameters of each run must gain. On validation runs those
+parameters are fitted too, so that a gain there alone proves nothing. An effect without them must only not lose there."""
+
+# ----- what counts as a lower error
+
+MAX_ERROR_RATIO = 0.92
+"""Error ratio that an addition must reach: a significant effect need not be important. Speed, trim and clock of a real vehicle
+always differ a little from the model's, which leaves a few percent of the noise."""
+EXTRA_ERROR_RATIO_PER_EFFECT = 0.02
+"""By how much MAX_ERROR_RATIO is lowered for the third and each further effect: large sets of effects fit more by chance."""
+MAX_VARIANT_ERROR_RATIO = 0.97
+"""Error ratio that another variant of an effect that has been accepted must reach."""
+MAX_FREE_RUN_ERROR_RATIO = 0.95
+"""Error ratio that each effect must reach in a log without noise, where no likelihood decides."""
+EQUAL_ERROR_RATIO = 1.03
+"""Error ratio up to which two models predict equally well."""
+
+# ----- errors over the noise floor
+
+EXPLAINED_ERROR_RATIO = 1.02
+"""Error over the floor up to which the error counts as noise."""
+SUFFICIENT_ERROR_RATIO = 1.15
+"""Error over the floor below which the model is sufficient."""
+MISSING_ERROR_RATIO = 1.5
+"""Error over the floor above which something is missing, even where no effect in its textbook variant gains evidence; above which
+a fit may be at a local minimum; and which the right effect rarely leaves."""
+FAR_ERROR_RATIO = 4.0
+"""Error over the floor above which the textbook variant decides little, and a disturbance alone is implausible."""
+GUSTY_ERROR_RATIO = 2.0
+"""Error over the floor below which only dependence on the motion tells an effect from a disturbance: gusts come in bursts too."""
+MAX_VALIDATION_ERROR_RATIO = 2.0
+"""Validation error over training error above which something besides a disturbance is missing: a disturbance is equal on both."""
+MIN_BASE_ERROR_SHARE = 0.01
+"""Smallest noise that models are compared under, as a share of the base model's error. A filtered log shows almost no noise; then
+the smallest inconsistency of its sensors would outweigh everything the base model fails to follow."""
+MIN_COLOUR_RATIO = 0.5
+"""Coloured over white sensor noise above which the reported floor includes the coloured part."""
+MAX_SENSOR_COLOUR_S = 1.0
+"""s. Time constant below which coloured sensor noise counts as noise: a missing motion lasts as long as a maneuver."""
+
+# ----- what a named effect may leave
+
+MIN_P_VALUE = 2e-2
+"""p below which the residuals are not a disturbance."""
+COLOUR_P_EXPONENT = 0.2
+"""Power that the whiteness p is raised to: the model's disturbance has one time constant, a real sea a broader spectrum."""
+SHARES_TO_EXPLAIN = ((0.7, 1e-5), (0.6, 1e-3), (0.3, MIN_P_VALUE))
+"""Least share of the excess error that a named effect must explain, and the p of the residual tests below which it must: a model
+is never exact, but the less it explains the less it may leave."""
+SHARES_TO_EXPLAIN_MISSING = ((0.85, 1e-6),)
+"""The same in addition where it leaves an error above MISSING_ERROR_RATIO."""
+SHARES_TO_EXPLAIN_FAR = ((0.97, 1e-6),)
+"""The same where it leaves one above FAR_ERROR_RATIO: there, any effect that bends the response explains most of the excess."""
+MIN_EXPLAINED_SHARE = SHARES_TO_EXPLAIN[0][0]
+"""The largest of those shares that is asked whatever the error."""
+NOISELESS_EXPLAINED_SHARE = 0.5
+"""Share of the excess error that effects must explain to be named from a log without noise: more than they leave. No p-value
+decides there, since without noise whatever is left is significant."""
