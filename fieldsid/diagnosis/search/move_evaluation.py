@@ -68,25 +68,27 @@ class MoveEvaluation(SearchState):
         return self._children(key)
 
     def _fit_from_textbook(self, parent: ScoredModel, textbook: ScoredModel, left: Sequence[Effect]) -> None:
-        """Fit the parent with each effect that its textbook variant lacks, from the output-error fit with that.
+        """Fit both with each effect that the textbook variant lacks, from the textbook variant's solution with that.
 
-        A variant may have taken up the motion of an effect that is missing; from its own solution that effect explains little.
+        A variant may have taken up the motion of an effect that is missing; from its own solution that effect explains little,
+        and with it the textbook variant may be enough.
         """
         fitted = parent.likelihood_fit.fitted
         moves = add_effect(textbook, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=False)
-        groups = by_effect([m for m in moves if m.by_output_error])
 
         def fit_all(group: Sequence[SearchMove]) -> ScoredModel:
             effect = group[0].screened.effect
             problem = fitted.problem.with_effects([*parent.effects, effect])
             own = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
             for move in group:
-                free = fit_output_error(move.screened.problem, move.screened.start, fitted.weights)
-                start = overlay_parameters(free.problem.layout, free.x, problem.layout, own)
-                self._fit_child(parent, problem, start, effect)
+                plain, x = move.screened.problem, move.screened.start
+                if move.by_output_error:
+                    x = fit_output_error(plain, x, fitted.weights).x
+                    self._fit_child(parent, problem, overlay_parameters(plain.layout, x, problem.layout, own), effect)
+                self._fit_child(textbook, plain, x, effect)
             return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()
 
-        self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit_all, groups)})
+        self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit_all, by_effect(moves))})
 
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.
