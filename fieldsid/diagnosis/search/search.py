@@ -11,9 +11,10 @@ from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
 from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
-from fieldsid.diagnosis.search.model_spec import Assumptions
+from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
 from fieldsid.diagnosis.search.multistart import multistart
+from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MISSING_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.models.effect import Effect
@@ -30,6 +31,7 @@ class Search(MoveEvaluation):
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
         self._join_leaders()
+        self._exchange_for_variants()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -81,6 +83,19 @@ class Search(MoveEvaluation):
             ml_fit = fit_maximum_likelihood(problem, start, best.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
             self.tried[names] = prefer_output_error(self._keep(ml_fit), self.floor)
 
+    def _exchange_for_variants(self) -> None:
+        """Try the model of the highest evidence without each effect, the others of the same stage in their other variants.
+
+        An effect may stand for such a variant: a dead time for the inertia of a servo.
+        """
+        best, asked = self._most_evident(), list[VariantRequest]()
+        for gone in best.effects:
+            without = self.tried.get(frozenset(best.names) - {gone.name})
+            alike = {e.name for e in best.effects if e is not gone and e.stage is gone.stage and e.variants}
+            if gone.name not in self.known and without is not None and alike:
+                asked.append(VariantRequest(without, None, alike))
+        self._try_variants(asked)
+
     def _front(self, best: ScoredModel) -> list[ScoredModel]:
         """Return the models of accepted effects whose error is clearly below that of the one with the highest evidence."""
         least = MAX_ERROR_RATIO * best.selection_errors.mean
@@ -108,11 +123,15 @@ class Search(MoveEvaluation):
         return is_new and leaves_error(h, self.floor)
 
     def _drop_each(self) -> None:
-        """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle."""
+        """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.
+
+        The others stay in their variants. The set without it may have been tried in other variants only.
+        """
         best = self._most_evident()
+        spec = ModelSpec.of(best)
         if len(best.names) > len(self.known) + 1:
             for gone in best.effects:
-                if gone.name not in self.known and frozenset(best.names) - {gone.name} not in self.tried:
+                if gone.name not in self.known and spec.without(gone.name) not in self.tried.models:
                     self._drop_effect(best, gone)
 
     def _switch_noise_or_trim(self) -> bool:

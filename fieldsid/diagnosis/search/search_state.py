@@ -141,10 +141,10 @@ class SearchState:
     def _try_variants(self, asked: Sequence[VariantRequest]) -> None:
         """Try other variants of the models' effects, unless that was done at the same evidence."""
         at = self.tried.progress.evidence_at_variants
-        asked = [p for p in asked if p.model.log_evidence > at.get(frozenset(p.model.names), -np.inf) + MIN_LIKELIHOOD_GAIN]
-        for h in FormSearch(self.resolution_floor, self.noise_kind, self.floor, self.parallel).try_variants(asked):
-            key = frozenset(h.names)
-            self.tried[key], at[key] = h, h.log_evidence
+        asked = [p for p in asked if p.model.log_evidence > at.get(p.key, -np.inf) + MIN_LIKELIHOOD_GAIN]
+        formed = FormSearch(self.resolution_floor, self.noise_kind, self.floor, self.parallel).try_variants(asked)
+        for request, h in zip(asked, formed, strict=True):
+            self.tried[frozenset(h.names)], at[request.key] = h, h.log_evidence
 
     def _most_evident(self) -> ScoredModel:
         """Return the model of the highest log evidence, whether or not its effects are accepted."""

@@ -42,6 +42,11 @@ class VariantRequest:
     without: ScoredModel | None = None
     effects: Collection[str] | None = None
 
+    @property
+    def key(self) -> tuple[frozenset[str], frozenset[str]]:
+        """The names of the model's effects, and of those to be tried in other variants."""
+        return frozenset(self.model.names), frozenset(self.model.names if self.effects is None else self.effects)
+
     def accepts(self, formed: ScoredModel) -> bool:
         """Whether a variant that gains evidence is accepted."""
         return variant_improves(self.model, formed) or not (self.without is None or gains_evidence(self.without, self.model))
