@@ -58,8 +58,6 @@ MIN_BASE_ERROR_SHARE = 0.01
 the smallest inconsistency of its sensors would outweigh everything the base model fails to follow."""
 MIN_COLOUR_RATIO = 0.5
 """Coloured over white sensor noise above which the reported floor includes the coloured part."""
-MAX_SENSOR_COLOUR_S = 1.0
-"""s. Time constant below which coloured sensor noise counts as noise: a missing motion lasts as long as a maneuver."""
 
 # ----- what a named effect may leave
 

@@ -18,7 +18,6 @@ from fieldsid.diagnosis.thresholds import (
     EVIDENCE_TEMPERATURE,
     FAR_ERROR_RATIO,
     GUSTY_ERROR_RATIO,
-    MAX_SENSOR_COLOUR_S,
     MAX_VALIDATION_ERROR_RATIO,
     MIN_P_VALUE,
     MISSING_ERROR_RATIO,
@@ -29,7 +28,6 @@ from fieldsid.diagnosis.thresholds import (
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.models.model import Noise
-from fieldsid.noise.noise_kinds import JOINT_NOISE
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,24 +42,21 @@ class Verdict:
 def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: LikelihoodFit) -> Verdict:
     """Return the verdict on the model a search ended at, from its errors and the tests of its innovations.
 
-    Errors are over the sensors' noise; its coloured part counts where the noise is fitted jointly with a disturbance. Without an
-    effect, `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is
-    `disturbed` where the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the
-    training runs better leaves a visible error on the validation runs that is no smaller than without it.
+    Errors are over the noise floor that is reported, with the sensors' coloured noise where they have it. Without an effect,
+    `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is `disturbed` where
+    the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the training runs
+    better leaves a visible error on the validation runs that is no smaller than without it.
     """
-    noise, floor = ml_fit.noise, reported_noise_floor(search.floor, ml_fit.noise)
-    least = floor if ml_fit.noise_kind == JOINT_NOISE else search.floor
-    error = found.selection_errors.over(least)
+    floor = reported_noise_floor(search.floor, ml_fit.noise)
+    error = found.selection_errors.over(floor)
     if frozenset(found.names) == search.root:
-        if max(error, found.train.over(least)) <= SUFFICIENT_ERROR_RATIO:
+        if max(error, found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
-        return _unnamed(found, left, floor, least)
-    visible = (
-        found.selection_errors.over(floor) if noise.coloured_time < MAX_SENSOR_COLOUR_S else error
-    ) > SUFFICIENT_ERROR_RATIO
+        return _unnamed(found, left, floor)
+    visible = error > SUFFICIENT_ERROR_RATIO
     if visible and found.selection_errors.mean >= search.base().selection_errors.mean:
-        return _unnamed(found, left, floor, least)
-    share = excess_explained(search, found, least)
+        return _unnamed(found, left, floor)
+    share = excess_explained(search, found, floor)
     asked = (
         SHARES_TO_EXPLAIN
         if error <= MISSING_ERROR_RATIO or search.is_noiseless
@@ -75,12 +70,11 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     return Verdict("effect", added_effects(search, found))
 
 
-def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise, least: Noise) -> Verdict:
+def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
     """Return the verdict where no effect lowers the error that models are selected by: `disturbed`, or `unexplained`."""
-    worst = max(found.selection_errors.over(least), found.train.over(least))
-    sea = max(found.selection_errors.over(floor), found.train.over(floor))
+    worst = max(found.selection_errors.over(floor), found.train.over(floor))
     p = 3.0 * left.dependence if worst < GUSTY_ERROR_RATIO else left.p
-    odd = p < MIN_P_VALUE or sea > FAR_ERROR_RATIO or validation_error_ratio(found, least) > MAX_VALIDATION_ERROR_RATIO
+    odd = p < MIN_P_VALUE or worst > FAR_ERROR_RATIO or validation_error_ratio(found, floor) > MAX_VALIDATION_ERROR_RATIO
     return Verdict("unexplained" if odd else "disturbed", ())
 
 

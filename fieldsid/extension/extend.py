@@ -76,6 +76,8 @@ class Extension(Plotted):
     gain: Gain
     evidence: float
     notes: tuple[Note, ...] = ()
+    on_bound: tuple[str, ...] = ()
+    """The parameters that ended on a bound, which for a rate of the hull is what the runs can show."""
 
     @property
     def pays(self) -> bool:
@@ -121,7 +123,9 @@ def extend(
     )
     model = final_model(after)
     notes = (*notes, *as_flown(model, judged), *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
-    return Extension(model, gain, after.log_evidence - before.log_evidence, notes)
+    ended = after.reported_fit
+    on_bound = tuple(p.name for p in ended.problem.layout.on_bound(ended.x))
+    return Extension(model, gain, after.log_evidence - before.log_evidence, notes, on_bound)
 
 
 def base_from(work: Search, parent: Model) -> ScoredModel:

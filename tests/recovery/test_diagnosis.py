@@ -20,6 +20,8 @@ from fieldsid.models.record import record_of
 from fieldsid.runtime import worker_pool
 
 SEED = 2026
+WANDERING = 24
+"""Index of a log without an effect whose sensors wander."""
 CHANNELS = (("angle", "rad"), ("rate", "rad_s"))
 
 
@@ -62,6 +64,15 @@ def test_nothing_is_named_where_nothing_is_hidden(first: int) -> None:
     assert found.verdict in ("sufficient", "disturbed")
     assert found.effects == ()
     assert found.final == found.base
+
+
+def test_sensors_that_wander_are_noise_and_nothing_is_missing() -> None:
+    """The floor that is printed is the one that decides: over the white part alone the error is 1.7 times the noise."""
+    case = make_case(WANDERING, 701, kind="none")
+    found = diagnosed(case)
+    assert found.verdict == "sufficient"
+    assert found.base.validation.over(found.noise_floor) < 1.15
+    assert found.noise_floor.angle == pytest.approx(case.floor["angle_rad"], rel=0.15)
 
 
 def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:

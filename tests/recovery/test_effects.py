@@ -59,7 +59,8 @@ def test_the_coefficients_that_were_put_in_come_back(case):
     plain = fit([log], case.axis, method="output_error")
     for name, value in case.expected.items():
         assert found.model.values[name] == pytest.approx(value, rel=case.near, abs=case.near * 0.02), name
-    with_it, without = (np.sqrt(np.mean(f.predictions[0].residual[1] ** 2)) for f in (found, plain))
+    # in the channel that shows it: without noise a compass error leaves a rate that the plain model follows exactly
+    with_it, without = (np.sqrt(np.mean(f.predictions[0].residual ** 2, axis=1)).max() for f in (found, plain))
     assert with_it < 0.2 * without
 
 

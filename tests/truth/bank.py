@@ -267,5 +267,6 @@ def _details(scene, hidden):
         "speeds": [round(leg.speed, 3) for leg in scene.legs],
         "rate_hz": round(1.0 / scene.clock.sample),
         "damping": s.damping, "stiffness": s.stiffness, "authority": s.authority, "law": scene.law, **scene.notes,
-        "fields": hidden.updates(1.0, 0),
+        "fields": hidden.updates(1.0, 0), "nominal_speed": s.speed, "trim": scene.base.trim, "run_s": scene.clock.time[-1],
+        "per_run": [hidden.updates(1.0, i) for i in range(TRAINING)],
     }  # fmt: skip

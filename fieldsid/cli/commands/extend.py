@@ -30,8 +30,6 @@ SCHEMA = "fieldsid/extend/1"
 AT_THE_FLOOR = {"yaw": "turn-radius", "pitch": "schedule design"}
 """What a model is for once it leaves no more than the noise."""
 MORE = "more is missing than the sensors' noise explains"
-NEAR = 1e-6
-"""Share of a coefficient's range from its bound within which it lies at it."""
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
@@ -172,15 +170,14 @@ def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> 
         "model": str(path if written is None else written),
         "effects": list(parent.effects if written is None else found.model.effects),
         "parent": {"path": str(path), "sha256": sha256_of(path)},
-        "coefficients": {c.name: _coefficient(found.model, c) for c in new},
+        "coefficients": {c.name: _coefficient(found, c) for c in new},
         "notes": [{"code": n.code, "message": n.message} for n in found.notes],
     }
 
 
-def _coefficient(model: Model, c: Coefficient) -> dict[str, Any]:
-    value = model.values[c.name]
-    at_bound = min(value - c.low, c.high - value) <= NEAR * (c.high - c.low)
-    return {"value": value, "std_error": model.std_error(c.name), "unit": c.unit, "at_bound": at_bound}
+def _coefficient(found: Extension, c: Coefficient) -> dict[str, Any]:
+    value, error = found.model.values[c.name], found.model.std_error(c.name)
+    return {"value": value, "std_error": error, "unit": c.unit, "at_bound": c.name in found.on_bound}
 
 
 def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:

@@ -61,16 +61,14 @@ def _stability(problem: Problem, solution: Solution) -> Iterator[Note]:
 
 def _bounds(problem: Problem, solution: Solution) -> Iterator[Note]:
     means = {c.name: f" ({c.says})" for e in problem.layout.effects for c in e.shared if c.says}
-    for i in range(problem.layout.shared):
-        slot = problem.layout.parameters[i]
-        span = slot.high - slot.low
-        if min(solution.x[i] - slot.low, slot.high - solution.x[i]) <= 1e-6 * span:
-            said = f"{problem.layout.shown(slot.name)} = {solution.x[i]:.4g} {in_unit(slot.unit)}".rstrip()
-            yield Note(
-                "on_bound",
-                f"{said}{means.get(slot.name, '')} is on its bound [{slot.low:g}, {slot.high:g}]: no error bar is right there",
-                {"value": float(solution.x[i]), "low": slot.low, "high": slot.high},
-            )
+    values = _values(problem, solution)
+    for slot in problem.layout.on_bound(solution.x):
+        said = f"{problem.layout.shown(slot.name)} = {values[slot.name]:.4g} {in_unit(slot.unit)}".rstrip()
+        yield Note(
+            "on_bound",
+            f"{said}{means.get(slot.name, '')} is on its bound [{slot.low:g}, {slot.high:g}]: no error bar is right there",
+            {"value": values[slot.name], "low": slot.low, "high": slot.high},
+        )
 
 
 def _stiffness(problem: Problem, solution: Solution) -> Iterator[Note]:

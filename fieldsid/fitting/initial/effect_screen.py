@@ -29,6 +29,8 @@ MAX_SCAN_POINTS = 12
 MAX_BACKTRACKS = 4
 WEAK_START_SHARE = 0.03
 """Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's."""
+EVENT_UNIT, EVENT_REFINEMENT = "run", 7
+"""Unit of a time that is a share of a run, and the points it is searched at between the neighbours of its best grid point."""
 MIN_COLUMN_NORM, MIN_INDEPENDENT_SHARE = 1e-9, 1e-8
 MIN_HULL_RATE_1_S = 1e-3
 """1/s; a base model that lacks an effect may have almost no damping."""
@@ -298,14 +300,27 @@ def _best_per_run(
 ) -> FloatArray:
     """Return x with one nuisance at the best grid point of each run, under shared numbers that are equal for all runs.
 
-    Alone, each run would choose the event that suits it best, large or small; a run without an event would still find one.
+    Alone, each run would choose the event that suits it best, large or small; a run without an event would still find one. The
+    time of an event is then searched for between its neighbours on the grid: a pulse of the fin is shorter than their distance.
     """
-    x = x.copy()
-    shared = [i for i in new if problem.layout.parameters[i].run < 0]
     grid = c.scan or (c.start,)
-    places, squares = [], []
-    for run in range(len(problem.records)):
-        slot = next(i for i in problem.layout.nuisances_of(run) if problem.layout.parameters[i].name == c.name)
+    runs = range(len(linearisation.problem.records))
+    slots = problem.layout.parameters
+    places = [next(i for i in problem.layout.nuisances_of(run) if slots[i].name == c.name) for run in runs]
+    x = _at_best_points(linearisation, problem, x, new, places, np.tile(grid, (len(places), 1)))
+    if c.unit != EVENT_UNIT or len(grid) < 2:
+        return x
+    between = (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, EVENT_REFINEMENT)
+    return _at_best_points(linearisation, problem, x, new, places, np.clip(x[places][:, None] + between, c.low, c.high))
+
+
+def _at_best_points(
+    linearisation: Linearisation, problem: Problem, x: FloatArray, new: Sequence[int], places: Sequence[int], grids: FloatArray
+) -> FloatArray:
+    """Return x with the nuisance at `places`, one a run, at the best of each run's own grid points (R, G)."""
+    x = x.copy()
+    shared, squares = [i for i in new if problem.layout.parameters[i].run < 0], []
+    for run, (slot, grid) in enumerate(zip(places, grids, strict=True)):
         own = [i for i in new if i != slot and problem.layout.parameters[i].run == run]
         for value in grid:
             x[slot] = value
@@ -313,10 +328,9 @@ def _best_per_run(
             basis = _extend_basis(linearisation.nuisance_basis[run], rows[1 + len(shared) :].T)
             left = project_out(basis, np.concatenate([rows[: 1 + len(shared)], linearisation.shared[run]]))
             squares.append(left @ left.T)
-        places.append(slot)
-    square = np.array(squares).reshape(len(places), len(grid), *squares[0].shape)
+    square = np.array(squares).reshape(*grids.shape, *squares[0].shape)
     low, high = (bound[shared] - x[shared] for bound in (problem.layout.low, problem.layout.high))
-    x[places] = np.array(grid)[joint_grid_search(square, low, high)]
+    x[list(places)] = grids[np.arange(len(places)), joint_grid_search(square, low, high)]
     return x
 
 
