@@ -83,7 +83,7 @@ def check_wish(wish: Wish) -> None:
             "the damping ratio must lie in 0.1 .. 3", found=f"{wish.damping:g}", hint="`--damping 0.7` overshoots by 5 %"
         )
     if not 10.0 <= wish.phase_margin_deg <= 80.0:
-        hint = "`--phase-margin 45` is usual"
+        hint = "`--phase-margin 45deg` is usual"
         raise UsageError("the phase margin must lie in 10 .. 80 deg", found=f"{wish.phase_margin_deg:g}", hint=hint)
 
 
