@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from fieldsid.schedule.record import Schedule
     from fieldsid.schedule.verify import Check, Verification
 
+SLOWED_SHARE = 0.995
+"""Below it a row's share is not printed as 1.00."""
+
 command = typer.Typer(help="Gains per speed: design them, verify them, write them for the vehicle's software.")
 
 ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
@@ -313,7 +316,7 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
     )
     if rejected := schedule.provenance["draws_rejected"]:
         to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")
-    slowed = [r for r in schedule.rows if r.slowed < 1.0]
+    slowed = [r for r in schedule.rows if r.slowed < SLOWED_SHARE]
     if slowed:
         to.print(
             f"{len(slowed)} of {len(schedule.rows)} rows were slowed for lag, delay, margin or the draws (1 is the formula's)"
