@@ -1,4 +1,4 @@
-"""Angles as a user types them, the same everywhere: `15deg`, `0.26rad`, or a bare number, which is rad.
+"""Angles as a user types them, the same everywhere: `15deg`, `0.26rad`, or a bare number, which is rad; of a margin deg.
 
 A bare number that no such angle can be in rad is refused with both readings: 60 is 60 deg or 60 rad, never a guess.
 """
@@ -40,6 +40,24 @@ def parse_angle(text: str, option: str, most: float) -> float:
             hint=f"write `{option} {value:g}deg`, or `{value:g}rad` where that is meant",
         )
     return value * UNITS[unit or "rad"]
+
+
+def parse_margin(text: str, option: str) -> float:
+    """Read a phase margin as deg: `45deg`, `0.79rad`, or a bare number, which is deg as margins are always told.
+
+    A bare number that can be meant in rad, other than zero, is refused with both readings. Raises UsageError.
+    """
+    word = text.strip().lower()
+    if any(word.endswith(u) for u in UNITS):
+        return math.degrees(parse_angle(text, option, math.inf))
+    value = math.degrees(parse_angle(f"{word}deg", option, math.inf))
+    if 0.0 < abs(value) <= TILT:
+        raise UsageError(
+            f"`{option} {value:g}` is {value:g} deg or {value:g} rad?",
+            found=f"{value:g} rad is {math.degrees(value):.4g} deg; a bare number is deg for a margin",
+            hint=f"write `{option} {math.degrees(value):.0f}deg`, or `{value:g}deg` where that is meant",
+        )
+    return round(value, 9)
 
 
 def said(angle: float) -> str:

@@ -11,6 +11,7 @@ import json
 import re
 
 import numpy as np
+from lua import execute
 from moos_helm import Helm, holds, script
 from rosbags.highlevel import AnyReader
 
@@ -114,3 +115,106 @@ class Moos:
 
 def moos(script_path, helm_path, course):
     return Moos(script_path.read_text(), helm_path.read_text(), course)
+
+
+class Milliseconds(int):
+    """A time as the script sees it: differences know `tofloat`."""
+
+    def __sub__(self, other):
+        return Milliseconds(int(self) - int(other))
+
+    def tofloat(self):
+        return float(self)
+
+
+class Vector(tuple):
+    """Components by name, as a script's vectors have them."""
+
+    __slots__ = ()
+
+    def x(self):
+        return self[0]
+
+    def y(self):
+        return self[1]
+
+
+class ArduPilot:
+    """The script in a vehicle's place: what it may ask of the vehicle, and the fin it sets, by ArduPilot's names.
+
+    North, east and heading are the leg's, turned by its course; a velocity is over ground. The servo's trim is 1500 us.
+    """
+
+    PWM_PER_RAD, FIN_FUNCTION, CHANNEL, TRIM = 800.0, 21, 4, 1500
+
+    def __init__(self, text, course):
+        for name, value in (("PWM_PER_RAD", self.PWM_PER_RAD), ("FIN_FUNCTION", self.FIN_FUNCTION)):
+            text, count = re.subn(rf"local {name} = nil", f"local {name} = {value}", text)
+            assert count == 1, name
+        self.course, self.time, self.seen, self.before, self.fin = course, 0.0, None, None, None
+        self.switched, self.aborted, self.said = True, None, []
+        own = {"millis": self.millis} | dict.fromkeys(("ahrs", "baro", "rc", "arming", "gcs", "SRV_Channels"), self)
+        _, (self.update, self.step_ms) = execute(text, **own)
+
+    def step(self, t, seen):
+        self.before, self.seen, self.time, self.fin = self.seen and (self.time, self.seen), seen, t, None
+        self.update()
+        return self.fin
+
+    def millis(self):
+        return Milliseconds(round(1000.0 * self.time))
+
+    def turned(self, along, side):
+        sin, cos = np.sin(self.course), np.cos(self.course)
+        return Vector((along * cos - side * sin, along * sin + side * cos))
+
+    def get_velocity_NED(self):  # noqa: N802  the vehicle's own name
+        if self.before is None:
+            return self.turned(self.seen.surge, 0.0)
+        then, seen = self.before
+        return self.turned(*((a - b) / (self.time - then) for a, b in ((self.seen.x, seen.x), (self.seen.y, seen.y))))
+
+    def get_relative_position_NED_origin(self):  # noqa: N802  the vehicle's own name
+        return self.turned(self.seen.x, self.seen.y)
+
+    def get_yaw_rad(self):
+        return (self.seen.yaw + self.course + np.pi) % (2.0 * np.pi) - np.pi
+
+    def get_pitch_rad(self):
+        return self.seen.pitch
+
+    def get_roll_rad(self):
+        return self.seen.roll
+
+    def get_altitude(self):
+        return -self.seen.depth
+
+    def get_aux_cached(self, option):
+        assert option == 300
+        return 2 if self.switched else 0
+
+    def is_armed(self):
+        return True
+
+    def send_text(self, severity, text):
+        assert 0 <= severity <= 7
+        self.said.append(text)
+        if "ABORT" in text:
+            self.aborted = (self.time, re.search(r"ABORT, (.*) left", text)[1])
+
+    def get_output_pwm(self, function):
+        assert function == self.FIN_FUNCTION
+        return self.TRIM
+
+    def find_channel(self, function):
+        assert function == self.FIN_FUNCTION
+        return self.CHANNEL
+
+    def set_output_pwm_chan_timeout(self, channel, pwm, milliseconds):
+        assert channel == self.CHANNEL
+        assert milliseconds >= self.step_ms
+        self.fin = (pwm - self.TRIM) / self.PWM_PER_RAD
+
+
+def ardupilot(path, course):
+    return ArduPilot(path.read_text(), course)

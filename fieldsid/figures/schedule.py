@@ -1,4 +1,4 @@
-"""A schedule: gains and feed-forward over speed, margins with the least over the identified set, and steps at every speed."""
+"""A schedule: gains, feed-forward and margins over speed with what was asked; steps, the fin in them, a straight leg."""
 
 from __future__ import annotations
 
@@ -10,41 +10,49 @@ from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
 from fieldsid.schedule.flown.response import Steps
+from fieldsid.schedule.optimum import DRAWS_MARGIN_SHARE
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import STEPS_RAD, Check, Verification
 
 SHOWN_S = 25.0
+LEAST_SCALE_DEG = 1.0
+"""A feed-forward that differs by less than fins are rigged to is drawn as what it is: level."""
+LEAST_LEG_DEG = 0.5
+STOP_SHARE = 0.999
 
 
 def figure(schedule: Schedule, verification: Verification) -> Figure:
-    """Return gains, feed-forward and margins over speed at the left, steps of schedule and constant gain at the right."""
-    sheet = canvas.sheet(12.0, 9.0)
+    """Return gains, feed-forward, margins and a straight leg at the left, steps and their fin at the right."""
+    sheet = canvas.sheet(12.0, 11.0)
     left, right = np.asarray(sheet.subfigures(1, 2, width_ratios=(1.0, 1.15)), dtype=object)
-    gains, forward, margins = np.ravel(left.subplots(3, 1, sharex=True))
+    gains, forward, margins, leg = np.ravel(left.subplots(4, 1))
     draw_gains(schedule, gains)
     draw_forward(schedule, forward)
-    draw_margins(verification.scheduled, margins)
-    *steps, leg = np.ravel(right.subplots(4, 1))
+    draw_margins(schedule, verification.scheduled, margins)
+    draw_leg([(f.speed, f.leg) for f in verification.flown], verification.disturbance, leg)
+    *steps, fin = np.ravel(right.subplots(4, 1))
     for at, (size, ax) in enumerate(zip(STEPS_RAD[schedule.axis], steps, strict=True)):
         draw_steps([(f.speed, f.scheduled[at], f.constant[at]) for f in verification.flown], size, ax)
     steps[0].set_title(
         f"steps with the {schedule.kind} schedule; thin: one constant gain, kp = {verification.constant_row.gains.kp:.3g}",
         loc="left", fontsize=10,
     )  # fmt: skip
-    draw_leg([(f.speed, f.leg) for f in verification.flown], verification.disturbance, leg)
+    draw_fin(schedule, [(f.speed, f.scheduled[1], f.scheduled[2]) for f in verification.flown], fin)
     return sheet
 
 
 def gains_figure(schedule: Schedule) -> Figure:
-    """Return gains, feed-forward and the phase margin at the estimate over speed, one above the other."""
+    """Return gains, feed-forward and the phase margin of the draws over speed, one above the other."""
     sheet = canvas.sheet(8.0, 8.0)
     gains, forward, margin = np.ravel(sheet.subplots(3, 1, sharex=True))
     draw_gains(schedule, gains)
     draw_forward(schedule, forward)
     phase = schedule.column("phase_margin_deg")
-    margin.plot(schedule.speeds, phase, "o-", color=canvas.SECOND, markersize=4)
+    margin.plot(schedule.speeds, phase, "o-", color=canvas.SECOND, markersize=4, label="least over the draws")
+    _asked(schedule, margin)
     canvas.dress(margin, x="speed, m/s", y="phase margin, deg")
-    margin.set_ylim(0.0, 1.1 * max(phase))
+    margin.set_ylim(min(0.0, 1.1 * min(phase)), max(1.1 * max(phase), 1.3 * schedule.phase_margin_deg))
+    margin.legend(frameon=False, fontsize=9, ncols=3, loc="lower right")
     return sheet
 
 
@@ -55,26 +63,58 @@ def draw_gains(schedule: Schedule, ax: Axes) -> None:
         if np.any(values):
             ax.plot(schedule.speeds, values, "-", color=colour, linewidth=1.4, label=name)
             _knots(schedule, values, colour, ax)
+    ax.axhline(0.0, color=canvas.QUIET, linewidth=0.8)
     canvas.dress(ax, y="gain", title=f"{schedule.axis.value}: gains per speed (hollow: not supported by data)")
     ax.legend(frameon=False, fontsize=9, ncols=3, loc="best")
 
 
 def draw_forward(schedule: Schedule, ax: Axes) -> None:
-    """Draw the feed-forward against speed, in degrees of fin."""
+    """Draw the feed-forward against speed, in degrees of fin, on a scale that is no finer than a fin is rigged."""
     values = np.degrees(np.array(schedule.column("feed_forward_rad")))
     ax.plot(schedule.speeds, values, "-", color=canvas.FOURTH, linewidth=1.4)
     _knots(schedule, values, canvas.FOURTH, ax)
+    ax.axhline(0.0, color=canvas.QUIET, linewidth=0.8)
+    low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+    spare = 0.15 * (high - low)
+    ax.set_ylim(min(low - spare, -LEAST_SCALE_DEG), max(high + spare, LEAST_SCALE_DEG))
     canvas.dress(ax, y="feed-forward, deg")
 
 
-def draw_margins(checks: Sequence[Check], ax: Axes) -> None:
-    """Draw the phase margin at the estimate and the least over the identified set."""
+def draw_margins(schedule: Schedule, checks: Sequence[Check], ax: Axes) -> None:
+    """Draw the phase margin at the estimate and the least over the identified set, with what was asked of each."""
     speed = np.array([c.speed for c in checks])
     ax.plot(speed, [c.phase_deg for c in checks], "o-", color=canvas.SECOND, markersize=4, label="estimate")
     ax.plot(speed, [c.phase_least_deg for c in checks], "v--", color=canvas.SIMULATED, markersize=4, label="least over the set")
+    _asked(schedule, ax)
     canvas.dress(ax, x="speed, m/s", y="phase margin, deg")
-    ax.set_ylim(bottom=0.0)
-    ax.legend(frameon=False, fontsize=9, ncols=2, loc="lower right")
+    ax.set_ylim(bottom=min(0.0, 1.1 * min(c.phase_least_deg for c in checks)))
+    ax.legend(frameon=False, fontsize=8, ncols=4, loc="lower right", columnspacing=1.0, handlelength=1.6)
+
+
+def _asked(schedule: Schedule, ax: Axes) -> None:
+    """Draw the margin asked of the estimate, and the share of it asked of the draws."""
+    ax.axhline(schedule.phase_margin_deg, color="0.3", linewidth=1.0, linestyle="-.", label="asked")
+    of_draws = DRAWS_MARGIN_SHARE * schedule.phase_margin_deg
+    ax.axhline(of_draws, color="0.3", linewidth=1.0, linestyle=":", label="of 95 % of the draws")
+
+
+def draw_fin(schedule: Schedule, steps: Sequence[tuple[float, Steps, Steps]], ax: Axes) -> None:
+    """Draw the fin in the standard step, thin in the large one, at every speed, with its limits and how long it is at them."""
+    limit = max(schedule.column("fin_limit_rad"))
+    for (_, usual, large), colour in zip(steps, _colours([u for u, _, _ in steps]), strict=True):
+        for shown, width in ((large, 0.6), (usual, 1.4)):
+            keep = shown.time <= SHOWN_S
+            ax.plot(shown.time[keep], np.degrees(shown.fin[keep, 0]), color=colour, linewidth=width)
+    for sign in (-1.0, 1.0):
+        ax.axhline(sign * np.degrees(limit), color="0.3", linewidth=1.0, linestyle="-.")
+    at_stop = max(float(np.mean(np.abs(large.fin[:, 0]) >= STOP_SHARE * limit)) * float(large.time[-1]) for _, _, large in steps)
+    usual, large = (np.degrees(STEPS_RAD[schedule.axis][i]) for i in (1, 2))
+    ax.set_title(
+        f"fin in the {usual:.0f}° step, thin in the {large:.0f}° step: at its limit for up to {at_stop:.1f} s",
+        loc="left",
+        fontsize=9,
+    )
+    canvas.dress(ax, x="time, s", y="fin, deg")
 
 
 def draw_steps(steps: Sequence[tuple[float, Steps, Steps]], size: float, ax: Axes) -> None:
@@ -93,11 +133,15 @@ def draw_steps(steps: Sequence[tuple[float, Steps, Steps]], size: float, ax: Axe
 
 def draw_leg(legs: Sequence[tuple[float, Steps]], disturbance: float, ax: Axes) -> None:
     """Draw the angle of a straight leg at every speed, in the disturbance the models' runs had."""
+    most = 0.0
     for (_, shown), colour in zip(legs, _colours([u for u, _ in legs]), strict=True):
-        keep = shown.time <= SHOWN_S
-        ax.plot(shown.time[keep], np.degrees(shown.angle[keep, 0]), color=colour, linewidth=1.0)
+        angle = np.degrees(shown.angle[:, 0])
+        ax.plot(shown.time, angle, color=colour, linewidth=0.8)
+        most = max(most, float(np.abs(angle).max()))
+    ax.set_ylim(-max(1.1 * most, LEAST_LEG_DEG), max(1.1 * most, LEAST_LEG_DEG))
     canvas.dress(ax, x="time, s", y="straight leg, deg")
-    said = f"disturbance moment {disturbance:.2g} rad/s² rms" if disturbance > 0 else "no disturbance is known"
+    known = f"a disturbance as the runs had, up to {disturbance:.2g} rad/s² rms"
+    said = f"straight leg in {known}" if disturbance > 0 else "straight leg: the models' runs showed no disturbance"
     ax.set_title(said, loc="left", fontsize=9)
 
 

@@ -29,6 +29,8 @@ from fieldsid.plant.yaw_plant import EXPONENT
 from fieldsid.rounding import nine_digits
 
 MAX_PROPOSALS = 40
+LEAST_SHARE = 0.05
+"""A draw keeps the sign of damping and authority, and this share of the estimate: no plant turns the other way."""
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 
 
@@ -163,13 +165,36 @@ class ParameterSource(Brief):
 
     def base_draws(self, speed: float, count: int, rng: np.random.Generator) -> dict[str, FloatArray]:
         """Return draws (count,) of the base parameters at a speed, the first the estimate."""
-        values, spread = self.base_at(speed), self.base_std_at(speed)
-        out = {}
-        for name in NAMES[self.axis].base:
-            z = rng.standard_normal(count)
-            z[0] = 0.0
-            out[name] = values.get(name, 0.0) + z * spread.get(name, 0.0)
-        return out
+        return self._base_drawn(speed, count, rng)[0]
+
+    def share_rejected(self, speed: float, count: int, seed: int) -> float:
+        """Return the share of the draws at a speed that are rejected as outside what is physical, of the model where most are."""
+        if not self.models:
+            return self._base_drawn(speed, count, np.random.default_rng(seed))[1]
+        near = [(self.models[i], np.random.default_rng(seed + i)) for i, _ in self.near(speed)]
+        return max(_drawn_inside(model, count, rng)[1] for model, rng in near)
+
+    def _base_drawn(self, speed: float, count: int, rng: np.random.Generator) -> tuple[dict[str, FloatArray], float]:
+        """Return the draws and the share that was rejected for a damping or an authority of the other sign, and drawn anew."""
+        values, spread, names = self.base_at(speed), self.base_std_at(speed), NAMES[self.axis]
+        centre = np.array([values.get(n, 0.0) for n in names.base])
+        signed = [names.base.index(n) for n in (names.damping, names.authority)]
+        width = np.array([spread.get(n, 0.0) for n in names.base])
+        z = np.array([rng.standard_normal(count) for _ in names.base])
+        z[:, 0] = 0.0
+        rejected = 0
+        for _ in range(MAX_PROPOSALS):
+            drawn = centre[:, None] + width[:, None] * z
+            least = LEAST_SHARE * np.abs(centre[signed])
+            outside = np.any(drawn[signed] * np.sign(centre[signed])[:, None] < least[:, None], axis=0)
+            again = int(outside.sum())
+            rejected += again
+            if again == 0:
+                break
+            z[:, outside] = rng.standard_normal((len(names.base), again))
+        else:
+            z[:, outside] = 0.0
+        return {n: centre[i] + width[i] * z[i] for i, n in enumerate(names.base)}, rejected / (count + rejected)
 
 
 def _spread(law: ParameterLaw, speed: float) -> float:
@@ -237,22 +262,7 @@ def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[lis
     A draw outside the bounds that the effects declare, or with a damping or an authority of the other sign, is rejected as a
     whole: no value is moved to its bound. Where `MAX_PROPOSALS` times as many leave fewer than `count`, these come again.
     """
-    covariance = np.nan_to_num(np.asarray(model.covariance))
-    size = len(model.free)
-    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T)) if size else (np.zeros(0), np.zeros((0, 0)))
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    estimate = np.array([model.values[n] for n in model.free])
-    bounds = _bounds(model)
-    low, high = np.array([bounds.get(n, (-np.inf, np.inf)) for n in model.free]).reshape(size, 2).T
-    kept = np.empty((0, size))
-    for _ in range(MAX_PROPOSALS):
-        drawn = estimate + rng.standard_normal((count, size)) @ root.T
-        kept = np.concatenate([kept, drawn[np.all((drawn >= low) & (drawn <= high), axis=1)]])
-        if kept.shape[0] >= count - 1:
-            break
-    if kept.shape[0] == 0:
-        kept = estimate[None, :]
-    taken = kept[np.arange(count - 1) % kept.shape[0]]
+    taken, _ = _drawn_inside(model, count - 1, rng)
     own = dict(model.values)
     draws = [own, *(own | dict(zip(model.free, map(float, row), strict=True)) for row in taken)]
     if EXPONENT in model.free:
@@ -264,12 +274,34 @@ def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[lis
     return draws, exponent
 
 
+def _drawn_inside(model: Model, count: int, rng: np.random.Generator) -> tuple[FloatArray, float]:
+    """Return draws (count, p) of a model's free values inside the bounds, and the share of the proposals that was rejected."""
+    covariance = np.nan_to_num(np.asarray(model.covariance))
+    size = len(model.free)
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T)) if size else (np.zeros(0), np.zeros((0, 0)))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    estimate = np.array([model.values[n] for n in model.free])
+    bounds = _bounds(model)
+    low, high = np.array([bounds.get(n, (-np.inf, np.inf)) for n in model.free]).reshape(size, 2).T
+    kept, proposed = np.empty((0, size)), 0
+    for _ in range(MAX_PROPOSALS):
+        drawn = estimate + rng.standard_normal((count + 1, size)) @ root.T
+        proposed += drawn.shape[0]
+        kept = np.concatenate([kept, drawn[np.all((drawn >= low) & (drawn <= high), axis=1)]])
+        if kept.shape[0] >= count:
+            break
+    rejected = 1.0 - kept.shape[0] / proposed
+    if kept.shape[0] == 0:
+        kept = estimate[None, :]
+    return kept[np.arange(count) % kept.shape[0]], rejected
+
+
 def _bounds(model: Model) -> dict[str, tuple[float, float]]:
     names = NAMES[model.axis]
     bounds = {c.name: (c.low, c.high) for e in effects_of(model) for c in e.shared}
     for name in (names.damping, names.authority):
         value = model.values[name]
-        bounds[name] = (0.05 * value, np.inf) if value > 0 else (-np.inf, 0.05 * value)
+        bounds[name] = (LEAST_SHARE * value, np.inf) if value > 0 else (-np.inf, LEAST_SHARE * value)
     return bounds
 
 

@@ -3,29 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import ceil, degrees, radians
+from math import ceil, degrees
 from shlex import quote
 
+from fieldsid.angles import FIN
 from fieldsid.artifacts import inputs_of
 from fieldsid.dynamics.free_run import LIMITING_EFFECT
-from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.models.axis import NAMES
+from fieldsid.plant.parameter_source import ParameterSource, logs_of
 
-RIGHT_ANGLE_DEG = 90.0
+USUAL_FIN_DEG = 15.0
 
 
 def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
-    """Return the hint for a fin limit below `needed` rad: that of the models' runs where it does, else what it takes."""
+    """Return the hint for a fin limit below `needed` rad: that of the models' runs where it does, else what it takes.
+
+    An offset beyond what any fin lifts at is no trim: then it is what was identified that wants looking at.
+    """
     flown = ceil(1e4 * source.largest_fin) / 1e4
     if source.largest_fin > needed:
         return f"the models' runs had the fin at up to {flown:.4g} rad: `{option} {flown:.4g}`"
-    return f"trim the fin: a limit has to be above {needed:.4g} rad, {degrees(needed):.1f} deg"
+    if needed <= FIN:
+        return f"trim the fin: a limit has to be above {needed:.4g} rad, {degrees(needed):.1f} deg"
+    names, runs = NAMES[source.axis], " ".join(quote(str(p)) for p in logs_of(source.paths)) if source.models else ""
+    if not source.models:
+        return f"no fin is trimmed that far: check unit and sign of `{names.trim}` and `{names.authority}` in the table"
+    return (
+        f"no fin is trimmed that far: {names.trim} and {names.authority} are not told apart by these runs, or something else "
+        f"turns the vehicle: `sysid diagnose {runs or 'RUN...'} --axis {source.axis.value}`"
+    )
 
 
 def in_radians(option: str, given: float) -> str:
-    """Return the hint for an angle that is none in rad: that angle in rad where it may be one in degrees."""
-    if radians(RIGHT_ANGLE_DEG) < given <= RIGHT_ANGLE_DEG:
-        return f"{given:g} deg are `{option} {radians(given):.4g}`"
-    return f"for 15 deg: `{option} 0.26`"
+    """Return the hint for an angle in rad that no fin can have."""
+    return f"{given:.4g} rad is {degrees(given):.4g} deg; write it like `{option} {USUAL_FIN_DEG:g}deg`"
 
 
 def damping_that_holds(source: ParameterSource, speed: float, effects: Collection[str] = ()) -> str:

@@ -15,15 +15,19 @@ from fieldsid.schedule.record import Row, Schedule
 MULTIPLES = (0.5, 0.7, 1.0, 1.4, 2.0)
 TRIED_DRAWS = 12
 MARGIN_ROUNDING_DEG = 1.0
+FIN_ROUNDING = 1e-6
 
 
 def best_constant(schedule: Schedule, plants: Sequence[LinearPlant], *, step: float, seconds: float) -> Row:
     """Return the gains that settle soonest at the slowest of the speeds of plants, within 95 % of the draws of each.
 
-    They have to keep the margin that the schedule keeps: a faster loop without it is no better one. Feed-forward and reference
+    They have to keep the margin that the schedule keeps, and to ask for no more than the fin's limit in the step where the
+    schedule does not: a faster loop without that is no better one. Feed-forward and reference
     gain are left to `held_at`: the trim is known at every speed. Where nothing holds everywhere it is what holds at most speeds.
     """
-    candidates = [replace(r, gains=r.gains.times(f)) for r in schedule.rows for f in MULTIPLES]
+    most = max(max(r.fin_limit, abs(r.gains.kp) * step) for r in schedule.rows) * (1.0 + FIN_ROUNDING)
+    multiples = [replace(r, gains=r.gains.times(f)) for r in schedule.rows for f in MULTIPLES]
+    candidates = [r for r in multiples if abs(r.gains.kp) * step <= most]
     margin = margin_kept(schedule)
     few = [p.pick(np.arange(min(TRIED_DRAWS, p.count))) for p in plants]
 

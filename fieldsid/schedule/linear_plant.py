@@ -165,6 +165,17 @@ class FinLimits:
     rate: float | None = None
     latency: float | None = None
 
+    def refuse_impossible(self) -> None:
+        """Raise UsageError for a lag, a delay or a latency below zero, and for a fin that does not move."""
+        for name, value in self.record().items():
+            if value is not None and not (0.0 <= value < np.inf and (name != "fin_rate_rad_s" or value > 0.0)):
+                least = "above zero" if name == "fin_rate_rad_s" else "zero or more"
+                raise UsageError(
+                    f"`{name}` must be a number, {least}",
+                    found=f"{name} = {value:g}",
+                    hint="leave it out to take the models' own",
+                )
+
     def record(self) -> dict[str, float | None]:
         """Return what is said, by the names a schedule's file has."""
         return {"lag_s": self.lag, "delay_s": self.delay, "fin_rate_rad_s": self.rate, "latency_s": self.latency}
@@ -192,11 +203,11 @@ def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, d
     names = NAMES[source.axis]
     base = source.base_draws(speed, draws, np.random.default_rng(seed))
     stiffness = np.zeros(draws) if names.stiffness is None else base[names.stiffness]
-    authority = _same_sign(base[names.authority])
+    authority = base[names.authority]
     zero = np.zeros(draws)
     lag, delay, fin_rate = _actuator({}, limits, draws)
     return LinearPlant(
-        source.axis, speed, _same_sign(base[names.damping]), stiffness, authority, base[names.trim] / authority,
+        source.axis, speed, base[names.damping], stiffness, authority, base[names.trim] / authority,
         zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate, _powers(zero + 1.0, {}), np.zeros((draws, 3)),
     )  # fmt: skip
 
@@ -282,11 +293,6 @@ def _actuator(shared: Mapping[str, FloatArray], limits: FinLimits, draws: int) -
         out.append(np.full(draws, said) if said is not None else shared.get(name, np.full(draws, none)))
     out[1] = out[1] + (limits.latency or 0.0)
     return out
-
-
-def _same_sign(draws: FloatArray) -> FloatArray:
-    sign = np.sign(draws[0])
-    return np.asarray(sign * np.maximum(sign * draws, 0.05 * abs(draws[0])))
 
 
 def not_counted(models: Sequence[Model]) -> tuple[str, ...]:

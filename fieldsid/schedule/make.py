@@ -51,6 +51,7 @@ def design_schedule(
     """
     wish, limits = wish or Wish(), limits or FinLimits()
     check_wish(wish)
+    limits.refuse_impossible()
     knots = _knots(source, speeds)
     if depth and source.axis is not Axis.PITCH:
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
@@ -73,7 +74,7 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=actuator_of(source, limits),
-        provenance=_provenance(source, wish, surge),
+        provenance=_provenance(source, wish, surge, knots),
         stated=limits.record(),
     )
 
@@ -137,7 +138,7 @@ def actuator_of(source: ParameterSource, limits: FinLimits) -> dict[str, float |
     return own | {name: value for name, value in limits.record().items() if value is not None}
 
 
-def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None) -> dict[str, Any]:
+def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None, knots: Sequence[float]) -> dict[str, Any]:
     names = NAMES[source.axis]
     sign = float(np.sign(source.base_at(float(source.speeds[0]))[names.authority]))
     low, high = float(source.speeds[0]), float(source.speeds[-1])
@@ -149,6 +150,7 @@ def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None) -
         "effects_not_counted": list(not_counted(source.models)),
         "speed_lost": speed_kept_said(source.axis, surge),
         "draws": DESIGN_DRAWS,
+        "draws_rejected": max(source.share_rejected(speed, DESIGN_DRAWS, SEED) for speed in knots),
         "schedule_variable": "speed_m_s: forward speed through the water, m/s",
         "between_rows": "linear in speed",
         "outside_rows": "clamp: the nearest row's gains",

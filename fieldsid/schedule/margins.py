@@ -42,14 +42,14 @@ def worst_of(values: FloatArray, *, most: bool) -> float:
     return float(ordered[int(np.ceil(HELD_SHARE * ordered.size - 1e-9)) - 1]) * (1.0 if most else -1.0)
 
 
-def margins(plant: LinearPlant, gains: Gains) -> Margins:
-    """Return the margins of every draw, from the grid by interpolation at each crossing."""
-    open_loop = loop(plant, gains, FREQUENCY_GRID_RAD_S)
+def margins(plant: LinearPlant, gains: Gains, omega: FloatArray = FREQUENCY_GRID_RAD_S) -> Margins:
+    """Return the margins of every draw, from the grid (w,) rad/s by interpolation at each crossing."""
+    open_loop = loop(plant, gains, omega)
     size = np.log(np.abs(open_loop))
     phase = np.unwrap(np.angle(open_loop), axis=1)
     # an unwrapped phase may sit a turn off: a loop with positive gain starts between -360 and 0
     phase -= 2 * np.pi * np.ceil(phase[:, :1] / (2 * np.pi) - 1e-9)
-    found = _read_off(size, phase)
+    found = _read_off(size, phase, np.log(omega))
     unstable = least_damping(plant, gains) < 0.0
     below = -np.minimum(np.abs(found.phase_deg), 180.0)
     return Margins(
@@ -60,9 +60,8 @@ def margins(plant: LinearPlant, gains: Gains) -> Margins:
     )
 
 
-def _read_off(size: FloatArray, phase: FloatArray) -> Margins:
+def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray) -> Margins:
     count = size.shape[0]
-    log_omega = np.log(FREQUENCY_GRID_RAD_S)
     phase_margin, delay, crossover = np.full(count, np.inf), np.full(count, np.inf), np.full(count, np.nan)
     gain_margin = np.full(count, np.inf)
     for i, j in zip(*np.nonzero((size[:, :-1] > 0) != (size[:, 1:] > 0)), strict=True):

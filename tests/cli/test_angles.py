@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from cli import trial
 from cli.test_fit import table
@@ -60,3 +61,31 @@ def test_an_angle_inside_a_maneuver_is_typed_the_same_way(run_cli, tmp_path):
 
 def test_a_negative_tolerance_is_refused(run_cli, asked):
     assert "a tolerance is not negative" in run_cli(*asked["--fin-zero"], "-1deg").err
+
+
+def test_a_margin_is_typed_with_its_unit_or_in_deg_and_never_guessed(run_cli, asked):
+    said = (*asked["--fin-limit"], "15deg", "--phase-margin")
+    one, two, three = (run_cli(*said, text, "--json").json["rows"] for text in ("40", "40deg", f"{np.radians(40.0):.15g}rad"))
+    assert one == two
+    assert [r["kp"] for r in three] == pytest.approx([r["kp"] for r in one])
+    for refused in ((*said, "0.7"), ("schedule", "verify", "gains.yaml", "--require-phase-margin", "0.7")):
+        answer = run_cli(*refused)
+        assert answer.code == 2
+        assert "0.7 rad is 40.11 deg" in answer.err
+        assert "40deg`" in answer.err
+
+
+def test_a_course_and_a_fin_rate_take_the_same_angles(run_cli, asked):
+    answer = run_cli(*asked["--max-heading"], "60deg", "--course", "90")
+    assert answer.code == 2
+    assert "90deg`, or `90rad` where that is meant" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--fin-rate", "0"), ("--fin-rate", "-1deg"), ("--fin-lag", "-1"), ("--delay", "-1"), ("--latency", "nan")],
+)
+def test_a_fin_that_cannot_be_is_refused(run_cli, asked, option, value):
+    answer = run_cli(*asked["--fin-limit"], "15deg", option, value)
+    assert answer.code == 2
+    assert "must be a number" in answer.err

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from plan_legs import ENVELOPE, leg, plan
-from played import dune, moos, ros2
+from played import ardupilot, dune, moos, ros2
 from truth.pilots import Autopilot
 from truth.vehicle import CALM, QUIET, Fins, Sea, fly_vehicle
 
@@ -32,6 +32,9 @@ BREAKS = {
     "current from ahead": "x_m",
 }  # fmt: skip
 """The limit that a fault is expected to reach first, none for the others."""
+TARGETS = ("dune", "ros2", "moos", "ardupilot")
+NAMED = {"yaw_rad": "heading", "pitch_rad": "pitch", "y_m": "track", "x_m": "area", "surge_m_s": "speed"}
+"""What the script for ArduPilot calls a limit."""
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +48,7 @@ def written(tmp_path_factory):
     players = {
         "dune": lambda: dune(name("dune.ini"), run_up),
         "ros2": lambda: ros2(name("bag"), run_up),
+        "ardupilot": lambda: ardupilot(name("ardupilot.lua"), COURSE),
         "moos": lambda: moos(name("moos_timer_script.moos"), name("moos_oparea.bhv"), COURSE),
     }
     return made, players
@@ -67,6 +71,13 @@ def flown(player, speed, seconds, *, gain=1.0, stuck=None, elevator=None, fins=N
     ).truth
 
 
+def over_ground(truth):
+    """The flight with the speed over ground along the heading in place of that through the water."""
+    north, east = (np.gradient(truth[name], truth["time_s"]) for name in ("x_m", "y_m"))
+    along = north * np.cos(truth["yaw_rad"]) + east * np.sin(truth["yaw_rad"])
+    return truth | {"surge_m_s": along}
+
+
 def first_broken(truth, conditions, run_up):
     """When the truth passes the first of the limits, and which; None where it never does."""
     broken = []
@@ -85,18 +96,24 @@ def first_broken(truth, conditions, run_up):
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("target", ["dune", "ros2", "moos"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_every_abort_fires_when_its_limit_is_passed_and_not_before(written, target, fault):
     made, players = written
     one, player = made.legs[0], players[target]()
     truth = flown(player, one.speed, one.window.length, **FAULTS[fault])
-    wanted = first_broken(truth, aborts_of(one, made.envelope), RUN_UP_S * one.speed)
-    assert (wanted and wanted[1]) == BREAKS.get(fault)
+    breaks, run_up = BREAKS.get(fault), RUN_UP_S * one.speed
+    if target == "ardupilot":
+        # it knows its speed over ground only, and the way along from where it was started
+        truth, run_up = over_ground(truth), truth["x_m"][0]
+        breaks = "surge_m_s" if fault.startswith("current") else breaks
+    wanted = first_broken(truth, aborts_of(one, made.envelope), run_up)
+    assert (wanted and wanted[1]) == breaks
     assert (player.aborted is None) == (wanted is None)
     if wanted is not None:
         # a helm watches from when the fin is taken from the autopilot on, not before
         due = max(wanted[0], one.window.lead) if target == "moos" else wanted[0]
         assert player.aborted[0] == pytest.approx(due, abs=0.15)
+        assert target != "ardupilot" or player.aborted[1] == NAMED[wanted[1]]
         assert player.step(player.aborted[0] + 0.05, _seen(truth)) is None
 
 
@@ -106,7 +123,7 @@ def _seen(truth):
     return Measured(*(float(truth[name][-1]) for name in SEEN))
 
 
-@pytest.mark.parametrize("target", ["dune", "ros2", "moos"])
+@pytest.mark.parametrize("target", TARGETS)
 def test_the_fins_that_are_flown_are_those_of_the_plan_and_within_the_limit(written, target):
     made, players = written
     player, commanded = players[target](), []

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from fieldsid.schedule.record import Schedule
     from fieldsid.schedule.verify import Check, Verification
 
+SLOWED_SHARE = 0.995
+"""Below it a row's share is not printed as 1.00."""
+
 command = typer.Typer(help="Gains per speed: design them, verify them, write them for the vehicle's software.")
 
 ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
@@ -29,7 +32,7 @@ Controller = Annotated[
     typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr; pd where the runs have a rate, else p."),
 ]
 Damping = Annotated[float, typer.Option("--damping", help="Damping ratio of the closed loop.")]
-PhaseWanted = Annotated[float, typer.Option("--phase-margin", metavar="DEG", help="Phase margin the gains are slowed to keep.")]
+PhaseWanted = Annotated[str, typer.Option("--phase-margin", metavar="ANGLE", help="Phase margin to keep, `45deg`.")]
 Speeds = Annotated[
     str | None, typer.Option("--speeds", metavar="LIST", help="Speeds of the rows, m/s; those of the models if not given.")
 ]
@@ -65,7 +68,9 @@ Models = Annotated[
 MarginFigure = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="FILE", help="Draw a figure: .png, .svg or .pdf, by the suffix.")
 ]
-NeedPhase = Annotated[float | None, typer.Option("--require-phase-margin", metavar="DEG", help="Exit 1 when any speed has less.")]
+NeedPhase = Annotated[
+    str | None, typer.Option("--require-phase-margin", metavar="ANGLE", help="Exit 1 when any speed has less, `40deg`.")
+]
 NeedGain = Annotated[float | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less.")]
 NeedDelay = Annotated[float | None, typer.Option("--require-delay-margin", metavar="S", help="Exit 1 when any speed has less.")]
 MostOvershoot = Annotated[float | None, typer.Option("--max-overshoot", metavar="PERCENT", help="Exit 1 when any step has more.")]
@@ -87,7 +92,7 @@ def design(
     models: ModelFiles,
     controller: Controller = None,
     damping: Damping = 0.7071,
-    phase_margin: PhaseWanted = 45.0,
+    phase_margin: PhaseWanted = "45deg",
     speeds: Speeds = None,
     fin_limit: FinLimit = None,
     fin_rate: FinRate = None,
@@ -109,7 +114,7 @@ def design(
 
     Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
     """
-    from fieldsid.angles import FIN, FIN_RATE, parse_angle
+    from fieldsid.angles import FIN, FIN_RATE, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import runs_behind
     from fieldsid.face.speeds import speeds_of
@@ -122,6 +127,7 @@ def design(
 
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
     fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE)
+    margin = parse_margin(phase_margin, "--phase-margin")
     source = load_parameter_source(models, laws=law or ())
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     limit, rate = _limits(given, fastest, vehicle, source)
@@ -129,7 +135,7 @@ def design(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller or usual_controller(source), damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
+        wish=Wish(controller or usual_controller(source), damping, margin, STEP_ANGLE_RAD[source.axis]),
         limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
         runs=runs_behind(source, say),
@@ -163,6 +169,7 @@ def verify(
 
     Example: sysid schedule verify gains.yaml --require-phase-margin 40 -o gains.png
     """
+    from fieldsid.angles import parse_margin
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import designed_from, runs_behind
     from fieldsid.plant.parameter_source import load_parameter_source
@@ -171,11 +178,12 @@ def verify(
     from fieldsid.schedule.verify import verify_schedule
 
     refuse_figure(output, force=force)
+    least = None if require_phase_margin is None else parse_margin(require_phase_margin, "--require-phase-margin")
     known = load_schedule(schedule)
     source = load_parameter_source(models or designed_from(known, str(schedule)))
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     checked = verify_schedule(known, source, runs=runs_behind(source, say))
-    wanted = (require_phase_margin, require_gain_margin, require_delay_margin, max_overshoot)
+    wanted = (least, require_gain_margin, require_delay_margin, max_overshoot)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
     body = {
@@ -306,7 +314,9 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
         f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of the models' errors; held: those that come "
         f"to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
     )
-    slowed = [r for r in schedule.rows if r.slowed < 1.0]
+    if rejected := schedule.provenance["draws_rejected"]:
+        to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")
+    slowed = [r for r in schedule.rows if r.slowed < SLOWED_SHARE]
     if slowed:
         to.print(
             f"{len(slowed)} of {len(schedule.rows)} rows were slowed for lag, delay, margin or the draws (1 is the formula's)"

@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError, UsageError
-from fieldsid.models.axis import NAMES
+from fieldsid.models.axis import NAMES, Axis
 from fieldsid.planning.design.abort_conditions import aborts_of
 from fieldsid.planning.design.leg import CIRCLE, Leg, commands_of
 from fieldsid.planning.design.plan import Plan
@@ -111,6 +111,7 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "rule": None if leg.open_loop else _blind(leg),
         "spec": leg.candidate.spec,
         "steps": steps_of(plan, leg),
+        "turns": _turns(plan, leg),
         "aborts": aborts,
         "limits": leg.envelope_in(plan.envelope),
         "unlimited": [n for n, words in limits_said(leg.envelope_in(plan.envelope)).items() if words == NOT_LIMITED],
@@ -120,6 +121,17 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "needed": helm.needed(leg, aborts, plan.course),
         "polygon": helm.polygon(leg, aborts, plan.course),
     }
+
+
+def _turns(plan: Plan, leg: Leg) -> str:
+    """Return which way a positive fin turns the vehicle by the model that was planned with: a file's sign is the logs'."""
+    names = NAMES[plan.axis]
+    sign = leg.expected[names.authority].value if names.authority in leg.expected else math.nan
+    ways = {Axis.YAW: ("to starboard", "to port"), Axis.PITCH: ("nose up", "nose down")}[plan.axis]
+    fin = names.fin.removesuffix("_rad")
+    return (
+        f"a positive {fin} turns {ways[0] if sign > 0 else ways[1]}" if math.isfinite(sign) else f"the {fin}'s sign is the logs'"
+    )
 
 
 def _blind(leg: Leg) -> str:

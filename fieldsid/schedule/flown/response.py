@@ -23,6 +23,10 @@ LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
 """Peak to peak over the step: what swings through the whole corridor of settling after 45 s does not settle."""
 
 
+MOST_ERROR = 3.0
+"""Steps of error at which a response counts as lost: what diverges is not later than that."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Steps(Brief):
     """Responses of n cases: time (t,) s, angle (t, n) rad, fin command or angle (t, n) rad, depth (t, n) m, speed (t, n) m/s."""
@@ -48,6 +52,15 @@ def settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
     off = np.abs(values - size) > SETTLING_BAND * abs(size)
     last = time.size - 1 - np.argmax(off[::-1], axis=0)
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
+
+
+def lateness(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
+    """Return sqrt(int t |error|/size dt) of steps (t, n) of `size`, (n,) s: the time constant of a first-order answer.
+
+    Unlike the time to settle it does not jump where an overshoot leaves the corridor. An error counts up to three steps.
+    """
+    off = np.minimum(np.abs(values / size - 1.0), MOST_ERROR)
+    return np.asarray(np.sqrt(np.maximum(time @ np.nan_to_num(off, nan=MOST_ERROR), STEP_S) * STEP_S))
 
 
 def swing(values: FloatArray, size: float) -> FloatArray:

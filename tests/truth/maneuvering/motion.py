@@ -52,7 +52,7 @@ def slope(u, v, r, fin, thrust, gust, h, out):
 
 
 @nb.njit(cache=True)
-def _whole(s, fin, push, straight, gust, h, out):
+def whole(s, fin, push, straight, gust, h, out):
     thrust = push * (1.0 + h.thrust_slope * (1.0 - s[0] / straight))
     slope(s[0], s[1], s[2], fin, thrust, gust, h, out)
     out[3] = s[2]
@@ -96,7 +96,7 @@ def fly(h, straight, command, mode, settings, sample, gust):
                 reach = 0.0 if stage == 0 else (step if stage == 3 else 0.5 * step)
                 for j in range(6):
                     mid[j] = s[j] + (reach * k[stage - 1, j] if stage else 0.0)
-                _whole(mid, fin, push, straight, gust[i], h, k[stage])
+                whole(mid, fin, push, straight, gust[i], h, k[stage])
             for j in range(6):
                 s[j] += step / 6.0 * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j])
     return states, given

@@ -64,7 +64,7 @@ def test_track_figure_draws_the_circle_with_its_radius():
 def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
     made = design_schedule(source, 0.26, speeds=[0.7, 1.4, 2.0])
     figure = schedule.figure(made, verify_schedule(made, source, draws=5))
-    gains, forward, margins, small, usual, large, leg = axes_of(figure)
+    gains, forward, margins, leg, small, usual, large, fin = axes_of(figure)
     faces = [line.get_markerfacecolor() for line in gains.lines if line.get_marker() == "o"]
     assert faces[0] == "white"
     assert "white" not in faces[1:]
@@ -74,3 +74,12 @@ def test_schedule_figure_has_hollow_rows_where_data_do_not_support_them(source):
     assert [ax.get_ylabel() for ax in (small, usual, large)] == [f"{d}° step, deg" for d in (5, 20, 90)]
     assert len(leg.lines) == 5
     assert "no disturbance" in leg.get_title(loc="left")
+    assert "asked" in {t.get_text() for t in margins.get_legend().get_texts()}
+    assert {float(line.get_ydata()[0]) for line in margins.lines} >= {45.0, 22.5}
+    low, high = forward.get_ylim()
+    assert low <= -1.0
+    assert high >= 1.0
+    limits = [float(line.get_ydata()[0]) for line in fin.lines[-2:]]
+    assert limits == pytest.approx([-np.degrees(0.26), np.degrees(0.26)])
+    assert "at its limit for up to" in fin.get_title(loc="left")
+    assert gains.get_ylim()[1] >= 0.0

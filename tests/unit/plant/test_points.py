@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
@@ -221,10 +222,24 @@ def outcome(path):
     return "a table"
 
 
-def test_a_draw_outside_the_bounds_is_rejected_and_none_lies_on_one():
+def test_a_draw_outside_the_bounds_is_rejected_and_none_lies_on_one(tmp_path):
     model = replace(yaw_model(effects=("quadratic_damping",), quadratic=0.1), covariance=np.diag([0.4, 0.2, 0.01, 0.3]) ** 2)
     draws, _ = draw_values(model, 800, np.random.default_rng(1))
     quadratic = np.array([d["quadratic"] for d in draws])
     assert len(draws) == 800
     assert quadratic.min() > 0.0
     assert np.unique(quadratic).size == 800
+    source = load_parameter_source([save_model(model, tmp_path / "m.yaml")])
+    assert source.share_rejected(model.law.reference, 400, 1) == pytest.approx(norm.cdf(-1.0 / 3.0), abs=0.06)
+
+
+def test_a_tables_draws_keep_the_sign_of_damping_and_authority_and_none_lies_on_a_bound(tmp_path):
+    head = "speed_m_s,a22,b2,C0,a22_std_error,b2_std_error,C0_std_error"
+    text = f"{head}\n1.0,0.8,-0.6,0.01,0.4,0.1,0.0\n1.5,1.2,-1.4,0.01,0.1,0.1,0.0\n"
+    source = load_parameter_source([written(tmp_path, text)])
+    drawn = source.base_draws(1.0, 2000, np.random.default_rng(1))
+    assert drawn["a22"][0] == 0.8
+    assert drawn["a22"].min() > 0.04
+    assert np.unique(drawn["a22"]).size == 2000
+    assert source.share_rejected(1.0, 2000, 1) == pytest.approx(norm.cdf(0.05 * 2.0 - 2.0), abs=0.02)
+    assert source.share_rejected(1.5, 200, 1) == 0.0

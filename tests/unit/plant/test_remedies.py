@@ -58,10 +58,25 @@ def test_where_the_runs_do_not_tell_a_limit_the_least_is_said(tmp_path, fin_max)
 
 
 @pytest.mark.parametrize(
-    ("given", "hint"), [(15.0, "15 deg are `--x 0.2618`"), (-0.2, "for 15 deg: `--x 0.26`"), (300.0, "for 15 deg: `--x 0.26`")]
+    ("given", "said"), [(15.0, "15 rad is 859.4 deg"), (-0.2, "-0.2 rad is -11.46 deg"), (1.745, "1.745 rad is 99.98 deg")]
 )
-def test_an_angle_in_degrees_is_turned(given, hint):
-    assert in_radians("--x", given) == hint
+def test_an_angle_that_no_fin_has_is_said_in_both_units(given, said):
+    assert in_radians("--x", given) == f"{said}; write it like `--x 15deg`"
+
+
+def test_an_offset_that_no_fin_has_is_not_to_be_trimmed_but_looked_into(tmp_path):
+    for refused in (
+        lambda: design_schedule(source(tmp_path, 3.46), 0.26),
+        lambda: turn_radius(source(tmp_path, 3.46), [1.2], 0.26),
+    ):
+        with pytest.raises(UsageError, match="offset") as caught:
+            refused()
+        assert "deg" not in caught.value.hint
+        assert "no fin is trimmed that far" in caught.value.hint
+        assert "`sysid diagnose RUN... --axis yaw`" in caught.value.hint
+    with pytest.raises(UsageError) as caught:
+        design_schedule(table(tmp_path, "speed_m_s,a22,b2,C0\n1.4,1.1,-1.2,-4.15\n"), 0.26)
+    assert caught.value.hint == "no fin is trimmed that far: check unit and sign of `C0` and `b2` in the table"
 
 
 def test_a_rate_that_nothing_holds_is_helped_by_what_the_source_has(tmp_path):

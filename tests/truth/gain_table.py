@@ -1,0 +1,172 @@
+"""Gains designed and verified on hulls nobody tuned to, flown on the hulls themselves: settling said and flown, by kind.
+
+Every hull is drawn, flown with sensor noise, identified from pulses, given a schedule, and steered by it at its speeds:
+    python tests/truth/gain_table.py --draws 14 --seed 7 [--controller pd] [--json rows.json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import warnings
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from fieldsid.errors import FieldsidError
+from fieldsid.fitting.identify import identify
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.plant.parameter_source import ParameterSource, source_of_models
+from fieldsid.schedule.design import Wish
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.record import Schedule
+from fieldsid.schedule.verify import STEPS_RAD, verify_schedule
+from truth.maneuvering.hulls import KINDS, Hull, draw_hull
+from truth.maneuvering.steered import steered
+from truth.maneuvering.trials import training
+
+EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
+WITHIN, AT_LEAST_S = 0.25, 0.5
+"""How far settling may be off what was said: a share of it, or seconds."""
+HUNTS = 0.1
+"""Peak to peak in the last quarter over the step: a limit cycle."""
+FLOWN_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One step flown beside what was said of it; NaN where there was no schedule. `low`, `high`: settling over the draws, s."""
+
+    draw: int
+    kind: str
+    length: float
+    stable: bool
+    speed: float
+    step_deg: float
+    said: float
+    said_most: float
+    flown: float
+    swing: float
+    overshoot: float
+    margin: float
+    refused: str = ""
+
+    @property
+    def as_said(self) -> bool:
+        """Whether settling is what was said of the estimate, to the share or the seconds."""
+        return abs(self.flown - self.said) <= max(WITHIN * self.said, AT_LEAST_S)
+
+    @property
+    def hunts(self) -> bool:
+        """Whether the loop goes on swinging."""
+        return not self.swing <= HUNTS
+
+
+def identified(hull: Hull, draw: int, seed: int) -> tuple[ParameterSource, list[Run]]:
+    """Return the models of a hull's pulses, one per speed, and the runs."""
+    logs = training(hull, "pulses", np.random.default_rng([seed, draw, 0]), sway=True)
+    runs = [Run(log.name, log.time, log.columns) for log in logs]
+    models = [f.model for run in runs for f in identify([run], Axis.YAW, effects=EFFECTS)]
+    return source_of_models(models, [f"m{i}" for i in range(len(models))]), runs
+
+
+def law_of(schedule: Schedule) -> np.ndarray:
+    """Return a schedule as the table that steers a hull."""
+    names = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad")
+    return np.array([schedule.column(n) for n in names], dtype=float).T
+
+
+def evaluate(hull: Hull, draw: int, seed: int, kind: str) -> list[Outcome]:
+    """Return the steps of one hull."""
+    nan = float("nan")
+    try:
+        source, runs = identified(hull, draw, seed)
+        schedule = design_schedule(source, hull.rudder_limit, wish=Wish(kind), runs=runs)
+        checks = [c for c in verify_schedule(schedule, source, runs=runs).scheduled if c.knot]
+    except FieldsidError as error:
+        sizes = [np.degrees(s) for s in STEPS_RAD[Axis.YAW]]
+        return [
+            Outcome(draw, hull.kind, hull.of.length, hull.stable, v, float(size), nan, nan, nan, nan, nan, nan, str(error))
+            for v in hull.speeds
+            for size in sizes
+        ]
+    rows = []
+    for check in checks:
+        for size, said in zip(STEPS_RAD[Axis.YAW], check.steps, strict=True):
+            rows.append(
+                flown(hull, draw, law_of(schedule), check.speed, size, said.settling, said.settling_most, check.phase_least_deg)
+            )
+    return rows
+
+
+def flown(hull: Hull, draw: int, law: np.ndarray, speed: float, size: float, said: float, most: float, margin: float) -> Outcome:
+    """Return what a step (rad) of the course does on the hull."""
+    motion = steered(hull, speed, law, size, FLOWN_S)
+    heading = motion[:, 1]
+    tail = heading[-round(0.25 * heading.size) :]
+    off = np.flatnonzero(np.abs(heading - heading[-150:].mean()) > 0.05 * size)
+    settled = float(motion[min(off[-1] + 1, heading.size - 1), 0]) if off.size else 0.0
+    return Outcome(
+        draw, hull.kind, hull.of.length, hull.stable, speed, float(np.degrees(size)), said, most, settled,
+        float(np.ptp(tail) / size), float(heading.max() / size - 1.0), margin,
+    )  # fmt: skip
+
+
+def line(name: str, rows: list[Outcome]) -> str:
+    """Return one line of the table."""
+    known = [r for r in rows if np.isfinite(r.flown)]
+    if not known:
+        return f"{name:34s} {len(rows):5d} none designed: {rows[0].refused[:60]}"
+    off = np.array([abs(r.flown - r.said) / max(r.said, AT_LEAST_S / WITHIN) for r in known])
+    held = 100.0 * float(np.mean([r.as_said for r in known]))
+    below = 100.0 * float(np.mean([r.flown <= 1.25 * r.said_most + AT_LEAST_S for r in known]))
+    return (
+        f"{name:34s} {len(known):5d} {len(rows) - len(known):4d} {100 * np.median(off):7.0f} {100 * off.max():8.0f} {held:9.0f} "
+        f"{below:9.0f} {sum(r.hunts for r in known):5d} {100 * max(r.overshoot for r in known):7.0f} "
+        f"{min(r.margin for r in known):8.0f}"
+    )
+
+
+def table(rows: list[Outcome]) -> list[str]:
+    """Return the table's lines: all, then by kind, by size of step, stable and unstable."""
+    heads = "rows refd   mid %  worst %  as said% <=draws %  hunt  over %  margin"
+    lines = [f"{'settling flown against said':34s}  {heads}", line("all", rows)]
+    lines += [line(f"  {kind}", part) for kind in KINDS if (part := [r for r in rows if r.kind == kind])]
+    sizes = sorted({r.step_deg for r in rows})
+    lines += [line(f"  {size:.0f} deg", [r for r in rows if r.step_deg == size]) for size in sizes]
+    for said, stable in (("stable", True), ("unstable without a pilot", False)):
+        if part := [r for r in rows if r.stable == stable]:
+            lines.append(line(f"  {said}", part))
+    return lines
+
+
+def main() -> None:
+    """Draw, fly, identify, design, verify, steer, and print the table."""
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--draws", type=int, default=7)
+    asked.add_argument("--first", type=int, default=0)
+    asked.add_argument("--seed", type=int, default=7)
+    asked.add_argument("--controller", default="pd")
+    asked.add_argument("--json", type=Path)
+    given = asked.parse_args()
+    rows: list[Outcome] = []
+    begun = time.monotonic()
+    for draw in range(given.first, given.first + given.draws):
+        hull = draw_hull(draw, given.seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            rows += evaluate(hull, draw, given.seed, given.controller)
+        print(f"{draw} {hull.kind} {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
+        if given.json:
+            given.json.write_text(json.dumps([asdict(r) for r in rows]))
+    print("\n".join(table(rows)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""Gains are continuous in the speed: neighbouring rows differ by what the plant differs, and keep what was asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.plant.parameter_source import source_of_models
+from fieldsid.schedule.design import Wish
+from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.optimum import minimum
+
+REFERENCE = 1.5
+HULLS = {
+    "quick fin": {"a22": 0.9, "b2": -0.8, "lag": 0.1},
+    "slow fin": {"a22": 0.5, "b2": -1.4, "lag": 0.5},
+    "unstable": {"a22": -0.15, "b2": -0.5, "lag": 0.2},
+}
+
+
+def source_at(values):
+    own = values | {"C0": 0.01, "quadratic": 0.8}
+    covariance = np.diag([(0.04 * v) ** 2 for v in own.values()])
+    trained = {"speed_low": 1.0, "speed_high": 2.0, "fin_max": 0.26, "rate_max": 0.3}
+    effects = ("servo_lag", "quadratic_damping")
+    law = SpeedLaw(REFERENCE)
+    return source_of_models([Model(Axis.YAW, effects, own, {}, tuple(own), covariance, law, Noise(0.005, 0.005), trained)], ["m"])
+
+
+@pytest.mark.parametrize("hull", HULLS)
+def test_no_step_of_the_gains_is_larger_than_the_plants_own(hull):
+    speeds = np.geomspace(1.2, 1.2 * 1.02**6, 7)
+    rows = design_schedule(source_at(HULLS[hull]), 0.26, speeds=list(speeds), wish=Wish("pd")).rows
+    kp, kd = (np.array([getattr(r.gains, n) for r in rows]) for n in ("kp", "kd"))
+    # from row to row the speed rises by 2 %, the fin's authority by 4 %; kd b = 2 zeta w - a differs by no more of its own terms
+    authority = abs(HULLS[hull]["b2"]) * (speeds / REFERENCE) ** 2
+    damped = abs(kd) + abs(HULLS[hull]["a22"]) / authority * speeds / REFERENCE
+    assert np.abs(np.diff(np.log(np.abs(kp)))).max() < 0.04
+    assert (np.abs(np.diff(kd)) / damped[1:]).max() < 0.06
+    assert all(r.draws_held >= 0.95 for r in rows)
+    assert all(r.phase_margin_deg >= 22.5 - 0.1 for r in rows)
+
+
+def test_the_minimum_is_found_inside_and_at_an_end():
+    assert minimum(lambda x: (x - 0.37) ** 2, -1.0, 2.0) == pytest.approx(0.37, abs=2e-3)
+    assert minimum(lambda x: -x, -1.0, 2.0) == 2.0
+    assert minimum(lambda x: abs(x - 1.1) + 0.1 * x, -1.0, 2.0) == pytest.approx(1.1, abs=5e-3)
