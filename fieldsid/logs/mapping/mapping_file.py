@@ -173,7 +173,7 @@ def _source(signal: str, item: _Source | str | int, place: str) -> Source:
     if signal not in known:
         raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
     if not isinstance(item, _Source):
-        item = _Source(column=item)
+        item = validated(_Source, {"column": item}, place=f"{place}, `{signal}`", error=MappingError)
     _check_place(signal, item, place)
     if item.unit is not None:
         _check_unit(signal, item.unit, place)
