@@ -7,11 +7,11 @@ import numpy as np
 from fieldsid.logs.doctor.dropouts import dropout_findings
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
-MEASURED = frozenset(SIGNALS) - PROPULSION - {"rudder_rad", "elevator_rad"}
+MEASURED = frozenset(SIGNALS) - PROPULSION - GOALS - {"rudder_rad", "elevator_rad"}
 FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
 """What the free run is fitted to."""
 MISSING_LIMIT = 0.05
@@ -20,7 +20,8 @@ COARSE_LIMIT = 0.3
 """Share of samples equal to the one before, above which a signal is called coarse."""
 
 LARGEST = {
-    "pitch_rad": (1.6, "deg"), "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
+    "pitch_rad": (1.6, "deg"), "pitch_goal_rad": (1.6, "deg"),
+    "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
     "roll_rate_rad_s": (8.0, "deg/s"), "rudder_rad": (1.6, "deg"), "elevator_rad": (1.6, "deg"),
     "rudder_measured_rad": (1.6, "deg"), "elevator_measured_rad": (1.6, "deg"),
     "surge_m_s": (8.0, "kn"), "depth_m": (11000.0, "mm"),
@@ -36,7 +37,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         return [Note("empty", f"{name} has no sample", {"signal": name})]
     found = _missing(name, seen)
     present = values[seen]
-    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION:
+    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION | GOALS:
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
         return [*found, *_size(name, present, stated), Note("constant", message, {"signal": name, "value": float(present[0])})]
     found += _size(name, present, stated)

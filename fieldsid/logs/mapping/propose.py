@@ -16,11 +16,12 @@ from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 REP103 = "ENU/FLU"
 _DEGREES = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s": 4.0, "pitch_rate_rad_s": 4.0,
+            "yaw_goal_rad": 6.4, "pitch_goal_rad": 1.6,
             "roll_rate_rad_s": 8.0,
             "rudder_rad": 1.6, "elevator_rad": 1.6, "rudder_measured_rad": 1.6, "elevator_measured_rad": 1.6}  # fmt: skip
 """Angles and rates larger than this are taken for degrees."""
@@ -216,10 +217,10 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
 
 
 def _as_the_heading(raw: RawLog, signals: dict[str, Any]) -> None:
-    """Take pitch and roll without a unit for degrees where the heading is in them: one logger wrote the three."""
+    """Take pitch, roll and goals without a unit for degrees where the heading is in them: one logger wrote them."""
     if "deg" not in {signals.get("yaw_rad", {}).get("unit"), raw.series["yaw_rad"].unit if "yaw_rad" in raw.series else None}:
         return
-    for angle in ("pitch_rad", "roll_rad"):
+    for angle in ("pitch_rad", "roll_rad", *sorted(GOALS)):
         if angle in signals and raw.series[angle].unit is None and "field" not in signals[angle]:
             signals[angle].setdefault("unit", "deg")
 

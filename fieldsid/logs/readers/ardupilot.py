@@ -23,6 +23,7 @@ FORMAT, FORMAT_LENGTH = 128, 89
 _DEG, _DEG_S, _RAD, _RAD_S = ({"unit": unit} for unit in ("deg", "deg/s", "rad", "rad/s"))
 MEANS: Means = {
     "ATT.Yaw": ("yaw_rad", _DEG), "ATT.Pitch": ("pitch_rad", _DEG), "ATT.Roll": ("roll_rad", _DEG),
+    "ATT.DesYaw": ("yaw_goal_rad", _DEG), "ATT.DesPitch": ("pitch_goal_rad", _DEG),
     "RATE.Y": ("yaw_rate_rad_s", _DEG_S), "RATE.P": ("pitch_rate_rad_s", _DEG_S), "RATE.R": ("roll_rate_rad_s", _DEG_S),
     "XKF1.PN": ("x_m", {}), "XKF1.PE": ("y_m", {}), "XKF1.PD": ("depth_m", {}),
     "ATTITUDE.yaw": ("yaw_rad", _RAD), "ATTITUDE.pitch": ("pitch_rad", _RAD), "ATTITUDE.roll": ("roll_rad", _RAD),

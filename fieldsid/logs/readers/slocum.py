@@ -26,6 +26,8 @@ MEANS: Means = {
     f"m_roll.{DATA}": ("roll_rad", {"unit": "rad"}),
     f"m_depth.{DATA}": ("depth_m", {"unit": "m"}),
     f"m_fin.{DATA}": ("rudder_measured_rad", {"unit": "rad"}),
+    f"c_heading.{DATA}": ("yaw_goal_rad", {"unit": "rad"}),
+    f"c_pitch.{DATA}": ("pitch_goal_rad", {"unit": "rad"}),
     f"c_fin.{DATA}": ("rudder_rad", {"unit": "rad"}),
 }
 """The glider's own sensors: heading from north, pitch up, the fin its rudder; `c_` is commanded, `m_` measured."""

@@ -78,6 +78,7 @@ def test_of_a_gliders_sensors_only_those_of_the_dictionary_are_taken(tmp_path):
     found = inspect_log(write_dbd(tmp_path / "a.dbd", TIME, signals))
     assert {s: i["topic"] for s, i in found.proposal.body["signals"].items()} == {
         "yaw_rad": "m_heading",
+        "yaw_goal_rad": "c_heading",
         "rudder_measured_rad": "m_fin",
     }
 
