@@ -63,7 +63,7 @@ def _course(run: Run) -> list[Note]:
         message = (
             f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "
             f"along it, limit {TURNED:g} between them): x is east and y north where the heading counts from north; "
-            "set `frame: ENU` at both, or turn yaw's sign"
+            "set `frame: ENU` at x_m and y_m, or `frame: ENU` at yaw_rad"
         )
         return [Note("course_against", message, {"signal": "yaw_rad", "value": abs(against) - abs(along), "limit": TURNED})]
     slope = _slope_of(np.unwrap(course), mean) if moved.mean() > ALL_BUT else None
@@ -106,6 +106,6 @@ def _dive(run: Run) -> list[Note]:
         return []
     message = (
         f"depth_m goes against what surge_m_s and pitch_rad make of it (correlation {trust:.2f}, limit {-TRUSTED:g}): "
-        "nose up is positive, and depth downwards; set `sign: -1` at one of them"
+        "nose up is positive, and depth downwards; set `sign: -1` at depth_m or pitch_rad"
     )
     return [Note("dive_sign", message, {"signal": "depth_m", "value": trust, "limit": -TRUSTED})]

@@ -55,7 +55,8 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
         at = int(np.argmax(steps))
         message = (
             f"{int(wide.sum())} gaps in time, the longest {steps[at]:.3g} s from {run.time[at]:.2f} s on "
-            f"(limit {GAP_FACTOR:g} x the step of {median:.3g} s); leave it out with `--from` and `--to`"
+            f"(limit {GAP_FACTOR:g} x the step of {median:.3g} s); leave it out: `--to {run.time[at]:.2f}` or "
+            f"`--from {run.time[at + 1]:.2f}`"
         )
         found.append(
             Note("time_gap", message, {"value": float(steps[at]), "limit": GAP_FACTOR * median, "count": int(wide.sum())})

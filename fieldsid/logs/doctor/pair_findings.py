@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from fieldsid.logs.convert.units import KNOT
 from fieldsid.logs.doctor.spikes import DIGITS, last_digit
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
@@ -52,7 +53,7 @@ def pair_findings(run: Run, stated: Stated) -> list[Note]:
             found += _jumps(run, angle, rate)
     found += _swapped(run)
     if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
-        found += _speed_and_way(run)
+        found += _speed_and_way(run, stated)
     for command, fin in _FINS:
         if run.has(command) and run.has(fin):
             found += _command_and_fin(run, command, fin, stated)
@@ -240,7 +241,7 @@ def _centred(values: FloatArray) -> FloatArray:
     return np.zeros_like(values) if float(np.ptp(values)) == 0.0 else values - values.mean()
 
 
-def _speed_and_way(run: Run) -> list[Note]:
+def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
     """The way made over five seconds against the speed; a current may change it, a unit changes it more."""
     good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
     if good.sum() < 50:
@@ -256,10 +257,11 @@ def _speed_and_way(run: Run) -> list[Note]:
     ratio = float(np.percentile(made, 90)) / max(float(np.percentile(said, 90)), 1e-9)
     if 0.6 < ratio < 1.5 or float(np.percentile(said, 90)) < 0.1:
         return []
-    message = (
-        f"the way made is {ratio:.3g} times what surge_m_s says (limits 0.6 and 1.5): check the unit of speed, knots are 0.514"
-    )
-    return [Note("speed_unit", message, {"signal": "surge_m_s", "value": ratio, "limit": 1.5})]
+    in_knots = stated.is_si("surge_m_s") and abs(ratio / KNOT - 1.0) < SLOPE_LIMIT
+    advice = "a knot is 0.514 m/s: set `unit: kn` at surge_m_s" if in_knots else "check the unit of speed"
+    message = f"the way made is {ratio:.3g} times what surge_m_s says (limits 0.6 and 1.5): {advice}"
+    data = {"signal": "surge_m_s", "value": ratio, "limit": 1.5} | ({"unit": "kn"} if in_knots else {})
+    return [Note("speed_unit", message, data)]
 
 
 def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.dropouts import dropout_findings
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.doctor.stated import Stated
@@ -62,7 +63,10 @@ def _size(name: str, values: FloatArray, stated: Stated) -> list[Note]:
     largest = float(np.percentile(np.abs(values), 99))
     found = []
     if largest > limit:
+        servo = servo_of(values) if name in FINS and stated.is_si(name) else None
         advice = stated.probable(name, unit, largest, limit)
+        if servo is not None:
+            advice = f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`"
         message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
         data = {"signal": name, "value": largest, "limit": limit}
         found.append(Note("unit", message, data | ({"unit": unit} if f"`unit: {unit}`" in advice else {})))
@@ -90,7 +94,7 @@ def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
         return []
     message = (
         f"{name} is frozen at {values[starts[k]]:.6g} from {time[starts[k]]:.2f} to {time[ends[k]]:.2f} s "
-        f"(limit {limit:.3g} s); leave it out with `--from` and `--to`"
+        f"(limit {limit:.3g} s); leave it out: `--to {time[starts[k]]:.2f}` or `--from {time[ends[k]]:.2f}`"
     )
     return [Note("frozen", message, {"signal": name, "value": float(lengths[k]), "limit": limit})]
 

@@ -252,7 +252,8 @@ def _check_unit(signal: str, unit: str, place: str) -> None:
     try:
         picked = pick_unit(unit)
     except FieldsidError as error:
-        raise MappingError(f"{place}: `{signal}`: {error.what}", found=error.found, hint=error.hint) from error
+        fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
+        raise MappingError(f"{place}: `{signal}`: {error.what}", found=unit, hint=near(unit, fitting)) from error
     if picked.dimension != dimension and not (signal == "depth_m" and picked.dimension == "pressure"):
         raise MappingError(
             f"{place}: `{signal}` cannot be in {unit!r}",

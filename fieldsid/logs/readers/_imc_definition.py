@@ -37,7 +37,7 @@ def definition_of(path: Path, folder: Path | None) -> dict[int, Message]:
         raise LogError(
             f"`{path}` is an IMC log (DUNE, LSTS), and the definition of its messages is missing",
             found=f"no {' and no '.join(FILES)} in `{place}`",
-            hint="copy the IMC.xml that the vehicle wrote beside the log, or name its folder: `--msg-path FOLDER`",
+            hint="copy the IMC.xml that the vehicle wrote beside the log, or name its folder: `--msg-path DIR`",
         )
     try:
         raw = file.read_bytes()

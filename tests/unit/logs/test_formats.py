@@ -176,7 +176,7 @@ def test_a_dune_log_without_its_definition_is_refused_by_name_and_read_with_it(t
     (tmp_path / "IMC.xml").rename(tmp_path / "other" / "IMC.xml")
     with pytest.raises(LogError, match=r"IMC log \(DUNE, LSTS\), and the definition") as error:
         inspect_log(log)
-    assert "--msg-path FOLDER" in error.value.hint
+    assert "--msg-path DIR" in error.value.hint
     assert inspect_log(log, msg_path=tmp_path / "other").run.has("yaw_rad")
 
 
