@@ -25,6 +25,8 @@ _DEGREES = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s":
             "roll_rate_rad_s": 8.0,
             "rudder_rad": 1.6, "elevator_rad": 1.6, "rudder_measured_rad": 1.6, "elevator_measured_rad": 1.6}  # fmt: skip
 """Angles and rates larger than this are taken for degrees."""
+GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
+"""The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
 TRIES = 6
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -79,7 +81,10 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         return _of_topics(inventory)
     guesses: list[Guess] = []
     names = [c.name for c in inventory.channels]
+    is_of_glider = GLIDER_CLOCK in names
     for i, channel in enumerate(inventory.channels):
+        if is_of_glider and not channel.name.startswith(GLIDER_SENSORS):
+            continue
         # A name that several columns have, or none, says nothing of which one is meant.
         is_named = inventory.table is None or inventory.table.header
         guesses += of_column(channel, channel.name if names.count(channel.name) == 1 and is_named else i) if is_named else ()

@@ -241,3 +241,15 @@ def test_a_matlab_7_3_file_is_read_by_its_library_and_names_it_where_it_is_missi
 
 def _missing(name):
     raise ImportError(f"No module named {name!r}")
+
+
+@pytest.mark.parametrize(("place", "name"), [("cac", "0A0B0C0D.CAC"), ("../cac", "0a0b0c0d.cac"), ("cache", "0A0B0C0D.cac")])
+def test_the_list_of_a_gliders_sensors_is_found_where_gliders_people_keep_it(tmp_path, place, name):
+    log = write_dbd((tmp_path / "logs", (tmp_path / "logs").mkdir())[0] / "a.dbd", TIME, {"m_heading": YAW})
+    raw = log.read_bytes()
+    first, last = raw.index(b"s: T"), raw.index(b"sa\x34\x12")
+    folder = log.parent / place
+    folder.mkdir()
+    (folder / name).write_bytes(raw[first:last])
+    log.write_bytes(raw[:first].replace(b"factored:    0", b"factored:    1") + raw[last:])
+    np.testing.assert_allclose(inspect_log(log).run["yaw_rad"], YAW, atol=1e-12)
