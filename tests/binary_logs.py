@@ -55,6 +55,46 @@ def write_dataflash(path, time, signals):
     return path
 
 
+IMC = """<?xml version="1.0" encoding="UTF-8"?>
+<messages name="IMC" version="5.4.x">
+  <header><field abbrev="sync" type="uint16_t" value="0xFE54" fixed="true"/></header>
+  <message id="350" name="State" abbrev="EstimatedState"><field abbrev="lat" type="fp64_t"/>{fields}</message>
+  <message id="281" name="Servo" abbrev="SetServomotorPosition">
+    <field abbrev="id" type="uint8_t"/><field abbrev="value" type="fp64_t" unit="rad"/></message>
+  <message id="1" name="Entity" abbrev="EntityState"><field abbrev="state" type="uint8_t"/><field abbrev="label"
+    type="plaintext"/><field abbrev="after" type="uint8_t"/></message>
+</messages>
+"""
+"""A definition as DUNE copies it, of three kinds of messages."""
+
+
+def imc_message(kind, time, body, *, order="<", source=0x0015, entity=40):
+    """One message with its checksum, which is worked out bit by bit."""
+    out = struct.pack(f"{order}HHHdHBHB", 0xFE54, kind, len(body), time, source, entity, 0xFFFF, 255) + body
+    crc = 0
+    for byte in out:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
+    return out + struct.pack(f"{order}H", crc)
+
+
+def write_lsf(path, time, signals, *, servo="rudder_rad", order="<", start=1.7e9):
+    """A DUNE log: the signals as doubles of the estimated state, a servo of number 2, and what the entities say."""
+    names = [n for n in signals if n != servo]
+    out = bytearray(imc_message(1, start, bytes(9), order=order))
+    for i, t in enumerate(start + time):
+        out += imc_message(1, t, b"\x01" + struct.pack(f"{order}H", 4) + b"idle\x07", order=order)
+        if servo in signals:
+            for number, value in ((1, 0.0), (2, float(signals[servo][i]))):
+                out += imc_message(281, t, struct.pack(f"{order}Bd", number, value), order=order)
+        out += imc_message(350, t, struct.pack(f"{order}{1 + len(names)}d", 0.7, *(signals[n][i] for n in names)), order=order)
+    path.write_bytes(bytes(out))
+    fields = "".join(f'<field abbrev="{n}" type="fp64_t"/>' for n in names)
+    (path.parent / "IMC.xml").write_text(IMC.format(fields=fields))
+    return path
+
+
 def write_dbd(path, time, signals):
     """A glider's file with the list of its sensors inside: doubles, each written in every cycle."""
     names = ["m_present_time", *signals]

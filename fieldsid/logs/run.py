@@ -44,9 +44,13 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
         "thrust": "",
         "thrust_ratio": "1",
         "propeller_rpm": "1/min",
+        "yaw_goal_rad": "rad",
+        "pitch_goal_rad": "rad",
     }
 )
 """Canonical signal names and their units; `thrust` may be in any unit."""
+GOALS = frozenset({"yaw_goal_rad", "pitch_goal_rad"})
+"""The angles that an autopilot was told to hold."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -23,7 +23,6 @@ FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
     {
         b"\x89HDF": ("an HDF5 file", "write a table from it"),
         b"PK\x03\x04": ("a ZIP file, as .xlsx and .npz are too", "unpack it, or write a table from it"),
-        b"\x54\xfe": ("an IMC log (DUNE, LSTS)", "export its messages as tables, with Neptus or imcjava, and make one of them"),
         b"BZh": ("a bzip2 file", "unpack it: `bunzip2 -k {path}`"),
         b"\xfd7zXZ\x00": ("an xz file", "unpack it: `unxz -k {path}`"),
         b"\x28\xb5\x2f\xfd": ("a zstd file", "unpack it: `unzstd {path}`"),
@@ -54,8 +53,21 @@ def is_glider_log(head: bytes) -> bool:
     return head.startswith(b"dbd_label:") and b"(dinkum_binary_data)" in head[:100]
 
 
+def imc_order(head: bytes) -> str | None:
+    """Return the byte order, as `struct` writes it, of an IMC log (DUNE, LSTS) by its first two bytes; None where it is none.
+
+    They are the number 0xFE5n of a protocol of version 5.n.
+    """
+    if len(head) < 2:
+        return None
+    low, high = sorted((head[0], head[1]))
+    if high != 0xFE or low >> 4 != 5:
+        return None
+    return "<" if head[1] == high else ">"
+
+
 def _is_read_elsewhere(head: bytes) -> bool:
-    return head.startswith(READ_ELSEWHERE) or is_glider_log(head)
+    return head.startswith(READ_ELSEWHERE) or is_glider_log(head) or imc_order(head) is not None
 
 
 def not_a_log(path: Path, suffixes: Sequence[str]) -> LogError:

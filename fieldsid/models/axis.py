@@ -20,6 +20,7 @@ class AxisNames:
     axis: Axis
     angle: str
     rate: str
+    goal: str
     fin: str
     fin_measured: str
     cross: str
@@ -40,11 +41,11 @@ class AxisNames:
 
 NAMES = {
     Axis.YAW: AxisNames(
-        Axis.YAW, "yaw_rad", "yaw_rate_rad_s", "rudder_rad", "rudder_measured_rad", "sway_m_s",
+        Axis.YAW, "yaw_rad", "yaw_rate_rad_s", "yaw_goal_rad", "rudder_rad", "rudder_measured_rad", "sway_m_s",
         "pitch_rad", "pitch_rate_rad_s", "a22", None, "b2", "C0", "delta_r0",
     ),
     Axis.PITCH: AxisNames(
-        Axis.PITCH, "pitch_rad", "pitch_rate_rad_s", "elevator_rad", "elevator_measured_rad", "heave_m_s",
+        Axis.PITCH, "pitch_rad", "pitch_rate_rad_s", "pitch_goal_rad", "elevator_rad", "elevator_measured_rad", "heave_m_s",
         "yaw_rad", "yaw_rate_rad_s", "c22", "c23", "d2", "Cb", "delta_s0",
     ),
 }  # fmt: skip

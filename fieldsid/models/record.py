@@ -58,6 +58,8 @@ class Record(Brief):
     thrust_column: str = ""
     command_lead: FloatArray | None = None
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
+    goal: FloatArray | None = None
+    """The angle that an autopilot was told to hold, (n,) rad, where the log has it."""
     steps: FloatArray = field(init=False)
     """Length of each interval, (n-1,) s."""
     longest: float = field(init=False)
@@ -148,9 +150,14 @@ def first_part(record: Record, samples: int) -> Record:
     """Return the first samples of a record, with the speed of the whole."""
     part = slice(0, samples)
     early = None if record.command_lead is None else record.command_lead[part]
+    goal = None if record.goal is None else record.goal[part]
     arrays = {name: getattr(record, name)[part] for name in ("time", "fin", "angle", "rate", "angle_ok", "rate_ok")}
     return replace(
-        record, **arrays, command_lead=early, signals=MappingProxyType({k: v[part] for k, v in record.signals.items()})
+        record,
+        **arrays,
+        command_lead=early,
+        goal=goal,
+        signals=MappingProxyType({k: v[part] for k, v in record.signals.items()}),
     )
 
 
@@ -210,6 +217,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         rate_ok=rate_ok,
         signals=MappingProxyType(signals),
         thrust_column=thrust_column,
+        goal=_held_fin(run.signals[names.goal]) if run.has(names.goal) else None,
         # of the smoothed speed: where it swings between two levels, noise would throw the median from one to the other
         speed=float(np.median(signals["surge"])) if "surge" in signals else float("nan"),
     )

@@ -7,7 +7,7 @@ from operator import attrgetter
 import numpy as np
 import pytest
 from bags import MAPPING, write_bag
-from binary_logs import write_alog, write_dataflash, write_dbd, write_mat, write_ulog
+from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import LogError, MappingError
@@ -68,6 +68,12 @@ def as_slocum(folder):
     return write_dbd(folder / "log.dbd", TIME, SIGNALS), by_topic({n: (n, "data") for n in SIGNALS})
 
 
+def as_lsf(folder):
+    return write_lsf(folder / "log.lsf", TIME, SIGNALS, servo=None, start=0.0), by_topic(
+        {n: ("EstimatedState", n) for n in SIGNALS}
+    )
+
+
 MADE = {
     "csv_table": as_csv,
     "parquet": as_parquet,
@@ -77,6 +83,7 @@ MADE = {
     "ulog": as_ulog,
     "ardupilot": as_ardupilot,
     "slocum": as_slocum,
+    "lsf": as_lsf,
 }
 
 
@@ -86,6 +93,7 @@ MISSPELT = {
     "ulog": Source(topic="trial", path="rudder_rd"),
     "ardupilot": Source(topic="TRI", path="S33"),
     "slocum": Source(topic="rudder_rd", path="data"),
+    "lsf": Source(topic="EstimatedState", path="rudder_rd"),
 }
 """Sources of logs of topics that are not there; all others are tables."""
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import lookalikes
 import numpy as np
 from bags import MAPPING, write_bag
-from binary_logs import write_alog, write_dataflash, write_dbd, write_mat, write_ulog
+from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 from cli import trial
 from fuzz.mutate import Spoil, spoil_bytes, spoil_column, spoil_parquet, spoil_sqlite, spoil_text, spoil_yaml
 
@@ -161,6 +161,19 @@ def written(writer, name):
     return lambda folder: writer(folder / name, TIME[:60], {n: v[:60] for n, v in SIGNALS.items()})
 
 
+def as_lsf(folder):
+    """A folder as DUNE leaves it, the log and its definition."""
+    place = folder / "120000"
+    place.mkdir()
+    names = {"psi": "yaw_rad", "r": "yaw_rate_rad_s", "u": "surge_m_s", "rudder_rad": "rudder_rad"}
+    write_lsf(place / "Data.lsf", TIME[:60], {n: SIGNALS[s][:60] for n, s in names.items()})
+    return place
+
+
+def lsf_inspected(folder):
+    inspected(folder / "Data.lsf")
+
+
 def as_mapping(folder):
     path = folder / "mapping.yaml"
     signals = {
@@ -263,6 +276,8 @@ KINDS = (
     Kind("slocum", written(write_dbd, "log.dbd"), (spoil_bytes, spoil_text), (inspected,)),
     Kind("mat", written(write_mat, "log.mat"), (spoil_bytes,), LOG),
     Kind("alog", written(write_alog, "log.alog"), (spoil_text, spoil_bytes), (inspected,)),
+    Kind("lsf", as_lsf, (spoil_bytes,), (lsf_inspected,), part="Data.lsf"),
+    Kind("imc_definition", as_lsf, (spoil_text, spoil_bytes), (lsf_inspected,), part="IMC.xml"),
     Kind("mapping", as_mapping, NODES, (mapping_read,)),
     Kind("vehicle", as_vehicle, NODES, (vehicle_read,)),
     Kind("model", good("m1.0.yaml"), NODES, (model_read,)),

@@ -18,6 +18,8 @@ from fieldsid.cli.app import run as command
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, LogError, MappingError, ModelError
 from fieldsid.fitting.checks.closed_loop import controller
+from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.problem.parameters import layout_of
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.mapping.mapping_file import load_mapping
@@ -91,6 +93,26 @@ def test_a_fit_file_whose_models_are_spoilt_is_refused(tmp_path, way):
 def test_a_law_of_impossible_numbers_is_refused(tmp_path, way, to):
     with pytest.raises(ArtifactError):
         load_laws(changed(tmp_path, "law.yaml", *way, to=to))
+
+
+def test_a_law_of_nested_coefficients_is_refused(tmp_path):
+    kind = read_yaml(good_files() / "law.yaml")["laws"]["b2"]["chosen"]
+    with pytest.raises(ArtifactError):
+        load_laws(changed(tmp_path, "law.yaml", "laws", "b2", "candidates", kind, "coefficients", to=[[]]))
+
+
+def test_a_column_counted_below_zero_is_refused(tmp_path):
+    (tmp_path / "m.yaml").write_text("signals: {rudder_rad: -1}\n")
+    with pytest.raises(MappingError, match="greater than or equal to 0"):
+        load_mapping(tmp_path / "m.yaml")
+
+
+def test_numbers_whose_squares_overflow_give_no_start_of_a_fit():
+    time = 0.1 * np.arange(300)
+    fin = np.where(time % 4.0 < 2.0, 0.2, -0.2)
+    run = Run("r", time, {"yaw_rad": 1e300 * np.sin(time), "yaw_rate_rad_s": 1e300 * np.cos(time), "rudder_rad": fin})
+    records = [record_of(run, Axis.YAW)]
+    assert np.isfinite(equation_error_start(records, layout_of(records, Axis.YAW, ()))).all()
 
 
 @pytest.mark.parametrize("dof", [float("inf"), float("nan")])

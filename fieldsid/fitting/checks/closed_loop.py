@@ -2,7 +2,9 @@
 
     fin(t) - fin(t - W) = k_angle [angle(t - d) - angle(t - d - W)] + k_rate [rate(t - d) - rate(t - d - W)]
 Changes, so that a commanded heading that stays does not matter; the few largest, where it moves, are left out, and so is
-what starts or ends where the fin is at its stop, where no controller moves it. Under feedback the fin follows noise and
+what starts or ends where the fin is at its stop, where no controller moves it. Where the log has the goal, the angle is what
+is left to it the short way round, and no change is left out; a goal that moves excites the vehicle, and is no ground for refusal.
+Under feedback the fin follows noise and
 disturbance, and an estimate without it can mistake the controller for the vehicle.
 """
 
@@ -28,7 +30,7 @@ TRIMMED_SHARE = 0.05
 MAX_OF_NOISE = 0.5
 """Half of the variance that noise the fin does not follow would leave at least; noise that it does follow leaves none."""
 MIN_MOVING_SHARE = 0.5
-"""Share of the record over which the fin must move for a controller to be looked for."""
+"""Share of the record over which the fin must move for a controller to be looked for; one that has reached its goal rests."""
 
 
 def closed_loop_note(record: Record) -> Iterator[Note]:
@@ -37,10 +39,9 @@ def closed_loop_note(record: Record) -> Iterator[Note]:
     if best is None or best[0] < MIN_EXPLAINED_SHARE:
         return
     share, gain, damping, delay = best
-    names = NAMES[record.axis]
     yield Note(
         "feedback",
-        f"run {record.name!r}: {100 * share:.0f} % of the fin's changes follow {names.angle} {delay:.2f} s before (limit "
+        f"run {record.name!r}: {100 * share:.0f} % of the fin's changes follow {_followed(record)} {delay:.2f} s before (limit "
         f"{100 * MIN_EXPLAINED_SHARE:.0f} %), {gain:+.2f} rad per rad and {damping:+.2f} rad per rad/s: a controller flies the "
         "fin; "
         "fly pulses on top of it, or with it off",
@@ -57,7 +58,11 @@ def closed_loop_note(record: Record) -> Iterator[Note]:
 
 def controller(record: Record) -> tuple[float, float, float, float] | None:
     """Return the share explained, gains on angle and rate (s) and delay (s) of the best controller; None where none can be."""
-    best = _best(record, TRIMMED_SHARE)
+    best = (
+        _best(record, record.angle, TRIMMED_SHARE, MIN_MOVING_SHARE)
+        if record.goal is None
+        else _best(record, _off_goal(record), 0.0, 0.0)
+    )
     return None if best is None else (best[0].share, *best[0].gains, best[1])
 
 
@@ -76,7 +81,7 @@ def refuse_feedback_alone(records: Sequence[Record]) -> None:
 
 
 def _feedback_alone(record: Record) -> DataError | None:
-    best = _best(record, 0.0)
+    best = _best(record, record.angle, 0.0, MIN_MOVING_SHARE)
     if best is None or best[0].share < MIN_EXPLAINED_SHARE or not best[0].left < MAX_OF_NOISE * best[0].noise:
         return None
     found, delay = best
@@ -89,8 +94,23 @@ def _feedback_alone(record: Record) -> DataError | None:
     )
 
 
-def _best(record: Record, trimmed: float) -> tuple[_Explained, float] | None:
-    """Return the best controller with its delay in s; None where none can be looked for."""
+def _followed(record: Record) -> str:
+    """Return what a controller of a record answers to, in words."""
+    names = NAMES[record.axis]
+    return f"`{names.angle}`" if record.goal is None else f"`{names.angle}` less `{names.goal}`"
+
+
+def _off_goal(record: Record) -> FloatArray:
+    """Return the angle (n,) in rad, from its goal the short way round where the log has one."""
+    if record.goal is None:
+        return record.angle
+    off = record.angle - record.goal
+    # a turn past the far side of the goal is no change of what is left to it
+    return np.unwrap(np.asarray(off - 2.0 * np.pi * np.round(off / (2.0 * np.pi))))
+
+
+def _best(record: Record, angle: FloatArray, trimmed: float, moving: float) -> tuple[_Explained, float] | None:
+    """Return the best controller of an angle (n,) in rad with its delay in s; None where none can be looked for."""
     if not record.angle_ok.all() or (record.rate_ok.any() and not record.rate_ok.all()):
         return None
     step = float(np.median(record.steps))
@@ -99,9 +119,9 @@ def _best(record: Record, trimmed: float) -> tuple[_Explained, float] | None:
     moved = record.fin[width:] - record.fin[:-width]
     if moved.size <= longest:
         return None
-    if np.mean(np.abs(moved) > 1e-3 * max(float(np.ptp(record.fin)), 1e-9)) < MIN_MOVING_SHARE:
+    if np.mean(np.abs(moved) > 1e-3 * max(float(np.ptp(record.fin)), 1e-9)) < moving:
         return None
-    tried = [(_explained(record, moved, width, lag, longest, trimmed), lag * step) for lag in range(longest + 1)]
+    tried = [(_explained(record, angle, moved, width, lag, longest, trimmed), lag * step) for lag in range(longest + 1)]
     return max(tried, key=lambda one: one[0].share)
 
 
@@ -115,14 +135,16 @@ class _Explained:
     noise: float
 
 
-def _explained(record: Record, moved: FloatArray, width: int, lag: int, longest: int, trimmed: float) -> _Explained:
+def _explained(
+    record: Record, angle: FloatArray, moved: FloatArray, width: int, lag: int, longest: int, trimmed: float
+) -> _Explained:
     """Return what the motion a lag before explains of the fin's changes, the largest left out to a share."""
     target = moved[longest:]
     step = float(np.median(record.steps))
     measured = bool(record.rate_ok.any())
     # a controller without a rate sensor takes differences of the angle
     rate = record.rate if measured else np.diff(record.angle, prepend=record.angle[0]) / step
-    columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (record.angle, rate)])
+    columns = np.column_stack([(v[width:] - v[:-width])[longest - lag : moved.size - lag] for v in (angle, rate)])
     free = (record.fin > record.fin.min()) & (record.fin < record.fin.max())
     free = (free[width:] & free[:-width])[longest:]
     if free.sum() < MIN_MOVING_SHARE * free.size or not (np.isfinite(columns).all() and np.isfinite(target).all()):

@@ -40,7 +40,10 @@ def equation_error_start(records: Sequence[Record], layout: ParameterLayout) -> 
         rows.append(full)
         targets.append(target)
     matrix, target = np.concatenate(rows), np.concatenate(targets)
-    if len(target) < len(base):
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = float(np.linalg.norm(matrix) + np.linalg.norm(target))
+    # of numbers whose squares no float holds, garbage in a log, there is no least squares
+    if len(target) < len(base) or not np.isfinite(length):
         return x
     longest = max(float(r.time[-1] - r.time[0]) for r in records)
     solution = _stable(matrix, target, longest, stiff=names.stiffness is not None)

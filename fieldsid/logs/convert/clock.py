@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import GOALS, Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
-COMMANDS = frozenset({"rudder_rad", "elevator_rad", "thrust", "thrust_ratio", "propeller_rpm"})
+COMMANDS = frozenset({"rudder_rad", "elevator_rad", "thrust", "thrust_ratio", "propeller_rpm"}) | GOALS
 """Signals that stand until the next one."""
 
 ANGLES_AND_RATES = ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s", "roll_rad", "roll_rate_rad_s")

@@ -18,7 +18,7 @@ from fieldsid.numerics.arrays import FloatArray
 World = Literal["NED", "ENU"]
 Body = Literal["FRD", "FLU"]
 
-TURNED_BY_BODY = frozenset({"pitch_rad", "pitch_rate_rad_s", "yaw_rate_rad_s", "sway_m_s", "heave_m_s"})
+TURNED_BY_BODY = frozenset({"pitch_rad", "pitch_goal_rad", "pitch_rate_rad_s", "yaw_rate_rad_s", "sway_m_s", "heave_m_s"})
 """Signals that change sign between forward-left-up and forward-starboard-down."""
 
 SHORTEST, LONGEST = 1e-3, 1e3
@@ -50,7 +50,7 @@ def to_ned_frd(signal: str, values: FloatArray, frame: Frame, *, is_height: bool
         return signal, -values if frame.body == "FLU" else values
     if frame.world == "NED":
         return signal, values
-    if signal == "yaw_rad":
+    if signal in ("yaw_rad", "yaw_goal_rad"):
         return signal, heading_of_enu(values)
     if signal == "depth_m" and is_height:
         return signal, -values

@@ -72,15 +72,20 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     """Return the unit of numbers of time by their size, as an epoch has them, else by their usual step.
 
     None where the cells are no numbers. A step that shows nothing of a vehicle's motion in seconds, and does in milliseconds or
-    less, is in those.
+    less, is in those; seconds since 1970 with a fraction are what they are, however seldom a glider writes them.
     """
     if cells.dtype.kind not in "iuf" or not cells.size or not np.isfinite(cells[0]):
         return None
     size = float(cells[0])
     epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else ""
+    seen = cells[np.isfinite(cells)]
+    if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
+        return "s"
     return epoch or unit_of_step(step) or "s"
 
 
+YEARS_S = (946684800, 4102444800)
+"""Seconds since 1970 between 2000 and 2100."""
 LATEST_S = 1e20
 """No clock is at more, not even one of nanoseconds since an epoch that is taken for seconds: such a cell is damage."""
 SLOW_S = 5.0

@@ -25,8 +25,10 @@ ALL_BUT = 0.95
 """Share of the windows in which the vehicle must have moved for its course to be followed round."""
 RATIO = 2.0
 """How much further than the heading the course may turn: a hull that slides in a turn turns as far as its course in the end."""
-LEAST_WAY_M, LEAST_DIVE_M = 0.3, 0.1
-"""Way and depth made in a window below which they are the sensors' noise."""
+LEAST_WAY_M = 0.3
+"""Way made in a window below which it is the sensors' noise."""
+SPREADS = 4.0
+"""Standard deviations by which a correlation must be off zero, by Fisher's z = atanh(r) over windows that share no sample."""
 
 
 def course_findings(run: Run) -> list[Note]:
@@ -61,7 +63,7 @@ def _course(run: Run) -> list[Note]:
         message = (
             f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "
             f"along it, limit {TURNED:g} between them): x is east and y north where the heading counts from north; "
-            "set `frame: ENU` at both, or turn yaw's sign"
+            "set `frame: ENU` at x_m and y_m, or `frame: ENU` at yaw_rad"
         )
         return [Note("course_against", message, {"signal": "yaw_rad", "value": abs(against) - abs(along), "limit": TURNED})]
     slope = _slope_of(np.unwrap(course), mean) if moved.mean() > ALL_BUT else None
@@ -97,13 +99,13 @@ def _dive(run: Run) -> list[Note]:
     time, width, (depth, pitch, surge) = found
     said = trapezoid_integral(time, -surge * np.sin(pitch))
     made, wanted = depth[width:] - depth[:-width], said[width:] - said[:-width]
-    if float(np.std(made)) < LEAST_DIVE_M or float(np.std(wanted)) < LEAST_DIVE_M:
+    if float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
         return []
     trust = float(np.corrcoef(made, wanted)[0, 1])
-    if trust > -TRUSTED:
+    if trust > -TRUSTED or math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) < SPREADS:
         return []
     message = (
         f"depth_m goes against what surge_m_s and pitch_rad make of it (correlation {trust:.2f}, limit {-TRUSTED:g}): "
-        "nose up is positive, and depth downwards; set `sign: -1` at one of them"
+        "nose up is positive, and depth downwards; set `sign: -1` at depth_m or pitch_rad"
     )
     return [Note("dive_sign", message, {"signal": "depth_m", "value": trust, "limit": -TRUSTED})]

@@ -9,13 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.logs.doctor.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
-from fieldsid.logs.run import SIGNALS, Note
+from fieldsid.logs.run import GOALS, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 3
 """Jumps to one number from which on it is a drop-out; a spike may stand alone."""
 SENSED = (
     frozenset(SIGNALS)
+    - GOALS
     - {"thrust", "thrust_ratio", "propeller_rpm"}
     - {n for n in SIGNALS if n.startswith(("rudder", "elevator"))}
 )

@@ -47,7 +47,9 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
     median = float(np.median(steps))
     found = []
     if median > SLOW_S:
-        advice = likely_unit(median) or "log faster"
+        # a clock that counts in another unit goes on evenly; a glider that seldom writes does not
+        is_even = float(np.std(steps)) < JITTER_LIMIT * median
+        advice = (likely_unit(median) if is_even else "") or "log faster"
         message = f"time goes on by {median:.3g} s a sample (limit {SLOW_S:g} s): {advice}"
         found.append(Note("time_unit", message, {"value": median, "limit": SLOW_S}))
     wide = steps > GAP_FACTOR * median
@@ -55,7 +57,8 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
         at = int(np.argmax(steps))
         message = (
             f"{int(wide.sum())} gaps in time, the longest {steps[at]:.3g} s from {run.time[at]:.2f} s on "
-            f"(limit {GAP_FACTOR:g} x the step of {median:.3g} s); leave it out with `--from` and `--to`"
+            f"(limit {GAP_FACTOR:g} x the step of {median:.3g} s); leave it out: `--to {run.time[at]:.2f}` or "
+            f"`--from {run.time[at + 1]:.2f}`"
         )
         found.append(
             Note("time_gap", message, {"value": float(steps[at]), "limit": GAP_FACTOR * median, "count": int(wide.sum())})

@@ -85,12 +85,23 @@ def _steps(time: FloatArray, fin: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _roll(run: Run) -> list[Note]:
-    roll = np.abs(run["roll_rad"][np.isfinite(run["roll_rad"])])
+    seen = np.isfinite(run["roll_rad"])
+    time, roll = run.time[seen], np.abs(run["roll_rad"][seen])
     share = float(np.mean((roll > ROLLED) & (roll < math.pi - ROLLED)))
     if share <= 0.05 or float(np.percentile(roll, 99)) > math.pi:
         return []
     message = (
         f"roll_rad is beyond {math.degrees(ROLLED):.0f} deg for {100 * share:.0f} % of the run (limit 5 %): there yaw and pitch "
-        "answer to both fins, and no model of one axis holds; leave it out with `--from` and `--to`"
+        f"answer to both fins, and no model of one axis holds{_upright(time, roll)}"
     )
     return [Note("rolled", message, {"signal": "roll_rad", "value": share, "limit": 0.05})]
+
+
+def _upright(time: FloatArray, roll: FloatArray) -> str:
+    """Return the advice to take the longest stretch between rolls of this size; nothing where there is none."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], roll <= ROLLED, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2] - 1
+    if not starts.size:
+        return ""
+    k = int(np.argmax(time[ends] - time[starts]))
+    return f"; take the longest stretch without: `--from {time[starts[k]]:.2f} --to {time[ends[k]]:.2f}`"

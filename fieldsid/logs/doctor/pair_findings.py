@@ -10,13 +10,14 @@ import math
 
 import numpy as np
 
+from fieldsid.logs.convert.units import KNOT
 from fieldsid.logs.doctor.spikes import DIGITS, last_digit
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.shifted_correlation import shifted_correlations
 from fieldsid.numerics.trapezoid import trapezoid_integral
-from fieldsid.numerics.white_noise import robust_white_noise_std
+from fieldsid.numerics.white_noise import MEDIAN_OF_NORMAL, robust_white_noise_std
 
 PAIR_WINDOW_S, LONG_WINDOW_S = 1.0, 4.0
 """Time over which an angle's change is set against its rate's, and that for a motion which shows above its noise only then."""
@@ -27,8 +28,14 @@ STRONG, WEAK = 0.9, 0.5
 MIN_NOISE_RATIO = 4.0
 """How many times its noise a change must be to be judged."""
 SLOPE_LIMIT = 0.15
-JUMP_SPREADS, FASTER, FEWEST_JUMPS = 8.0, 1.5, 4
-"""Standard deviations, and times the turn of a fast tenth of the log, by which an angle and its rate may differ in one step."""
+JUMP_SPREADS, FASTER, FEWEST_JUMPS = 8.0, 1.5, 2
+"""Standard deviations, and times a step at the rate of a fast tenth of the log, by which an angle and its rate may differ."""
+JUMP_WIDTHS = (1, 2, 4)
+"""Steps over which they are compared."""
+FITS_BETTER = 2.5
+"""Ratio of two variances of the same steps, 50 at least, that chance does not make: 2.4 is the one per mille of F(50, 50)."""
+ROUNDING = 1e-12
+"""Circular variance below which there is none."""
 DEGREES = 180.0 / math.pi
 LAG_S = 1.0
 """Longest clock offset looked for."""
@@ -46,7 +53,7 @@ def pair_findings(run: Run, stated: Stated) -> list[Note]:
             found += _jumps(run, angle, rate)
     found += _swapped(run)
     if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
-        found += _speed_and_way(run)
+        found += _speed_and_way(run, stated)
     for command, fin in _FINS:
         if run.has(command) and run.has(fin):
             found += _command_and_fin(run, command, fin, stated)
@@ -54,9 +61,10 @@ def pair_findings(run: Run, stated: Stated) -> list[Note]:
 
 
 def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
+    in_degrees = _turned_in_degrees(run, angle, rate, stated) if angle == "yaw_rad" else []
     changes = _changes(run, angle, rate)
-    if changes is None:
-        return []
+    if changes is None or in_degrees:
+        return in_degrees
     a, b, step = changes
     slope, trust = _slope(a, b)
     if trust < TRUSTED:
@@ -64,25 +72,64 @@ def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Not
     return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
 
 
+def _turned_in_degrees(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
+    """A heading in degrees that was unwrapped as rad: whole turns are lost, but on the circle it goes with 57.3 of its rate.
+
+    The circular variances 1 - |mean exp(i (step - k turn))| of k = 1 and k = 57.3 are compared (Mardia and Jupp 2000, 2.3.1).
+    """
+    both = np.isfinite(run[angle]) & np.isfinite(run[rate])
+    if both.sum() < 50:
+        return []
+    made, turned = np.diff(run[angle][both]), np.diff(trapezoid_integral(run.time[both], run[rate][both]))
+    as_rad, as_deg = (max(1.0 - abs(complex(np.mean(np.exp(1j * (made - k * turned))))), ROUNDING) for k in (1.0, DEGREES))
+    if not as_deg < as_rad / FITS_BETTER:
+        return []
+    advice, unit = _in_degrees(angle, "deg", rate, stated)
+    message = (
+        f"{angle} goes with {rate} as degrees, not as rad (circular variances of the steps {as_deg:.3g} and {as_rad:.3g}, limit "
+        f"{FITS_BETTER:g} times): {advice}"
+    )
+    return [Note("unit", message, {"signal": angle, "value": as_rad / as_deg, "limit": FITS_BETTER, **unit})]
+
+
 def _jumps(run: Run, angle: str, rate: str) -> list[Note]:
-    """Steps of an angle that its rate does not make, or rates that the angle does not follow, beyond the noise of both."""
+    """Changes of an angle that its rate does not make, or rates that the angle does not follow, beyond the noise of both.
+
+    A rate that is wrong for a few samples moves the angle's noise out of no single step, so that changes over a few are taken.
+    """
     both = np.isfinite(run[angle]) & np.isfinite(run[rate])
     if both.sum() < 50:
         return []
     time, turned, swept = run.time[both], run[angle][both], trapezoid_integral(run.time[both], run[rate][both])
-    off = np.abs(np.diff(turned) - np.diff(swept))
-    usual = float(np.median(off)) / 0.6745
-    fastest = float(np.percentile(np.abs(run[rate][both]), 90)) * np.diff(time)
-    odd = off > np.maximum(max(JUMP_SPREADS * usual, DIGITS * last_digit(turned)), FASTER * fastest)
-    count = int(odd.sum())
-    if count < FEWEST_JUMPS or usual == 0.0:
+    fastest = FASTER * float(np.percentile(np.abs(run[rate][both]), 90))
+    found = [f for width in JUMP_WIDTHS if (f := _off_over(width, time, turned, swept, fastest)) is not None]
+    if not found:
         return []
-    at = int(np.argmax(off))
+    count, size, limit, at = max(found, key=lambda f: f[1] / f[2])
     message = (
-        f"{angle} and {rate} disagree in {count} of {odd.size} steps, by up to {off[at]:.3g} rad at {time[at]:.2f} s (limit "
-        f"{JUMP_SPREADS * usual:.3g} rad, {JUMP_SPREADS:g} standard deviations): one of them jumps where the other does not"
+        f"{angle} and {rate} disagree at {count} places of {time.size} samples, by up to {size:.3g} rad at {at:.2f} s (limit "
+        f"{limit:.3g} rad, {JUMP_SPREADS:g} standard deviations): one of them jumps where the other does not"
     )
-    return [Note("disagree", message, {"signal": angle, "value": float(off[at]), "limit": JUMP_SPREADS * usual, "count": count})]
+    return [Note("disagree", message, {"signal": angle, "value": size, "limit": limit, "count": count})]
+
+
+def _off_over(
+    width: int, time: FloatArray, turned: FloatArray, swept: FloatArray, fastest: float
+) -> tuple[int, float, float, float] | None:
+    """Return at how many places an angle is off its rate over some steps, by how much, the limit and when; None where at few.
+
+    `fastest` is the rate by which they may be a step apart.
+    """
+    off = (turned[width:] - turned[:-width]) - (swept[width:] - swept[:-width])
+    off = np.abs(off - np.median(off))
+    usual = float(np.median(off)) / MEDIAN_OF_NORMAL
+    limit = max(JUMP_SPREADS * usual, DIGITS * last_digit(turned))
+    odd = np.flatnonzero(off > np.maximum(limit, fastest * np.diff(time)[width - 1 :]))
+    places = 1 + int(np.count_nonzero(np.diff(odd) > width)) if odd.size else 0
+    if places < FEWEST_JUMPS or usual == 0.0:
+        return None
+    at = int(np.argmax(off))
+    return places, float(off[at]), limit, float(time[at])
 
 
 def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
@@ -194,7 +241,7 @@ def _centred(values: FloatArray) -> FloatArray:
     return np.zeros_like(values) if float(np.ptp(values)) == 0.0 else values - values.mean()
 
 
-def _speed_and_way(run: Run) -> list[Note]:
+def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
     """The way made over five seconds against the speed; a current may change it, a unit changes it more."""
     good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
     if good.sum() < 50:
@@ -210,10 +257,11 @@ def _speed_and_way(run: Run) -> list[Note]:
     ratio = float(np.percentile(made, 90)) / max(float(np.percentile(said, 90)), 1e-9)
     if 0.6 < ratio < 1.5 or float(np.percentile(said, 90)) < 0.1:
         return []
-    message = (
-        f"the way made is {ratio:.3g} times what surge_m_s says (limits 0.6 and 1.5): check the unit of speed, knots are 0.514"
-    )
-    return [Note("speed_unit", message, {"signal": "surge_m_s", "value": ratio, "limit": 1.5})]
+    in_knots = stated.is_si("surge_m_s") and abs(ratio / KNOT - 1.0) < SLOPE_LIMIT
+    advice = "a knot is 0.514 m/s: set `unit: kn` at surge_m_s" if in_knots else "check the unit of speed"
+    message = f"the way made is {ratio:.3g} times what surge_m_s says (limits 0.6 and 1.5): {advice}"
+    data = {"signal": "surge_m_s", "value": ratio, "limit": 1.5} | ({"unit": "kn"} if in_knots else {})
+    return [Note("speed_unit", message, data)]
 
 
 def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:

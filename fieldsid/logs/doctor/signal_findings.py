@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.logs.convert.servo_counts import FINS, servo_of
 from fieldsid.logs.doctor.dropouts import dropout_findings
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 PROPULSION = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
-MEASURED = frozenset(SIGNALS) - PROPULSION - {"rudder_rad", "elevator_rad"}
+MEASURED = frozenset(SIGNALS) - PROPULSION - GOALS - {"rudder_rad", "elevator_rad"}
 FITTED = frozenset({"yaw_rad", "pitch_rad", "yaw_rate_rad_s", "pitch_rate_rad_s"})
 """What the free run is fitted to."""
 MISSING_LIMIT = 0.05
@@ -20,7 +21,8 @@ COARSE_LIMIT = 0.3
 """Share of samples equal to the one before, above which a signal is called coarse."""
 
 LARGEST = {
-    "pitch_rad": (1.6, "deg"), "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
+    "pitch_rad": (1.6, "deg"), "pitch_goal_rad": (1.6, "deg"),
+    "roll_rad": (3.3, "deg"), "yaw_rate_rad_s": (4.0, "deg/s"), "pitch_rate_rad_s": (4.0, "deg/s"),
     "roll_rate_rad_s": (8.0, "deg/s"), "rudder_rad": (1.6, "deg"), "elevator_rad": (1.6, "deg"),
     "rudder_measured_rad": (1.6, "deg"), "elevator_measured_rad": (1.6, "deg"),
     "surge_m_s": (8.0, "kn"), "depth_m": (11000.0, "mm"),
@@ -36,7 +38,7 @@ def signal_findings(run: Run, name: str, stated: Stated) -> list[Note]:
         return [Note("empty", f"{name} has no sample", {"signal": name})]
     found = _missing(name, seen)
     present = values[seen]
-    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION:
+    if present.size > 2 and float(np.ptp(present)) == 0.0 and name not in PROPULSION | GOALS:
         message = f"{name} is constant at {present[0]:.6g} over {present.size} samples; check the sensor, or map another one"
         return [*found, *_size(name, present, stated), Note("constant", message, {"signal": name, "value": float(present[0])})]
     found += _size(name, present, stated)
@@ -61,7 +63,10 @@ def _size(name: str, values: FloatArray, stated: Stated) -> list[Note]:
     largest = float(np.percentile(np.abs(values), 99))
     found = []
     if largest > limit:
+        servo = servo_of(values) if name in FINS and stated.is_si(name) else None
         advice = stated.probable(name, unit, largest, limit)
+        if servo is not None:
+            advice = f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`"
         message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
         data = {"signal": name, "value": largest, "limit": limit}
         found.append(Note("unit", message, data | ({"unit": unit} if f"`unit: {unit}`" in advice else {})))
@@ -89,7 +94,7 @@ def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
         return []
     message = (
         f"{name} is frozen at {values[starts[k]]:.6g} from {time[starts[k]]:.2f} to {time[ends[k]]:.2f} s "
-        f"(limit {limit:.3g} s); leave it out with `--from` and `--to`"
+        f"(limit {limit:.3g} s); leave it out: `--to {time[starts[k]]:.2f}` or `--from {time[ends[k]]:.2f}`"
     )
     return [Note("frozen", message, {"signal": name, "value": float(lengths[k]), "limit": limit})]
 

@@ -19,6 +19,7 @@ STEMS: Mapping[str, str] = MappingProxyType(
         "roll": "roll_rad", "roll_rate": "roll_rate_rad_s", "depth": "depth_m", "surge": "surge_m_s", "sway": "sway_m_s",
         "heave": "heave_m_s", "x": "x_m", "y": "y_m", "rudder": "rudder_rad", "elevator": "elevator_rad",
         "rudder_measured": "rudder_measured_rad", "elevator_measured": "elevator_measured_rad", "propeller": "propeller_rpm",
+        "yaw_goal": "yaw_goal_rad", "pitch_goal": "pitch_goal_rad",
     }
 )  # fmt: skip
 """Names without a unit, and the signal each stands for."""

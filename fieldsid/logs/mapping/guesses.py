@@ -124,6 +124,6 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit
     if unit is not None:
         item["unit"] = unit
-    if found[0] == "yaw_rad" and {"heading", "compass", "hdg"} & set(words_of(f"{channel.name} {info.path}")):
+    if found[0] in ("yaw_rad", "yaw_goal_rad") and {"heading", "compass", "hdg"} & set(words_of(f"{channel.name} {info.path}")):
         item["frame"] = "NED/FRD"
     yield Guess(*found, item, channel.count)

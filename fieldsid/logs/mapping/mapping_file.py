@@ -173,7 +173,7 @@ def _source(signal: str, item: _Source | str | int, place: str) -> Source:
     if signal not in known:
         raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
     if not isinstance(item, _Source):
-        item = _Source(column=item)
+        item = validated(_Source, {"column": item}, place=f"{place}, `{signal}`", error=MappingError)
     _check_place(signal, item, place)
     if item.unit is not None:
         _check_unit(signal, item.unit, place)
@@ -252,7 +252,8 @@ def _check_unit(signal: str, unit: str, place: str) -> None:
     try:
         picked = pick_unit(unit)
     except FieldsidError as error:
-        raise MappingError(f"{place}: `{signal}`: {error.what}", found=error.found, hint=error.hint) from error
+        fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
+        raise MappingError(f"{place}: `{signal}`: {error.what}", found=unit, hint=near(unit, fitting)) from error
     if picked.dimension != dimension and not (signal == "depth_m" and picked.dimension == "pressure"):
         raise MappingError(
             f"{place}: `{signal}` cannot be in {unit!r}",

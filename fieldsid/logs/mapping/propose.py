@@ -12,18 +12,24 @@ from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ATTITUDE, POSITION, ChannelMap
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic
+from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 REP103 = "ENU/FLU"
 _DEGREES = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s": 4.0, "pitch_rate_rad_s": 4.0,
+            "yaw_goal_rad": 6.4, "pitch_goal_rad": 1.6,
             "roll_rate_rad_s": 8.0,
             "rudder_rad": 1.6, "elevator_rad": 1.6, "rudder_measured_rad": 1.6, "elevator_measured_rad": 1.6}  # fmt: skip
 """Angles and rates larger than this are taken for degrees."""
+GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
+"""The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
 TRIES = 6
+MENDS = 6
+"""Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,15 +60,16 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
             left = body["signals"].pop(signal)
             notes.append(Note("left_out", f"{signal} is not proposed from {_label(left)}: {error.what}", {"signal": signal}))
         else:
-            return replace(done, notes=tuple(notes))
+            return replace(done, notes=(*notes, *done.notes))
     return Proposal(body, notes=tuple(notes))
 
 
 def _at_fault(error: FieldsidError, body: dict[str, Any]) -> str | None:
-    """Return the signal whose cells an error is about, None where it is about all of them."""
-    if not isinstance(error, LogError) or len(body["signals"]) < 2:
+    """Return the signal whose cells or place an error is about, None where it is about all of them."""
+    if len(body["signals"]) < 2:
         return None
-    return next((s for s in body["signals"] if f"for `{s}`" in error.what), None)
+    said = "for `{}`" if isinstance(error, LogError) else "`{}`"
+    return next((s for s in body["signals"] if said.format(s) in error.what), None)
 
 
 def _label(item: dict[str, Any]) -> str:
@@ -74,7 +81,10 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         return _of_topics(inventory)
     guesses: list[Guess] = []
     names = [c.name for c in inventory.channels]
+    is_of_glider = GLIDER_CLOCK in names
     for i, channel in enumerate(inventory.channels):
+        if is_of_glider and not channel.name.startswith(GLIDER_SENSORS):
+            continue
         # A name that several columns have, or none, says nothing of which one is meant.
         is_named = inventory.table is None or inventory.table.header
         guesses += of_column(channel, channel.name if names.count(channel.name) == 1 and is_named else i) if is_named else ()
@@ -195,25 +205,27 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
 
     lenient = ReadOptions(options.msg_path, salvage=True)
     raw = reader.read(inventory.path, mapping_of(body), lenient)
-    for signal, series in raw.series.items():
-        item = body["signals"].get(signal, {})
-        if _is_in_degrees(signal, series, item):
-            item["unit"] = "deg/s" if signal.endswith("_s") else "deg"
+    by_size = frozenset(s for s, v in raw.series.items() if _is_in_degrees(s, v, body["signals"].get(s, {})))
+    for signal in by_size:
+        body["signals"][signal]["unit"] = "deg/s" if signal.endswith("_s") else "deg"
     _as_the_heading(raw, body["signals"])
-    for _ in range(2):
+    why: list[Note] = []
+    for _ in range(MENDS):
         mapping: ChannelMap = mapping_of(body)
         run = assemble(raw, mapping, inventory.path, lenient, max_gap_s=float("inf"))
         notes = examine(run, stated=stated_by(mapping, raw))
-        if not _mended(body, raw, notes):
+        set_now = mended(body, run, notes, by_size)
+        why += set_now
+        if not set_now:
             break
-    return Proposal(body, Run(run.name, run.time, run.signals, inventory.path, (*run.notes, *notes)))
+    return Proposal(body, Run(run.name, run.time, run.signals, inventory.path, (*run.notes, *notes)), notes=tuple(why))
 
 
 def _as_the_heading(raw: RawLog, signals: dict[str, Any]) -> None:
-    """Take pitch and roll without a unit for degrees where the heading is in them: one logger wrote the three."""
+    """Take pitch, roll and goals without a unit for degrees where the heading is in them: one logger wrote them."""
     if "deg" not in {signals.get("yaw_rad", {}).get("unit"), raw.series["yaw_rad"].unit if "yaw_rad" in raw.series else None}:
         return
-    for angle in ("pitch_rad", "roll_rad"):
+    for angle in ("pitch_rad", "roll_rad", *sorted(GOALS)):
         if angle in signals and raw.series[angle].unit is None and "field" not in signals[angle]:
             signals[angle].setdefault("unit", "deg")
 
@@ -222,12 +234,3 @@ def _is_in_degrees(signal: str, series: Series, item: dict[str, Any]) -> bool:
     if signal not in _DEGREES or series.values.ndim != 1 or "unit" in item or series.unit is not None:
         return False
     return float(np.max(np.abs(series.values[np.isfinite(series.values)]), initial=0.0)) > _DEGREES[signal]
-
-
-def _mended(body: dict[str, Any], raw: RawLog, notes: Iterable[Note]) -> bool:
-    """Set what findings say of units that nobody stated; return whether there was one."""
-    likely = {n.data["signal"]: n.data["unit"] for n in notes if n.code == "unit" and "unit" in n.data}
-    wrong = [s for s in likely if "unit" not in body["signals"].get(s, {"unit": 0})]
-    for signal in wrong:
-        body["signals"][signal]["unit"] = likely[signal]
-    return bool(wrong)

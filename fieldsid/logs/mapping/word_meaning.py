@@ -90,6 +90,7 @@ _SUFFIX = re.compile(r"_(rad|deg|rad_s|deg_s|m_s|m|s|ms|us|ns|kn|ft|rpm|km_h|dps
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _OF_GLIDER = re.compile(r"^[mc]_[a-z]")
 _FINS = {"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"}
+_GOALS = {"yaw_rad": "yaw_goal_rad", "pitch_rad": "pitch_goal_rad"}
 
 
 def words_of(name: str) -> list[str]:
@@ -122,6 +123,8 @@ def _of_use(signal: str, sure: int, words: set[str]) -> tuple[str, int] | None:
     """Return a signal as what it was wanted to be or what it was, and how sure its words make it."""
     if signal in _FINS and MEASURED & words and not COMMANDED & words:
         return _FINS[signal], sure
+    if COMMANDED & words and signal in _GOALS:
+        return _GOALS[signal], sure + ("next" not in words)
     if COMMANDED & words and signal not in (*_FINS, "thrust", "propeller_rpm", TIME):
         return None
     if signal in ("yaw_rad", "surge_m_s"):

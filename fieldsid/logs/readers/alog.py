@@ -21,6 +21,7 @@ MEANS: Means = {
     f"NAV_SPEED.{DATA}": ("surge_m_s", {"unit": "m/s"}),
     f"NAV_X.{DATA}": ("x_m", {"unit": "m", **_ENU}),
     f"NAV_Y.{DATA}": ("y_m", {"unit": "m", **_ENU}),
+    f"DESIRED_HEADING.{DATA}": ("yaw_goal_rad", {"unit": "deg"}),
     f"DESIRED_RUDDER.{DATA}": ("rudder_rad", {"unit": "deg"}),
     f"DESIRED_ELEVATOR.{DATA}": ("elevator_rad", {"unit": "deg"}),
     f"DESIRED_THRUST.{DATA}": ("thrust", {}),

@@ -10,6 +10,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.convert.time_column import YEARS_S
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
 from fieldsid.logs.run import Note
@@ -17,12 +18,11 @@ from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
 
 MAVLINK = (0xFE, 0xFD)
 """How a packet of either version of the protocol starts, behind eight bytes of time."""
-YEARS_US = (946684800 * 10**6, 4102444800 * 10**6)
-"""Between 2000 and 2100 a telemetry log was written."""
 FORMAT, FORMAT_LENGTH = 128, 89
 _DEG, _DEG_S, _RAD, _RAD_S = ({"unit": unit} for unit in ("deg", "deg/s", "rad", "rad/s"))
 MEANS: Means = {
     "ATT.Yaw": ("yaw_rad", _DEG), "ATT.Pitch": ("pitch_rad", _DEG), "ATT.Roll": ("roll_rad", _DEG),
+    "ATT.DesYaw": ("yaw_goal_rad", _DEG), "ATT.DesPitch": ("pitch_goal_rad", _DEG),
     "RATE.Y": ("yaw_rate_rad_s", _DEG_S), "RATE.P": ("pitch_rate_rad_s", _DEG_S), "RATE.R": ("roll_rate_rad_s", _DEG_S),
     "XKF1.PN": ("x_m", {}), "XKF1.PE": ("y_m", {}), "XKF1.PD": ("depth_m", {}),
     "ATTITUDE.yaw": ("yaw_rad", _RAD), "ATTITUDE.pitch": ("pitch_rad", _RAD), "ATTITUDE.roll": ("roll_rad", _RAD),
@@ -41,7 +41,7 @@ def sniff(path: Path) -> bool:
         head = stream.read(9)
     if head.startswith(DATAFLASH):
         return True
-    return len(head) == 9 and head[8] in MAVLINK and YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]
+    return len(head) == 9 and head[8] in MAVLINK and YEARS_S[0] < 1e-6 * int.from_bytes(head[:8], "big") < YEARS_S[1]
 
 
 def _topics(path: Path) -> dict[str, Topic]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from shutil import copy
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -26,6 +27,8 @@ MEANS: Means = {
     f"m_roll.{DATA}": ("roll_rad", {"unit": "rad"}),
     f"m_depth.{DATA}": ("depth_m", {"unit": "m"}),
     f"m_fin.{DATA}": ("rudder_measured_rad", {"unit": "rad"}),
+    f"c_heading.{DATA}": ("yaw_goal_rad", {"unit": "rad"}),
+    f"c_pitch.{DATA}": ("pitch_goal_rad", {"unit": "rad"}),
     f"c_fin.{DATA}": ("rudder_rad", {"unit": "rad"}),
 }
 """The glider's own sensors: heading from north, pitch up, the fin its rudder; `c_` is commanded, `m_` measured."""
@@ -46,11 +49,14 @@ def sniff(path: Path) -> bool:
 def _topics(path: Path, wanted: set[str] | None = None) -> dict[str, Topic]:
     dbdreader = library("dbdreader", path, "a Slocum glider's log", "slocum")
     _refuse_cut_head(path)
-    folder = _cache_of(path)
+    cache = _cache_of(path)
     try:
-        # The list of sensors of a log that brings its own is written to the cache: not beside the log.
+        # The list of sensors of a log that brings its own is written to the cache: not beside the log. One that lies there is
+        # looked for in small letters, and a glider writes capitals.
         with TemporaryDirectory() as own:
-            log = dbdreader.DBD(str(path), cacheDir=str(folder or own))
+            if cache is not None:
+                copy(cache, Path(own) / cache.name.lower())
+            log = dbdreader.DBD(str(path), cacheDir=own)
             log.close()  # it opens the file again to read it
             _refuse_other_lengths(path, log)
             found = _sensors(log, [n for n in log.parameterNames if wanted is None or n in wanted])
@@ -101,17 +107,19 @@ def _cut(path: Path) -> tuple[Note, ...]:
 
 
 def _cache_of(path: Path) -> Path | None:
-    """Return the folder of the list of sensors that a log refers to, None where it brings the list; raises LogError."""
+    """Return the list of sensors that a log refers to, None where it brings the list; raises LogError."""
     with path.open("rb") as stream:
         head = stream.read(HEAD)
     found = _CACHE.search(head)
     if found is None or not _FACTORED.search(head):
         return None
     crc = found[1].decode()
-    folders = (path.parent, path.parent / "cache", path.parent.parent / "cache")
-    for folder in folders:
-        if any((folder / f"{name}{suffix}").is_file() for name in (crc, crc.upper()) for suffix in (".cac", ".ccc", ".CAC")):
-            return folder
+    folders = (path.parent, *(place / name for place in (path.parent, path.parent.parent) for name in ("cache", "cac")))
+    names = {f"{crc}{suffix}".lower() for suffix in (".cac", ".ccc")}
+    for folder in (f for f in folders if f.is_dir()):
+        for file in sorted(folder.iterdir()):
+            if file.name.lower() in names:
+                return file
     raise LogError(
         f"`{path}` leaves the list of its sensors to a file that is not there",
         found=f"no `{crc}.cac` in {', '.join(f'`{f}`' for f in folders)}",

@@ -20,6 +20,8 @@ MEANS: Means = {
     "vehicle_angular_velocity.xyz[0]": ("roll_rate_rad_s", {"unit": "rad/s"}),
     "vehicle_angular_velocity.xyz[1]": ("pitch_rate_rad_s", {"unit": "rad/s"}),
     "vehicle_angular_velocity.xyz[2]": ("yaw_rate_rad_s", {"unit": "rad/s"}),
+    "vehicle_attitude_setpoint.yaw_body": ("yaw_goal_rad", {"unit": "rad"}),
+    "vehicle_attitude_setpoint.pitch_body": ("pitch_goal_rad", {"unit": "rad"}),
     "vehicle_local_position.x": ("x_m", {}),
     "vehicle_local_position.y": ("y_m", {}),
     "vehicle_local_position.z": ("depth_m", {}),

@@ -79,7 +79,7 @@ def regression_of(record: Mapping[str, Any]) -> Regression:
         return Regression(
             kind=str(record["kind"]),
             powers=_powers_of(record["powers"], count),
-            coefficients=np.array(record["coefficients"], dtype=np.float64),
+            coefficients=np.array(record["coefficients"], dtype=np.float64).reshape(count),
             covariance=np.array(covariance, dtype=np.float64).reshape(count, count),
             dof=int(record["dof"]),
             r2=_number(record["r2"]),

@@ -1,16 +1,18 @@
 """Formats of other programs: what their definitions say is proposed, and what is missing is said by its right name."""
 
 import builtins
+import gzip
 import importlib
 import struct
 
 import numpy as np
 import pytest
-from binary_logs import write_alog, write_dataflash, write_dbd, write_mat, write_ulog
+from binary_logs import imc_message, write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 
 from fieldsid.errors import LogError
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log
+from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.readers.slocum import sniff
 
 TIME = 0.1 * np.arange(300)
@@ -78,6 +80,7 @@ def test_of_a_gliders_sensors_only_those_of_the_dictionary_are_taken(tmp_path):
     found = inspect_log(write_dbd(tmp_path / "a.dbd", TIME, signals))
     assert {s: i["topic"] for s, i in found.proposal.body["signals"].items()} == {
         "yaw_rad": "m_heading",
+        "yaw_goal_rad": "c_heading",
         "rudder_measured_rad": "m_fin",
     }
 
@@ -91,8 +94,6 @@ def test_a_glider_log_without_its_list_of_sensors_names_the_file(tmp_path):
 
 
 def _by(topic):
-    from fieldsid.logs.mapping.mapping_file import mapping_of
-
     return mapping_of({"signals": {"yaw_rad": {"topic": topic, "field": "data"}}})
 
 
@@ -139,3 +140,116 @@ def test_a_gliders_log_whose_head_is_cut_is_refused_before_it_is_read(tmp_path, 
         inspect_log(log)
     assert "cannot be read" in refused.value.what
     assert "lines in its first" in refused.value.found
+
+
+STATE = {"psi": YAW, "r": np.gradient(YAW, TIME), "u": 0.0 * TIME + 1.5}
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("packed", [False, True])
+def test_the_messages_of_a_dune_log_are_those_of_the_definition_beside_it(tmp_path, order, packed):
+    log = write_lsf(tmp_path / "Data.lsf", TIME, {**STATE, "rudder_rad": 0.2 * np.sign(YAW)}, order=order)
+    if packed:
+        log.with_suffix(".lsf.gz").write_bytes(gzip.compress(log.read_bytes()))
+        log = log.with_suffix(".lsf.gz")
+        (tmp_path / "IMC.xml.gz").write_bytes(gzip.compress((tmp_path / "IMC.xml").read_bytes()))
+        (tmp_path / "IMC.xml").unlink()
+    found = inspect_log(log)
+    assert {c.name for c in found.inventory.channels} == {
+        "EntityState",
+        "EstimatedState",
+        "SetServomotorPosition[1]",
+        "SetServomotorPosition[2]",
+    }
+    signals = found.proposal.body["signals"]
+    assert {s: i["field"] for s, i in signals.items()} == {"yaw_rad": "psi", "yaw_rate_rad_s": "r", "surge_m_s": "u"}
+    body = {**found.proposal.body, "signals": {**signals, "rudder_rad": {"topic": "SetServomotorPosition[2]", "field": "value"}}}
+    run = load_run(log, mapping_of(body))
+    np.testing.assert_allclose(run["yaw_rad"], YAW, atol=1e-12)
+    np.testing.assert_allclose(run["rudder_rad"], 0.2 * np.sign(YAW), atol=1e-7)
+    np.testing.assert_allclose(run.time, TIME, atol=1e-6)
+
+
+def test_a_dune_log_without_its_definition_is_refused_by_name_and_read_with_it(tmp_path):
+    log = write_lsf(tmp_path / "Data.lsf", TIME, STATE)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "IMC.xml").rename(tmp_path / "other" / "IMC.xml")
+    with pytest.raises(LogError, match=r"IMC log \(DUNE, LSTS\), and the definition") as error:
+        inspect_log(log)
+    assert "--msg-path DIR" in error.value.hint
+    assert inspect_log(log, msg_path=tmp_path / "other").run.has("yaw_rad")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<messages>",
+        "<messages><message id='x' abbrev='A'/></messages>",
+        "<!DOCTYPE a [<!ENTITY a 'b'>]><a/>",
+        "<?xml version='1.0' encoding='UT-8'?><a/>",
+    ],
+)
+def test_what_is_no_definition_is_said_so(tmp_path, text):
+    log = write_lsf(tmp_path / "Data.lsf", TIME, STATE)
+    (tmp_path / "IMC.xml").write_text(text)
+    with pytest.raises(LogError, match="no definition of IMC messages"):
+        inspect_log(log)
+
+
+def test_damaged_messages_of_a_dune_log_are_left_out_and_counted(tmp_path):
+    log = write_lsf(tmp_path / "Data.lsf", TIME, STATE)
+    data = bytearray(log.read_bytes())
+    whole = inspect_log(log)
+    state = next(i for i in range(2000, len(data)) if data[i : i + 4] == b"\x54\xfe\x5e\x01")
+    data[state + 30] ^= 0x40  # a number whose checksum is wrong then
+    later = next(i for i in range(9000, len(data)) if data[i : i + 4] == b"\x54\xfe\x5e\x01")
+    data[later + 4 : later + 6] = b"\xff\xff"  # a size that reaches beyond the end
+    log.write_bytes(bytes(data[:-10]))
+    found = inspect_log(log)
+    (note,) = [n for n in found.notes if n.code == "truncated"]
+    assert note.data["count"] == 3
+    assert f"the first at byte {later}" in note.message
+    counts = {c.name: c.count for c in found.inventory.channels}
+    assert counts["EstimatedState"] == {c.name: c.count for c in whole.inventory.channels}["EstimatedState"] - 3
+
+
+def test_what_another_system_said_is_no_state_of_the_vehicle_that_wrote_the_log(tmp_path):
+    log = write_lsf(tmp_path / "Data.lsf", TIME, STATE)
+    other = b"".join(imc_message(350, 1.7e9 + t, struct.pack("<4d", 0.7, 9.0, 0.0, 0.0), source=0x0802) for t in TIME[::3])
+    log.write_bytes(log.read_bytes() + other)
+    found = inspect_log(log)
+    assert "EstimatedState[0x0802.40]" in {c.name for c in found.inventory.channels}
+    np.testing.assert_allclose(found.run["yaw_rad"], YAW, atol=1e-12)
+
+
+def test_a_matlab_7_3_file_is_read_by_its_library_and_names_it_where_it_is_missing(tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py", reason="needs the extra `matlab`")
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for name, values in (("time_s", TIME), ("yaw_rad", YAW), ("rudder_rad", np.sign(YAW))):
+            file[name] = values[None, :]
+        file["log/gain"] = np.array([[2.0]])
+    with (tmp_path / "a.mat").open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<HH", 0x0200, 0x4D49))
+    run = load_run(tmp_path / "a.mat")
+    np.testing.assert_array_equal(run["yaw_rad"], YAW)
+    np.testing.assert_array_equal(run.time, TIME)
+    monkeypatch.setattr("fieldsid.logs.readers._topics.import_module", _missing)
+    with pytest.raises(LogError, match=r"a MATLAB 7\.3 file") as error:
+        load_run(tmp_path / "a.mat")
+    assert error.value.hint == "install it: `pip install 'fieldsid[matlab]'`"
+
+
+def _missing(name):
+    raise ImportError(f"No module named {name!r}")
+
+
+@pytest.mark.parametrize(("place", "name"), [("cac", "0A0B0C0D.CAC"), ("../cac", "0a0b0c0d.cac"), ("cache", "0A0B0C0D.cac")])
+def test_the_list_of_a_gliders_sensors_is_found_where_gliders_people_keep_it(tmp_path, place, name):
+    log = write_dbd((tmp_path / "logs", (tmp_path / "logs").mkdir())[0] / "a.dbd", TIME, {"m_heading": YAW})
+    raw = log.read_bytes()
+    first, last = raw.index(b"s: T"), raw.index(b"sa\x34\x12")
+    folder = log.parent / place
+    folder.mkdir()
+    (folder / name).write_bytes(raw[first:last])
+    log.write_bytes(raw[:first].replace(b"factored:    0", b"factored:    1") + raw[last:])
+    np.testing.assert_allclose(inspect_log(log).run["yaw_rad"], YAW, atol=1e-12)

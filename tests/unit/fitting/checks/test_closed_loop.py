@@ -7,7 +7,7 @@ import pytest
 
 from fieldsid.diagnosis.diagnose import diagnose
 from fieldsid.errors import DataError
-from fieldsid.fitting.checks.closed_loop import controller, refuse_feedback_alone
+from fieldsid.fitting.checks.closed_loop import closed_loop_note, controller, refuse_feedback_alone
 from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
@@ -94,3 +94,39 @@ def test_a_controller_is_found_from_the_angle_alone():
 def test_identify_and_diagnose_refuse(door):
     with pytest.raises(DataError, match="its fin is feedback"):
         door(flown(2, **PILOTS["P"]))
+
+
+def steered(seed, *, goal_is_logged=True, per_degree=4.0, step=0.5, length=900):
+    """An autopilot that holds a goal which changes every half minute: 4 counts per degree of what is left, 200 counts a rad."""
+    random = np.random.default_rng(seed)
+    t = step * np.arange(length)
+    goal = np.repeat(random.uniform(-np.pi, np.pi, length // 60 + 1), 60)[:length]
+    angle, fin = np.zeros(length), np.zeros(length)
+    rate = 0.0
+    for i in range(length):
+        left = np.remainder(goal[i] - angle[i] + np.pi, 2.0 * np.pi) - np.pi
+        fin[i] = np.clip(np.round(per_degree * np.degrees(left)), -60, 60) / 200.0
+        for _ in range(10 if i + 1 < length else 0):
+            rate += 0.1 * step * (-0.9 * rate + 0.8 * fin[i] + 0.02 * random.standard_normal())
+            angle[i : i + 2] += 0.1 * step * rate * np.array([0.0, 1.0])
+        if i + 1 < length:
+            angle[i + 1] += angle[i]
+    seen = angle + 0.002 * random.standard_normal(length)
+    return Run("iver", t, {"yaw_rad": seen, "rudder_rad": fin} | ({"yaw_goal_rad": goal} if goal_is_logged else {}))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_controller_is_found_against_the_goal_that_the_log_has(seed):
+    (note,) = closed_loop_note(record_of(steered(seed), Axis.YAW))
+    assert "`yaw_rad` less `yaw_goal_rad`" in note.message
+    assert note.data["gain"] == pytest.approx(-4.0 * np.degrees(1.0) / 200.0, rel=0.15)
+    assert note.data["value"] > 0.95
+    refuse_feedback_alone([record_of(steered(seed), Axis.YAW)])
+
+
+@pytest.mark.parametrize("kind", ["holds", "chirp", "multisine"])
+def test_a_goal_that_nothing_follows_makes_no_controller(kind):
+    run = flown(3, excitation=kind)
+    goal = np.repeat(np.random.default_rng(1).uniform(-3.0, 3.0, LENGTH // 200), 200)
+    record = record_of(Run("r", run.time, {**run.signals, "yaw_goal_rad": goal}), Axis.YAW)
+    assert not list(closed_loop_note(record))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.time_column import seconds_of
+from fieldsid.logs.convert.time_column import likely_time_unit, seconds_of
 from fieldsid.logs.reader import ReadOptions
 
 
@@ -84,3 +84,9 @@ def test_differences_of_integer_stamps_are_never_lost(start, steps):
     found, _ = seconds_of(stamps, "ns", name="t")
     expected = (stamps - stamps[0]) / 1e9
     np.testing.assert_allclose(found - found[0], expected, atol=1e-6, rtol=1e-12)
+
+
+def test_seconds_since_1970_with_a_fraction_are_seconds_however_seldom_they_are_written():
+    seldom = 1.56e9 + np.cumsum(np.random.default_rng(3).uniform(5.0, 40.0, 200))
+    assert likely_time_unit(seldom, float(np.median(np.diff(seldom)))) == "s"
+    assert likely_time_unit(50.0 * np.arange(200.0), 50.0) == "ms"

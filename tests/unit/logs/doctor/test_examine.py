@@ -207,3 +207,38 @@ def test_what_a_mapping_states_reaches_the_doctor(tmp_path):
     )
     notes = {n.code: n.message for n in load_run(log, mapping).notes}
     assert notes["unit"] == "rudder_rad reaches 2.147 rad (limit 1.6): taken as `deg` already: check which one it is"
+
+
+def turning(rate_hz=5.0, size=0.6):
+    """A heading that turns by more than 180 a step where its degrees are taken for rad, and its rate, both with noise."""
+    random = np.random.default_rng(4)
+    time = np.arange(600) / rate_hz
+    yaw, rate = size * 2.0 * np.sin(0.5 * time), size * np.cos(0.5 * time)
+    return time, yaw + 0.005 * random.standard_normal(600), rate + 0.004 * random.standard_normal(600)
+
+
+def test_a_heading_in_degrees_is_known_where_unwrapping_it_as_rad_lost_whole_turns():
+    time, yaw, rate = turning()
+    lost = np.unwrap(np.degrees(yaw))
+    assert np.abs(lost - np.degrees(yaw)).max() > 6.0
+    found = {n.data.get("unit") for n in examine(Run("r", time, {"yaw_rad": lost, "yaw_rate_rad_s": rate})) if n.code == "unit"}
+    assert found == {"deg"}
+    assert not [n for n in examine(Run("r", time, {"yaw_rad": yaw, "yaw_rate_rad_s": rate})) if n.code == "unit"]
+
+
+def test_a_rate_that_is_off_for_three_samples_shows_in_no_step_and_over_a_few():
+    time, yaw, rate = turning(20.0)
+    assert not [n for n in examine(Run("r", time, {"yaw_rad": yaw, "yaw_rate_rad_s": rate})) if n.code == "disagree"]
+    for start in (100, 300, 480):
+        rate[start : start + 3] += 0.8
+    (note,) = [n for n in examine(Run("r", time, {"yaw_rad": yaw, "yaw_rate_rad_s": rate})) if n.code == "disagree"]
+    assert note.data["count"] == 3
+
+
+def test_a_dive_of_centimetres_tells_the_sign_of_depth_where_pitch_explains_it():
+    time = np.arange(0.0, 120.0, 0.1)
+    pitch = 0.02 * np.sin(0.4 * time)
+    depth = 5.0 + 0.01 * np.random.default_rng(1).standard_normal(time.size) - 0.02 / 0.4 * (1.0 - np.cos(0.4 * time))
+    signals = {"pitch_rad": pitch, "surge_m_s": np.ones_like(time), "depth_m": depth}
+    assert "dive_sign" not in {n.code for n in examine(Run("r", time, signals))}
+    assert "dive_sign" in {n.code for n in examine(Run("r", time, {**signals, "depth_m": 10.0 - depth}))}

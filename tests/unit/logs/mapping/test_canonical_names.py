@@ -79,7 +79,7 @@ def test_words_of_a_foreign_name_are_understood(name, signal):
     assert meaning_of(name)[0] == signal
 
 
-@pytest.mark.parametrize("name", ["battery", "mode", "desired_heading", "", "a_b_c"])
+@pytest.mark.parametrize("name", ["battery", "mode", "desired_speed", "", "a_b_c"])
 def test_other_words_mean_nothing(name):
     assert meaning_of(name) is None
 
@@ -87,3 +87,23 @@ def test_other_words_mean_nothing(name):
 def test_words_leave_the_unit_out():
     assert words_of("/auv/yawRate_deg_s") == ["auv", "yaw", "rate"]
     assert words_of("Heading [deg]") == ["heading"]
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"),
+    [
+        ("desired_heading", "yaw_goal_rad"),
+        ("Yaw Goal", "yaw_goal_rad"),
+        ("c_heading", "yaw_goal_rad"),
+        ("pitch_setpoint", "pitch_goal_rad"),
+        ("yaw_rate_setpoint", None),
+        ("heading error", None),
+    ],
+)
+def test_what_an_autopilot_was_told_to_hold_is_a_goal(name, signal):
+    found = meaning_of(name)
+    assert (found and found[0]) == signal
+
+
+def test_the_goal_itself_is_surer_than_the_way_to_the_next_point():
+    assert meaning_of("Yaw Goal")[1] > meaning_of("Next Heading")[1]

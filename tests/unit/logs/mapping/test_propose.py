@@ -85,3 +85,14 @@ def test_the_record_holds_what_the_page_shows(tmp_path):
     assert [c["name"] for c in record["channels"]][:2] == ["Time [ms]", "Heading"]
     assert record["mapping"]["signals"]["yaw_rad"]["unit"] == "deg"
     assert set(record["signals"]) == TRUTH.keys() - {"time_s"}
+
+
+def test_of_a_gliders_table_only_what_is_measured_or_commanded_is_proposed(tmp_path):
+    time = 1.6e9 + np.arange(100) * 4.3
+    columns = {"m_present_time": time, "m_heading": 0.01 * np.arange(100), "u_heading_rate_deadband": 0.0 * time + 0.1,
+               "u_reqd_depth_at_surface": 0.0 * time + 4.0, "c_fin": 0.1 * np.sign(np.sin(0.2 * np.arange(100)))}  # fmt: skip
+    rows = "\n".join(" ".join(f"{v:.3f}" for v in row) for row in zip(*columns.values(), strict=True))
+    (tmp_path / "a.dat").write_text(" ".join(columns) + "\n" + rows + "\n")
+    body = inspect_log(tmp_path / "a.dat").proposal.body
+    assert {s: i["column"] for s, i in body["signals"].items()} == {"yaw_rad": "m_heading", "rudder_rad": "c_fin"}
+    assert body["time"]["unit"] == "s"

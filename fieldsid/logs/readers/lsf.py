@@ -1,0 +1,219 @@
+"""Logs of DUNE and Neptus (LSTS), .lsf: IMC messages one behind the other, which the IMC.xml beside them defines.
+
+A message is a header of 20 bytes (synchronisation number 0xFE, major and minor version, which tells the byte order; kind, size of
+what follows, time in s, source, its entity, destination, its entity), its fields, and the CRC-16-IBM of both (IMC protocol
+reference, LSTS). Where the next message does not follow, what lies between is damaged and left out, as is a wrong checksum.
+"""
+
+from __future__ import annotations
+
+import gzip
+import struct
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers._imc_definition import Message, definition_of
+from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.run import Note
+from fieldsid.logs.unknown_file import COPY_AGAIN, imc_order
+from fieldsid.numerics.arrays import FloatArray
+
+GZIP = b"\x1f\x8b"
+HEADER, FOOTER = 20, 2
+BLOCK = 1 << 20
+MOST_IDS = 32
+"""Numbers of servos, motors and the like in one kind of message; more are no numbers of devices."""
+_STATE = {
+    "psi": ("yaw_rad", "rad"), "theta": ("pitch_rad", "rad"), "phi": ("roll_rad", "rad"), "r": ("yaw_rate_rad_s", "rad/s"),
+    "q": ("pitch_rate_rad_s", "rad/s"), "p": ("roll_rate_rad_s", "rad/s"), "u": ("surge_m_s", "m/s"), "v": ("sway_m_s", "m/s"),
+    "w": ("heave_m_s", "m/s"), "depth": ("depth_m", "m"), "x": ("x_m", "m"), "y": ("y_m", "m"),
+}  # fmt: skip
+MEANS: Means = {f"EstimatedState.{name}": (signal, {"unit": unit}) for name, (signal, unit) in _STATE.items()} | {
+    "DesiredHeading.value": ("yaw_goal_rad", {"unit": "rad"}),
+    "DesiredPitch.value": ("pitch_goal_rad", {"unit": "rad"}),
+    "Rpm.value": ("propeller_rpm", {"unit": "rpm"}),
+    "SetThrusterActuation.value": ("thrust", {}),
+}
+"""What the protocol says of its messages: the estimated state is north-east-down, the body forward-starboard-down."""
+
+
+def sniff(path: Path) -> bool:
+    """Whether a file, packed or not, starts with a synchronisation number."""
+    if path.is_dir():
+        return False
+    with path.open("rb") as stream:
+        head = stream.read(2)
+    if head == GZIP:
+        try:
+            with gzip.open(path) as packed:
+                head = packed.read(2)
+        except (OSError, EOFError, zlib.error):  # whatever it is, this reader does not take it
+            return False
+    return imc_order(head) is not None
+
+
+def _unpacked(path: Path) -> tuple[bytes, bool]:
+    """Return the bytes of a log, and whether they end before it does."""
+    raw = path.read_bytes()
+    if not raw.startswith(GZIP):
+        return raw, False
+    unpack, out = zlib.decompressobj(wbits=31), bytearray()
+    try:
+        for start in range(0, len(raw), BLOCK):
+            out += unpack.decompress(raw[start : start + BLOCK])
+    except zlib.error:
+        return bytes(out), True
+    return bytes(out), not unpack.eof
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Where messages start, by kind, source, entity and size, and where the bytes are none, in all and first."""
+
+    by_kind: dict[tuple[int, int, int, int], list[int]]
+    damaged: int
+    first: int
+
+
+def _places(data: bytes, order: str) -> _Places:
+    head, by_kind = struct.Struct(f"{order}HHHdHBHB"), defaultdict(list)
+    sync, at, damaged, first = data[:2], 0, 0, -1
+    while at >= 0 and at + HEADER + FOOTER <= len(data):
+        _, kind, size, _, source, entity, _, _ = head.unpack_from(data, at)
+        end = at + HEADER + size + FOOTER
+        follows = end == len(data) or data[end : end + 2] == sync
+        if data[at : at + 2] == sync and end <= len(data) and (follows or _is_whole(data[at:end], order)):
+            by_kind[kind, source, entity, size].append(at)
+            at = end
+            continue
+        damaged, first = damaged + 1, at if first < 0 else first
+        at = data.find(sync, at + 1)
+    return _Places(by_kind, damaged + (0 <= at < len(data)), first if first >= 0 else at)
+
+
+def _is_whole(message: bytes, order: str) -> bool:
+    return bool(_whole(np.frombuffer(message, np.uint8)[None, :], order)[0])
+
+
+def _crc_table() -> npt.NDArray[np.uint16]:
+    table = np.arange(256, dtype=np.uint16)
+    for _ in range(8):
+        table = np.where(table & 1, (table >> 1) ^ 0xA001, table >> 1).astype(np.uint16)
+    return table
+
+
+CRC = _crc_table()
+"""The CRC-16-IBM of each byte: x^16 + x^15 + x^2 + 1, low bit first."""
+
+
+def _whole(messages: npt.NDArray[np.uint8], order: str) -> npt.NDArray[np.bool_]:
+    """Return which messages (n, size) have the checksum that they end with."""
+    said = np.ascontiguousarray(messages[:, -FOOTER:]).view(f"{order}u2")[:, 0]
+    made = np.zeros(len(messages), dtype=np.uint16)
+    for column in messages[:, :-FOOTER].T:
+        made = (made >> 8) ^ CRC[(made ^ column) & 0xFF]
+    return np.asarray(made == said)
+
+
+def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+    kinds = definition_of(path, options.msg_path)
+    data, is_cut = _unpacked(path)
+    order = imc_order(data[:2])
+    if order is None:
+        raise LogError(f"`{path}` is a damaged IMC log", found="no message at its start", hint=COPY_AGAIN)
+    places, buffer = _places(data, order), np.frombuffer(data, np.uint8)
+    own = Counter({key: len(at) for key, at in places.by_kind.items()})
+    parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]] = defaultdict(list)
+    wrong = 0
+    for (kind, source, entity, size), starts in places.by_kind.items():
+        layout = np.dtype([(n, f"{order}{t}") for n, t in kinds[kind].numbers]) if kind in kinds else np.dtype([])
+        if not 0 < layout.itemsize <= size:
+            continue
+        messages = buffer[np.array(starts)[:, None] + np.arange(HEADER + size + FOOTER)]
+        good = messages[_whole(messages, order)]
+        wrong += len(messages) - len(good)
+        time = np.ascontiguousarray(good[:, 6:14]).view(f"{order}f8")[:, 0].astype(np.float64)
+        numbers = np.ascontiguousarray(good[:, HEADER : HEADER + layout.itemsize]).view(layout)[:, 0]
+        parts[kind, source, entity].append((time, {n: numbers[n].astype(np.float64) for n in layout.names or ()}))
+    notes = _notes(places, wrong, is_cut=is_cut)
+    return dict(_named(kinds, parts, _most(own))), notes
+
+
+def _notes(places: _Places, wrong: int, *, is_cut: bool) -> tuple[Note, ...]:
+    lost = places.damaged + wrong
+    if not lost and not is_cut:
+        return ()
+    where = f", the first at byte {places.first}" if places.damaged else ""
+    cut = "; the packed file is cut off" if is_cut else ""
+    message = f"messages that are damaged or cut off, left out: {lost}{where}{cut}"
+    return (Note("truncated", message, {"count": lost}),)
+
+
+def _most(counts: Counter[tuple[int, int, int, int]]) -> int:
+    """Return the source of most messages: the system that wrote the log, which hears others too."""
+    by_source: Counter[int] = Counter()
+    for (_, source, _, _), count in counts.items():
+        by_source[source] += count
+    return by_source.most_common(1)[0][0] if by_source else 0
+
+
+def _named(
+    kinds: dict[int, Message], parts: dict[tuple[int, int, int], list[tuple[FloatArray, dict[str, FloatArray]]]], own: int
+) -> Iterator[tuple[str, Topic]]:
+    """Yield topics: the own system's busiest entity has the message's name, others their source, entity or device beside it."""
+    sizes = {key: sum(len(time) for time, _ in blocks) for key, blocks in parts.items()}
+    for (kind, source, entity), blocks in parts.items():
+        rivals = [key for key in parts if key[0] == kind and key[1] == own]
+        busiest = max(rivals, key=lambda key: sizes[key], default=None) == (kind, source, entity)
+        name = kinds[kind].name
+        name += "" if busiest else f"[{entity}]" if source == own else f"[{source:#06x}.{entity}]"
+        time = np.concatenate([t for t, _ in blocks])
+        fields = {n: np.concatenate([f[n] for _, f in blocks]) for n in blocks[0][1]}
+        devices = np.unique(fields["id"]) if "id" in fields else np.zeros(0)
+        if not 1 < devices.size <= MOST_IDS:
+            topic = topic_of(time, fields)
+            if topic is not None:
+                yield name, topic
+            continue
+        for device in devices:
+            rows = fields["id"] == device
+            topic = topic_of(time[rows], {n: v[rows] for n, v in fields.items()})
+            if topic is not None:
+                yield f"{name}[{device:.0f}]", topic
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the messages with count, rate and first numbers; raises LogError for a log without its definition."""
+    topics, notes = _topics(path, options)
+    return inventory_of(path, "IMC log", topics, MEANS, notes)
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
+    topics, notes = _topics(path, options)
+    return raw_log_of(path, topics, mapping, notes)
+
+
+def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return None: which servo is which fin is the vehicle's."""
+    return None
+
+
+READER = Reader(
+    name="lsf",
+    says="DUNE log (LSTS): .lsf, .lsf.gz, with its IMC.xml beside it",
+    suffixes=(".lsf", ".lsf.gz"),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+    own_map=own_map,
+)
