@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.console import emit, messages, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
 from fieldsid.cli.progress import get_ready, refuse_closed
 from fieldsid.cli.session import drawing
@@ -111,12 +111,15 @@ def command(
         "skipped_runs": skips.records,
         "warnings": [{"code": n.code, "message": n.message} for n in notes],
     }
-    if not as_json:
-        warn(notes)
-    emit(body, as_json=as_json, render=lambda to: _render(to, entries, top))
+    from fieldsid.artifacts import inputs_of
+    from fieldsid.cli.headlines.models import of_compare
+    from fieldsid.cli.inputs import files_of
+
+    headline = of_compare(body, files_of(logs), inputs_of(model))
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, entries, top), headline=headline, notes=notes)
     _gate(entries, min_fit)
     skips.end(len(entries))
-    return body
+    return result
 
 
 def _refuse_part(*given: object) -> None:
@@ -178,6 +181,7 @@ def _drawn(
 def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
     return {
         "run": c.run,
+        "fitted_to": c.run in c.model.runs,
         "speed_m_s": c.shown.record.speed,
         "angle_rms_rad": c.merit.angle_rms,
         "rate_rms_rad_s": c.merit.rate_rms,

@@ -127,10 +127,9 @@ def command(
         check_effects([(model, made.model)])
     files = [] if output is None else _written(made.plan, made.model, asked, output, write, context, figures=figures, force=force)
     body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body))
-    if output is None:
-        say("nothing was written: add `-o DIR` for the plan, the fin commands, mission snippets and the figure")
-    return result
+    from fieldsid.cli.headlines.trial import of_plan
+
+    return emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body), headline=of_plan(body, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say
+from fieldsid.cli.console import emit
 from fieldsid.cli.options import Force, JsonFlag
 from fieldsid.cli.progress import get_ready, refuse_existing
+from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,10 +68,11 @@ def command(files: Files = None, output: Page = None, force: Force = False, as_j
         "figures": text.count('<svg class="chart"') + text.count('<svg class="bars"'),
         "skipped": context["skipped"],
     }
-    if not as_json:
-        for line in context["skipped"]:
-            say(f"warning: {line} [not_in_report]")
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    from fieldsid.cli.headlines.trial import of_report
+
+    notes = [Note("not_in_report", line, {}) for line in context["skipped"]]
+    headline = of_report(body, state.folder)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=headline, notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:

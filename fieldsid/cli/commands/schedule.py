@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, messages, say, table
+from fieldsid.cli.headlines.gains import of_design, of_export, of_verification
 from fieldsid.cli.options import Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
@@ -138,7 +139,8 @@ def design(
     if output is not None:
         inputs = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
-    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, source, body))
+    headline = of_design(body, models)
+    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, source, body), headline=headline)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -194,10 +196,11 @@ def verify(
         "passed": all(g.passed for g in gates),
         "figure": None if output is None else _draw(known, checked, output, context, force=force),
     }
-    emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body))
+    headline = of_verification(body, schedule, models or source.paths)
+    result = emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body), headline=headline)
     if not body["passed"]:
         raise typer.Exit(1)
-    return body
+    return result
 
 
 @command.command("export", short_help="Write the gains for the vehicle's software.")
@@ -238,7 +241,8 @@ def export(
         from fieldsid.artifacts import write_text
 
         body["file"] = str(write_text(output, text, force=force))
-    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body))
+    headline = of_export(body, schedule) if body["file"] else None  # without a file the text is all there is
+    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body), headline=headline)
 
 
 def _export_into(schedule: Schedule, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
@@ -313,18 +317,11 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
         )
     if body["file"]:
         to.print(f"schedule: {body['file']}", soft_wrap=True)
-    else:
-        messages().print("nothing was written: add `-o gains.yaml` to verify and export it")
 
 
 def _render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) -> None:
     from math import degrees
 
-    from rich.text import Text
-
-    to.print(Text(f"{body['verdict']}: {body['says']}", style="bold"), soft_wrap=True)
-    to.print(Text(body["rests_on"]), soft_wrap=True)
-    to.print()
     small, usual, large = (degrees(step.size) for step in checked.scheduled[0].steps)
     columns = (
         "m/s", "phase", "least", "dB", "delay", "over", "most", f"{small:.0f}", f"{usual:.0f}", "most", f"{large:.0f}", "const",

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.console import emit, table
+from fieldsid.cli.headlines.trial import of_status
 from fieldsid.cli.options import JsonFlag
+from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -63,9 +65,9 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
         "unreadable_journal_lines": state.broken_lines,
         "next": {"why": why, "command": line},
     }
-    if state.broken_lines and not as_json:
-        say(f"warning: {state.broken_lines} lines of the journal cannot be read [journal]")
-    return emit(body, as_json=as_json, render=lambda to: _render(to, state, body))
+    broken = f"{state.broken_lines} lines of the journal cannot be read"
+    notes = [Note("journal", broken, {})] if state.broken_lines else []
+    return emit(body, as_json=as_json, render=lambda to: _render(to, state, body), headline=of_status(body), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:
@@ -86,15 +88,10 @@ def _entry(item: Item) -> dict[str, Any]:
 
 
 def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:
-    to.print(body["verdict"], markup=False, soft_wrap=True)
-    to.print(f"because: {body['next']['why']}", markup=False, soft_wrap=True)
-    if body["next"]["command"]:
-        to.print(f"next: {body['next']['command']}", markup=False, soft_wrap=True)
     used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that has become a run says no more
     listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
     shown = sorted(listed, key=lambda i: (ORDER.index(i.kind), i.path))
     if shown:
-        to.print()
         to.print(table("", ("file", "what", "made from", ""), [_row(i) for i in shown], left=4))
     kept = [e for e in state.entries if e.verdict][-LAST:]
     if kept:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table, warn
+from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import tasks_of
@@ -76,6 +76,7 @@ def command(
     Example: sysid turn-radius models/*.yaml --rudder-max 0.35 --measured circle.parquet -o turning/
     """
     from fieldsid.angles import FIN, parse_angle
+    from fieldsid.cli.headlines.gains import of_turn
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.speeds import speeds_of
@@ -101,11 +102,10 @@ def command(
     body["skipped_runs"] = skips.records
     if output is not None:
         body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
-    if not as_json:
-        warn(prediction.notes)
-    emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body))
+    headline, notes = of_turn(body, models), prediction.notes
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
-    return body
+    return result
 
 
 def _fin_zero(text: str) -> float:

@@ -11,6 +11,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from fieldsid.cli.console import print_headline
+from fieldsid.cli.headlines.headline import Headline
+
 STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
 BAR = 20
 
@@ -18,7 +21,9 @@ BAR = 20
 def screen(body: Mapping[str, Any]) -> RenderableType:
     """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
     head = Text(body["said"], style=STYLE[body["verdict"]])
-    return Group(head, Text(rests_on(body), style="dim"), Text(), _parameters(body), Text(), _meters(body), _met(body))
+    return Group(
+        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), _parameters(body), Text(), _meters(body), _met(body)
+    )
 
 
 def line(body: Mapping[str, Any]) -> str:
@@ -38,13 +43,10 @@ def rests_on(body: Mapping[str, Any]) -> str:
 
 
 def final(to: Console, body: Mapping[str, Any]) -> None:
-    """Print the last look: verdict, what it rests on, the table, the next command."""
-    to.print(Text(body["said"], style=STYLE[body["verdict"]]), soft_wrap=True)
-    to.print(rests_on(body), soft_wrap=True)
+    """Print the last look: verdict, what it rests on, the next command, the table."""
+    print_headline(to, Headline(body["said"], rests_on(body), body["next"]))
     to.print()
     to.print(_parameters(body))
-    if body["next"]:
-        to.print(f"\nnext: {body['next']}", soft_wrap=True)
 
 
 def _parameters(body: Mapping[str, Any]) -> Table:

@@ -1,0 +1,151 @@
+"""Headlines of the search for what is missing: diagnose, extend, effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
+from fieldsid.cli.headlines.words import Body, counted, is_noise, named, used
+
+MODELS = "models"
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """What was searched: the training files, those that judged, the model whose effects were known, the mapping."""
+
+    runs: Sequence[Path]
+    unseen: Sequence[Path]
+    model: Path | None
+    mapping: Path | None
+
+    @property
+    def reading(self) -> tuple[str, ...]:
+        """The option that reads the logs."""
+        return ("--mapping", str(self.mapping)) if self.mapping is not None else ()
+
+
+def of_diagnosis(body: Body, searched: Searched) -> Headline:
+    """Return the verdict with its numbers and probability."""
+    first = body["candidates"][0] if body["candidates"] else None
+    sure = f", probability {probability(first['probability'])}" if first and body["verdict"] in ("effect", "undecided") else ""
+    judged = named(body["validation_runs"]) if body["validation_runs"] else "a part of them held back"
+    rests = (
+        f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
+        f"{counted(len(body['candidates']), 'hypothesis').replace('hypothesiss', 'hypotheses')} compared"
+    )
+    return Headline(f"{body['verdict']}: {body['says']}{sure}", rests, _after(body, searched))
+
+
+def probability(p: float) -> str:
+    """Return a probability to three digits, and which side of the last one it is on."""
+    return f"{p:.3f}" if 0.001 <= p <= 0.999 else "< 0.001" if p < 0.001 else "> 0.999"
+
+
+def _after(body: Body, of: Searched) -> str:
+    axis = str(body["axis"])
+    judged = repeated("--validate", of.unseen)
+    if body["effects"]:
+        adds = repeated("--add", body["effects"])
+        return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged, *of.reading))
+    if body["verdict"] == "undecided" and body["file"]:
+        return pasted("plan", "--from", body["file"], "-o", "plan")
+    if body["verdict"] == "undecided":
+        fly = body["next_maneuver"] or {}
+        return f"{fly['command']} --axis {axis} -o plan" if "command" in fly else typed_with("-o", "diagnosis.yaml")
+    if body["verdict"] == "unexplained":
+        return pasted("effects", "new", "unexplained", "--axis", axis)
+    if body["verdict"] == "disturbed":
+        known = ("--effects", ",".join(body["known"])) if body["known"] else ()
+        joint = ("--joint",) if len(of.runs) > 1 else ()
+        return pasted("identify", of.runs, "--axis", axis, *joint, *known, "--method", "pem", *of.reading, "-o", "models_pem/")
+    return _on_model(of, axis, lambda model: used(axis, model))
+
+
+def _on_model(of: Searched, axis: str, then: Callable[[str], str]) -> str:
+    """Return a line on the model that was diagnosed: one known, one that was identified of the same runs, or one still to be."""
+    if (model := of.model or _identified(of.runs, axis)) is not None:
+        return then(str(model))
+    joint = ("--joint",) if len(of.runs) > 1 else ()
+    stem = "joint" if joint else _stem(of.runs[0])
+    made = pasted("identify", of.runs, "--axis", axis, *joint, *of.reading, "-o", f"{MODELS}/")
+    return f"{made} && {then(f'{MODELS}/{stem}_{axis}.yaml')}"
+
+
+def _stem(log: Path) -> str:
+    from fieldsid.logs.several.run_names import stem_of
+
+    return stem_of(log)
+
+
+def _identified(runs: Sequence[Path], axis: str) -> Path | None:
+    """Return a model without effects that was fitted to just these runs, in `models` here or beside them."""
+    from fieldsid.artifacts import inputs_of, read_yaml
+    from fieldsid.logs.unknown_file import own_kind
+
+    wanted = {p.resolve() for p in runs}
+    places = dict.fromkeys([Path(MODELS), *(p.parent.parent / MODELS for p in runs[:1])])
+    for path in (p for place in places for p in sorted(place.glob("*.yaml"))):
+        if own_kind(path) == "model" and {p.resolve() for p in inputs_of(path)} == wanted:
+            body = read_yaml(path)
+            if body.get("axis") == axis and not body.get("effects"):
+                return path
+    return None
+
+
+def of_extension(body: Body) -> Headline:
+    """Return whether the addition is kept, and how the error fell."""
+    before, after = body["over_floor"]["before"], body["over_floor"]["after"]
+    word = "kept" if body["pays"] else "kept because of --keep" if body["kept"] else "not kept"
+    where = "unseen data" if body["unseen"] else "the runs fitted to"
+    says = f"{'+'.join(body['added'])} {word}: the error on {where} goes from {before:.2f} to {after:.2f} x the noise floor"
+    fitted = counted(len(body["learned_on"]), "run")
+    return Headline(says, f"{fitted} fitted to ({named(body['learned_on'])}), judged by {named(body['judged_on'])}", body["next"])
+
+
+def of_undoing(body: Body) -> Headline:
+    """Return which model counts again."""
+    return Headline(
+        f"undone: {body['model']} counts again, with {', '.join(body['effects']) or 'no effects'}",
+        f"the parent that {body['undone']} names, {body['parent']['state']}",
+        pasted("history", body["model"]),
+    )
+
+
+def of_catalogue(body: Body) -> Headline:
+    """Return how many effects there are."""
+    effects = body["effects"]
+    stages = [str(e["stage"]) for e in effects]
+    shares = ", ".join(f"{stages.count(s)} {s}" for s in dict.fromkeys(stages))
+    own = sum("/" in str(e["origin"]) for e in effects)
+    return Headline(
+        f"{counted(len(effects), 'effect')}: {shares}",
+        "what is built in" + (f" and {own} of your own" if own else "; your own go into effects/"),
+        pasted("effects", "show", effects[0]["name"]),
+    )
+
+
+def of_effect(body: Body) -> Headline:
+    """Return what an effect is, and the maneuver that shows it."""
+    name, axis = str(body["name"]), str(body["axes"][0])
+    return Headline(
+        f"{name}: {body['says']}", str(body["source"]), pasted("plan", "--axis", axis, "--separate", f"none,{name}", "-o", "plan")
+    )
+
+
+def of_new_effect(body: Body, look: str) -> Headline:
+    """Return what was written; look: the line to look at it."""
+    says, rests = f"wrote {body['file']}: edit its moment and coefficients", f"the template of an effect, for {body['axis']}"
+    return Headline(says, rests, look)
+
+
+def left_says(body: Body) -> str:
+    """Return what the model as it now is leaves."""
+    sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
+    said = ", ".join(f"{error:.2f} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    quiet = all(is_noise(error) for _, error in sides if isfinite(error))
+    return f"left: {said}: " + ("that is the noise" if quiet else "more is missing than the sensors' noise explains")
