@@ -144,6 +144,10 @@ def _next(found: Change, sides: Sequence[Side]) -> str | None:
         return shlex.join(["sysid", "schedule", "design", *map(str, new), "-o", "gains_after.yaml"])
     if found.verdict == "form":
         lacking, add = (old, found.added) if found.added else (new, found.removed)
+        made, others = lacking[0].with_name(f"{lacking[0].stem}+{'+'.join(add)}.yaml"), new if found.added else old
+        if made.exists():  # it was extended so already: that one can be compared
+            pair = (made, others[0]) if found.added else (others[0], made)
+            return None if made in others else shlex.join(["sysid", "compare", *map(str, pair)])
         return shlex.join(["sysid", "extend", str(lacking[0]), *_runs(lacking[0]), *(w for e in add for w in ("--add", e))])
     return f"sysid plan --axis {axis} --speeds {speeds}" if found.verdict == "unclear" else None
 

@@ -15,6 +15,7 @@ from fieldsid.cli.console import emit, table
 from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in, shown_words
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -136,7 +137,8 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
 
     to.print(_candidates(found))
     floor = found.noise_floor
-    noise = f"{number(floor.angle, 2)} rad and {number(floor.rate, 2)} rad/s"
+    times, angle = shown_in("rad")
+    noise = f"{number(times * floor.angle, 2)} {angle} and {number(times * floor.rate, 2)} {angle}/s"
     to.print(
         Text(f"fitted, unseen: free-run error of those runs over the noise floor, {noise}; evidence: log, over the first row")
     )
@@ -150,7 +152,7 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
 
 
 def _candidates(found: Diagnosis) -> Any:
-    from fieldsid.cli.headlines.missing import probability
+    from fieldsid.rounding import probability
 
     floor = found.noise_floor
     judged = found.base.validation.over(floor)
@@ -187,7 +189,7 @@ def _render_words(to: Console, found: Diagnosis) -> None:
 
 def _render_where(to: Console, found: Diagnosis) -> None:
     rows = [
-        (p.condition, f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
+        (shown_words(p.condition), f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
         for p in found.where[:MOST_PLACES]
     ]
     to.print()

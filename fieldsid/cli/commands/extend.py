@@ -19,6 +19,7 @@ from fieldsid.cli.headlines.words import used
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
+from fieldsid.cli.voice import shown_in
 from fieldsid.errors import ArtifactError, UsageError
 
 if TYPE_CHECKING:
@@ -215,12 +216,16 @@ def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
-    from fieldsid.rounding import in_unit, number
+    from fieldsid.rounding import number
 
+    times, angle = shown_in("rad")
     floor = body["noise_floor"]
     rows = [
-        (f"{unit}, {side}", number(b[key], 3), number(a[key], 3), number(floor[noise], 3))
-        for key, noise, unit in (("angle_rms_rad", "angle_rad", "angle, rad"), ("rate_rms_rad_s", "rate_rad_s", "rate, rad/s"))
+        (f"{unit}, {side}", *(number(times * v, 3) for v in (b[key], a[key], floor[noise])))
+        for key, noise, unit in (
+            ("angle_rms_rad", "angle_rad", f"angle, {angle}"),
+            ("rate_rms_rad_s", "rate_rad_s", f"rate, {angle}/s"),
+        )
         for side, b, a in (
             ("unseen", body["before"]["validation"], body["after"]["validation"]),
             ("fitted", body["before"]["train"], body["after"]["train"]),
@@ -230,8 +235,9 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
     to.print()
     found = [
-        (n, _value(c["value"], c["std_error"], at_bound=c["at_bound"]), in_unit(c["unit"]))
+        (n, _value(factor * c["value"], factor * c["std_error"], at_bound=c["at_bound"]), unit)
         for n, c in body["coefficients"].items()
+        for factor, unit in [shown_in(c["unit"])]
     ]
     to.print(table("", ("coefficient", "value", "unit"), found, left=2))
     to.print()

@@ -13,6 +13,7 @@ from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in
 from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
@@ -111,13 +112,13 @@ def _rows(g: Generation) -> list[tuple[str, ...]]:
 
     if g.step is None:
         return []
-    gain = g.step.gain
+    gain, (times, angle) = g.step.gain, shown_in("rad")
     before, after = (p.validation if gain.unseen else p.train for p in (gain.before, gain.after))
     channels = [
         (name, b, a, floor)
         for name, b, a, floor in (
-            ("angle, rad", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
-            ("rate, rad/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
+            (f"angle, {angle}", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
+            (f"rate, {angle}/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
         )
         if isfinite(b)
     ]
@@ -126,6 +127,6 @@ def _rows(g: Generation) -> list[tuple[str, ...]]:
     over = [f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}", *([""] * (len(words) - 1))]
     channels += [("", float("nan"), float("nan"), float("nan"))] * (len(words) - len(channels))
     return [
-        (w, name, *(number(v, 3) if name else "" for v in (b, a, floor)), x)
+        (w, name, *(number(times * v, 3) if name else "" for v in (b, a, floor)), x)
         for w, (name, b, a, floor), x in zip(words, channels, over, strict=True)
     ]

@@ -26,6 +26,7 @@ from fieldsid.cli.options import (
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import drawing
+from fieldsid.cli.voice import shown_estimate, shown_in
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -232,30 +233,25 @@ def _label(entry: Mapping[str, Any]) -> str:
 
 
 def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
-    from fieldsid.rounding import in_unit, interval, number, with_error
+    from fieldsid.rounding import number
 
     rows = [
-        (
-            _label(e) if i == 0 else "",
-            p["shown"],
-            with_error(p["value"], p["std_error"]),
-            in_unit(p["unit"]),
-            interval(*p["interval95"]),
-        )
+        (_label(e) if i == 0 else "", p["shown"], *shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"]))
         for e in entries
         for i, p in enumerate(e["parameters"].values())
     ]
+    times, angle = shown_in("rad")
     to.print(table("", ("run", "parameter", "value", "unit", "95 % interval"), rows, left=2))
     to.print()
     merits = [
         (
             r["run"],
             number(r["speed_m_s"], 3),
-            number(r["angle_rms_rad"], 2),
-            number(e["noise_floor"]["angle_rad"], 2),
+            number(times * r["angle_rms_rad"], 2),
+            number(times * e["noise_floor"]["angle_rad"], 2),
             number(r["angle_fit_percent"], 3),
-            number(r["rate_rms_rad_s"], 2),
-            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(times * r["rate_rms_rad_s"], 2),
+            number(times * e["noise_floor"]["rate_rad_s"], 2),
             number(r["rate_fit_percent"], 3),
         )
         for e in entries
@@ -263,7 +259,7 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
     ]
     columns = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
     to.print(table("", columns, merits))
-    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in rad, rate in rad/s")
+    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in {angle}, rate in {angle}/s")
     _render_reasons(to, entries)
     for e in entries:
         if e["model"]:

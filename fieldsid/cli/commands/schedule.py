@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, say, table
+from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.headlines.gains import of_design, of_export, of_verification
 from fieldsid.cli.options import Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -266,7 +267,7 @@ def _limits(
     """Return fin limit and fin rate: the options, else the vehicle's, else the largest fin the models were trained on."""
     from fieldsid.face.arguments import fin_limits_of, vehicle_of
 
-    return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, messages().print)
+    return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, say)
 
 
 def _draw(schedule: Schedule, checked: Verification, path: Path, context: typer.Context, *, force: bool) -> str:
@@ -283,15 +284,15 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
     from fieldsid.schedule.verdict import fin_of, lost
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
-    extra = ("kz",) if schedule.depth else ()
+    (times, angle), extra = shown_in("rad"), ("kz",) if schedule.depth else ()
     rows = [
         (
             number(r.speed, 3),
             number(r.gains.kp),
             number(r.gains.ki, 3),
             number(r.gains.kd, 3),
-            number(r.feed_forward, 3),
-            number(r.fin_limit, 3),
+            number(times * r.feed_forward, 3),
+            number(times * r.fin_limit, 3),
             *((number(r.depth_gain, 3),) if schedule.depth else ()),
             f"{r.phase_margin_deg:.0f}",
             f"{r.slowed:.2f}",
@@ -302,7 +303,7 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
         for r in schedule.rows
     ]
     columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "settle s", "held", "data")
-    to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed", columns, rows, left=0))
+    to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angle}", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
     counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
     to.print(f"counted with: {'; '.join(counted)}")

@@ -10,6 +10,7 @@ import typer
 
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile
+from fieldsid.cli.voice import shown_in
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -117,9 +118,14 @@ def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | Non
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from fieldsid.cli.console import table
+    from fieldsid.logs.run import SIGNALS
     from fieldsid.rounding import number
 
-    rows = [(name, *(number(v[k]) for k in ("low", "high", "end"))) for name, v in body["signals"].items()]
-    to.print(table("", ("signal", "low", "high", "end"), rows))
+    rows = [
+        (name, *(number(factor * v[k]) for k in ("low", "high", "end")), unit)
+        for name, v in body["signals"].items()
+        for factor, unit in [shown_in(SIGNALS[name])]
+    ]
+    to.print(table("", ("signal", "low", "high", "end", "unit"), rows))
     if body["file"]:
         to.print(f"run: {body['file']}", soft_wrap=True)

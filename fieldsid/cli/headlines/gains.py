@@ -9,9 +9,12 @@ from pathlib import Path
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.cli.voice import shown_in
 from fieldsid.rounding import number, with_error
 
 TARGET = "ros2"
+SLOWER = 60.0
+"""Phase margin in degrees to ask for where less did not hold: the upper end of the textbooks' 30 to 60 (Franklin et al., 6.4)."""
 
 
 def of_fit(body: Body) -> Headline:
@@ -45,7 +48,8 @@ def of_turn(body: Body, models: Sequence[Path]) -> Headline:
     speeds = sorted({float(r["speed_m_s"]) for r in rows})
     methods = ", ".join(sorted({str(r["method"]) for r in rows}))
     circles = f"{counted(len(body['measured']), 'measured circle')}" if body["measured"] else "no measured circle"
-    rudder = f"rudder {number(body['rudder_max_rad'], 3)} rad"
+    times, unit = shown_in("rad")
+    rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
     rests = f"{named([str(m) for m in models])}, {rudder}; {methods} at {counted(len(speeds), 'speed')}; {circles}"
     return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
 
@@ -77,7 +81,9 @@ def of_verification(body: Body, schedule: Path, models: Sequence[Path]) -> Headl
         out = Path(f"{schedule.stem}_{TARGET}.yaml")
         return Headline(says, rests, pasted("schedule", "export", schedule, "--to", TARGET, "-o", out))
     again = schedule.with_name(f"{schedule.stem}_slower.yaml")
-    return Headline(says, rests, pasted("schedule", "design", models, "--phase-margin", "60", "-o", again))
+    asked = (float(g["wanted"]) for g in body["gates"] if g["gate"] == "phase_margin_deg" and not g["passed"])
+    margin = f"{max(asked, default=SLOWER):g}"
+    return Headline(says, rests, pasted("schedule", "design", models, "--phase-margin", margin, "-o", again))
 
 
 def of_export(body: Body, schedule: Path) -> Headline:

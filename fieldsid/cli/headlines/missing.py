@@ -10,6 +10,7 @@ from pathlib import Path
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import Body, counted, is_noise, named, used
+from fieldsid.rounding import probability
 
 MODELS = "models"
 
@@ -39,11 +40,6 @@ def of_diagnosis(body: Body, searched: Searched) -> Headline:
         f"{counted(len(body['candidates']), 'hypothesis').replace('hypothesiss', 'hypotheses')} compared"
     )
     return Headline(f"{body['verdict']}: {body['says']}{sure}", rests, _after(body, searched))
-
-
-def probability(p: float) -> str:
-    """Return a probability to three digits, and which side of the last one it is on."""
-    return f"{p:.3f}" if 0.001 <= p <= 0.999 else "< 0.001" if p < 0.001 else "> 0.999"
 
 
 def _after(body: Body, of: Searched) -> str:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, is_noise, named, over_noise, used
-from fieldsid.rounding import number, with_error
+from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, is_noise, named, over_noise, used
+from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
+from fieldsid.rounding import number
 
 
 def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
@@ -30,8 +31,9 @@ def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
 
 def _parameters(fit: Body) -> str:
     """Return the numbers of a fit that are not of one run alone."""
-    base = list(fit["parameters"].items())[:3]
-    return ", ".join(f"{p['shown']} = {with_error(p['value'], p['std_error'])}" for _, p in base)
+    base = list(fit["parameters"].values())[:MOST_NAMED]
+    shown = [(p["shown"], shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])) for p in base]
+    return ", ".join(f"{name} = {value} {unit}".rstrip() for name, (value, unit, _) in shown)
 
 
 def _span(fits: Sequence[Body]) -> str:
@@ -61,7 +63,7 @@ def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Head
     channel = worst["judged_by"]
     says = f"{worst['run']}: {channel} error {_leading(worst):.2f} x its noise, fit {worst[f'{channel}_fit_percent']:.1f} %"
     if worst["failing"]:
-        says += f"; fails most at {worst['where'][0]['condition']}" if worst["where"] else ""
+        says += f"; fails most at {shown_words(worst['where'][0]['condition'])}" if worst["where"] else ""
     else:
         says += ": nothing is left but the noise"
     seen = [e["run"] for e in entries if e["fitted_to"]]
@@ -116,7 +118,9 @@ def of_simulation(body: Body, axis: str, maneuver: str | None, run: Path | None)
     name = "yaw_rad" if axis == "yaw" else "pitch_rad"
     reach = body["signals"][name]
     how = f"the maneuver {maneuver}" if maneuver else f"the fin of {run}"
-    says = f"{body['seconds']:.1f} s, {axis} {number(reach['low'], 3)} .. {number(reach['high'], 3)} rad under {how}"
+    times, unit = shown_in("rad")
+    swing = f"{number(times * reach['low'], 3)} .. {number(times * reach['high'], 3)} {unit}"
+    says = f"{body['seconds']:.1f} s, {axis} {swing} under {how}"
     rests = f"{body['model']}, {counted(body['samples'], 'sample')}"
     if body["file"] is None:
         return Headline(says, rests, typed_with("-o", "simulated.parquet"))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from glob import escape
+from os.path import commonprefix
 from pathlib import Path
 
 FEW = 3
@@ -38,8 +40,10 @@ def _files(paths: Sequence[Path]) -> list[str]:
     folders, suffixes = {p.parent for p in paths}, {p.suffix for p in paths}
     if len(paths) > FEW and len(folders) == len(suffixes) == 1:
         folder, suffix = folders.pop(), suffixes.pop()
-        if suffix and folder.is_dir() and sorted(folder.glob(f"*{suffix}")) == sorted(paths):
-            return [f"{'' if folder == Path() else shlex.quote(str(folder)) + '/'}*{suffix}"]
+        start = commonprefix([p.stem for p in paths])  # noqa: RUF071 - characters are what is meant
+        if suffix and sorted(folder.glob(f"{escape(start)}*{suffix}")) == sorted(paths):
+            before = "" if folder == Path() else f"{shlex.quote(str(folder))}/"
+            return [f"{before}{shlex.quote(start) if start else ''}*{suffix}"]
     return [shlex.quote(str(p)) for p in paths]
 
 

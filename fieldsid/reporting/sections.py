@@ -12,8 +12,8 @@ import numpy as np
 
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import DOWN_TO_NOISE
-from fieldsid.report import figures
-from fieldsid.report.material import AxisMaterial, Material, Shown
+from fieldsid.reporting import figures
+from fieldsid.reporting.material import AxisMaterial, Material, Shown
 from fieldsid.rounding import in_unit, interval, number, with_error
 from fieldsid.trial_folder.journal import Entry, made_by
 from fieldsid.trial_folder.state import FolderState, Item
