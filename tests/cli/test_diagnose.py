@@ -44,7 +44,7 @@ def test_the_hidden_effect_is_named_first_and_kept_and_drawn(run_cli, logs, tmp_
 def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(run_cli, logs):
     answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
     assert answer.code == 0
-    assert max(len(line.rstrip()) for line in answer.out.splitlines()) <= 80
+    assert max(map(len, trial.below(answer.out))) <= 80
     assert answer.out.startswith("effect: servo_lag (the fin follows")
     for part in ("as it is", "log evidence", "where the model as it is fails", "not tried: ", "needs roll, which the log lacks"):
         assert part in answer.out

@@ -61,6 +61,8 @@ def command(
 
     The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
+
+    Example: sysid demo --effect sway_coupling -o tour
     """
     began = perf_counter()
     with compiling(context, _compile_loops) as warmup:

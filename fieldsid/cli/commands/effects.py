@@ -41,7 +41,10 @@ NewFile = Annotated[
 
 @command.command("list", short_help="List every effect by stage.")
 def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
-    """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor."""
+    """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor.
+
+    Example: sysid effects list --axis yaw
+    """
     from fieldsid.effects import all_effects
 
     known = all_effects(axis).values()
@@ -51,7 +54,10 @@ def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
 
 @command.command("show", short_help="Show all that is known of one effect.")
 def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
-    """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source."""
+    """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source.
+
+    Example: sysid effects show servo_lag
+    """
     from fieldsid.effects import pick_effect
 
     effect = pick_effect(name)

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from fieldsid.online.progress import Goal
     from fieldsid.online.samples import MessageReader, Sample
 
+SOURCE, GOAL = "Where the samples come from", "What is to be reached"
+"""The groups of its own options on the page of help."""
+
 Log = Annotated[
     Path | None,
     typer.Argument(
@@ -30,24 +33,55 @@ Log = Annotated[
     ),
 ]
 Factor = Annotated[
-    float, typer.Option("--speed", metavar="FACTOR", min=0.0, help="How many times as fast as logged to replay; 0 does not wait.")
+    float,
+    typer.Option(
+        "--speed",
+        metavar="FACTOR",
+        min=0.0,
+        help="How many times as fast as logged to replay; 0 does not wait.",
+        rich_help_panel=SOURCE,
+    ),
 ]
-Follow = Annotated[bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.")]
+Follow = Annotated[
+    bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.", rich_help_panel=SOURCE)
+]
 Port = Annotated[
     int | None,
-    typer.Option("--udp", metavar="PORT", min=1, max=65535, help="Take JSON lines as UDP on this machine.", show_default=False),
+    typer.Option(
+        "--udp",
+        metavar="PORT",
+        min=1,
+        max=65535,
+        help="Take JSON lines as UDP on this machine.",
+        show_default=False,
+        rich_help_panel=SOURCE,
+    ),
 ]
 Idle = Annotated[
     float | None,
-    typer.Option("--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False),
+    typer.Option(
+        "--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False, rich_help_panel=SOURCE
+    ),
 ]
 PlanFile = Annotated[
     Path | None,
-    typer.Option("--plan", metavar="YAML", help="The accuracy to reach is what this plan promised.", show_default=False),
+    typer.Option(
+        "--plan",
+        metavar="YAML",
+        help="The accuracy to reach is what this plan promised.",
+        show_default=False,
+        rich_help_panel=GOAL,
+    ),
 ]
 Want = Annotated[
     str | None,
-    typer.Option("--want", metavar="A=5%,...", help="The accuracy to reach; 5 % of each but the trim.", show_default=False),
+    typer.Option(
+        "--want",
+        metavar="A=5%,...",
+        help="The accuracy to reach; 5 % of each but the trim.",
+        show_default=False,
+        rich_help_panel=GOAL,
+    ),
 ]
 StateFile = Annotated[
     Path | None,
@@ -56,7 +90,9 @@ StateFile = Annotated[
 Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
 Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
 Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor; 1 forgets nothing.")]
-UntilEnough = Annotated[bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.")]
+UntilEnough = Annotated[
+    bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.", rich_help_panel=GOAL)
+]
 
 SAVE_EVERY_S = 1.0
 

@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.headlines.gains import of_design, of_export, of_verification
-from fieldsid.cli.options import Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
+from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.voice import shown_in
@@ -41,20 +41,28 @@ FinLimit = Annotated[
         "--fin-limit",
         metavar="ANGLE",
         help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
+        rich_help_panel=LIMITS,
     ),
 ]
 FinRate = Annotated[
-    str | None, typer.Option("--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.")
+    str | None,
+    typer.Option(
+        "--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.", rich_help_panel=LIMITS
+    ),
 ]
 FinLag = Annotated[
-    float | None, typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.")
+    float | None,
+    typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.", rich_help_panel=LIMITS),
 ]
 Delay = Annotated[
-    float | None, typer.Option("--delay", metavar="S", help="Dead time from command to fin; the model's if not given.")
+    float | None,
+    typer.Option("--delay", metavar="S", help="Dead time from command to fin; the model's if not given.", rich_help_panel=LIMITS),
 ]
 Latency = Annotated[
     float | None,
-    typer.Option("--latency", metavar="S", help="The autopilot's own, sensor to command, with half its period."),
+    typer.Option(
+        "--latency", metavar="S", help="The autopilot's own, sensor to command, with half its period.", rich_help_panel=LIMITS
+    ),
 ]
 Depth = Annotated[bool, typer.Option("--depth", help="Add the depth loop above pitch.")]
 OwnLaw = Annotated[
