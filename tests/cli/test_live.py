@@ -33,7 +33,7 @@ def test_without_a_terminal_it_prints_a_line_a_look_and_the_table_at_the_end(run
     assert answer.code == 0
     assert "95 % band" in answer.out
     assert "next: sysid identify" in answer.out
-    assert max(map(len, answer.out.split("\nyaw, ")[1].splitlines()[1:5])) <= 80
+    assert max(map(len, answer.out.split("\nnext: ")[1].splitlines()[1:6])) <= 80
 
 
 def test_a_state_is_gone_on_from_and_ends_where_one_go_ends(run_cli, tmp_path):

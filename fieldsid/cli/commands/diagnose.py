@@ -80,7 +80,7 @@ def command(
     body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, context, force=force)}
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
-    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping))
+    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
     result = emit(body, as_json=as_json, render=lambda to: _render(to, found, body), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
     return result
@@ -179,6 +179,9 @@ def _render_words(to: Console, found: Diagnosis) -> None:
 
     if found.verdict in ("sufficient", "disturbed"):
         return
+    if found.effects:
+        to.print()
+        to.print(Text(found.says))
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < MIN_RIVAL_PROBABILITY_RATIO:
             continue

@@ -207,6 +207,7 @@ def _render_one(to: Console, effect: Effect) -> None:
         ("excited by", ", ".join(effect.excited_by)),
         ("mistaken for", ", ".join(effect.mistaken_for) or "-"),
         ("log must have", ", ".join(effect.needs) or "nothing more"),
+        ("source", effect.source),
         ("origin", effect.origin),
     ]
     to.print(table("", ("", ""), facts, left=2))

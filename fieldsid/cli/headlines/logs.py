@@ -10,10 +10,13 @@ from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.models.axis import NAMES, Axis
 
+PROOF = "evidence"
+"""Code of a finding that says why a column was taken for a signal: nothing is wrong there."""
+
 
 def of_inspection(body: Body, mapping: Path | None) -> Headline:
     """Return what a log holds, and how it becomes a run."""
-    log, signals, findings = body["path"], body["signals"], body["findings"]
+    log, signals, findings = body["path"], body["signals"], [f for f in body["findings"] if f["code"] != PROOF]
     said = counted(len(findings), "finding") if findings else "nothing found that would spoil an identification"
     if not signals:
         says = (

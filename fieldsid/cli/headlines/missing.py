@@ -17,12 +17,13 @@ MODELS = "models"
 
 @dataclass(frozen=True, slots=True)
 class Searched:
-    """What was searched: the training files, those that judged, the model whose effects were known, the mapping."""
+    """What was searched: the training files, those that judged, the known model, the mapping, how long."""
 
     runs: Sequence[Path]
     unseen: Sequence[Path]
     model: Path | None
     mapping: Path | None
+    thorough: bool
 
     @property
     def reading(self) -> tuple[str, ...]:
@@ -39,7 +40,16 @@ def of_diagnosis(body: Body, searched: Searched) -> Headline:
         f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
         f"{counted(len(body['candidates']), 'hypothesis').replace('hypothesiss', 'hypotheses')} compared"
     )
-    return Headline(f"{body['verdict']}: {body['says']}{sure}", rests, _after(body, searched))
+    return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
+
+
+def _short(body: Body) -> str:
+    """Return the sentence of a verdict with the effects by their names alone; what each is stands in the whole sentence."""
+    says = str(body["says"])
+    before, end, after = says.rpartition("): ")
+    return (
+        f"{' and '.join(body['effects'])}: {after}" if body["effects"] and end and before.startswith(body["effects"][0]) else says
+    )
 
 
 def _after(body: Body, of: Searched) -> str:
@@ -48,18 +58,24 @@ def _after(body: Body, of: Searched) -> str:
     if body["effects"]:
         adds = repeated("--add", body["effects"])
         return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged, *of.reading))
-    if body["verdict"] == "undecided" and body["file"]:
-        return pasted("plan", "--from", body["file"], "-o", "plan")
     if body["verdict"] == "undecided":
-        fly = body["next_maneuver"] or {}
-        return f"{fly['command']} --axis {axis} -o plan" if "command" in fly else typed_with("-o", "diagnosis.yaml")
+        return _deciding(body, axis)
     if body["verdict"] == "unexplained":
-        return pasted("effects", "new", "unexplained", "--axis", axis)
+        longer = ("--thorough", *(("--force",) if body["file"] or body["figure"] else ()))
+        return pasted("effects", "new", "unexplained", "--axis", axis) if of.thorough else typed_with(*longer)
     if body["verdict"] == "disturbed":
         known = ("--effects", ",".join(body["known"])) if body["known"] else ()
         joint = ("--joint",) if len(of.runs) > 1 else ()
         return pasted("identify", of.runs, "--axis", axis, *joint, *known, "--method", "pem", *of.reading, "-o", "models_pem/")
     return _on_model(of, axis, lambda model: used(axis, model))
+
+
+def _deciding(body: Body, axis: str) -> str:
+    """Return how a maneuver is planned that tells the rivals apart."""
+    if body["file"]:
+        return pasted("plan", "--from", body["file"], "-o", "plan")
+    fly = body["next_maneuver"] or {}
+    return f"{fly['command']} --axis {axis} -o plan" if "command" in fly else typed_with("-o", "diagnosis.yaml")
 
 
 def _on_model(of: Searched, axis: str, then: Callable[[str], str]) -> str:
