@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
@@ -11,13 +12,16 @@ from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, is_noise, na
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
 from fieldsid.rounding import number
 
+MANY = 100.0
+"""Times the noise from which on a log has none to speak of, as one of a towing tank or a simulation."""
+
 
 def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
     """Return the parameters and what is left; files: of each fit."""
     fits, axis = body["fits"], str(body["axis"])
     over = [over_noise(f, f["noise_floor"]) for f in fits]
     most = max(range(len(fits)), key=lambda i: over[i])
-    left = f"what is left is {over[most]:.2f} x the noise" + ("" if is_noise(over[most]) else ": something is missing")
+    left = _left(over[most], fits[most])
     if len(fits) == 1:
         says = f"{_parameters(fits[0])}; {left}"
     else:
@@ -27,6 +31,14 @@ def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
     methods = ", ".join(sorted({str(f["method"]) for f in fits}))
     rests = f"{counted(len(runs), 'run')} fitted to, {seconds:.0f} s of {named([str(r['run']) for r in runs])}; {methods}"
     return Headline(says, rests, _after_fit(body, axis, over, files))
+
+
+def _left(over: float, fit: Body) -> str:
+    """Return what a fit leaves; of a log without noise, whose floor is that of its digits, how well it follows."""
+    if over >= MANY:
+        followed = (f"{n} fit {fit[f'{n}_fit_percent']:.1f} %" for n in ("angle", "rate") if isfinite(fit[f"{n}_fit_percent"]))
+        return f"{', '.join(followed)}, of a log with next to no noise: something is missing"
+    return f"what is left is {over:.2f} x the noise" + ("" if is_noise(over) else ": something is missing")
 
 
 def _parameters(fit: Body) -> str:
@@ -61,7 +73,8 @@ def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Head
     entries, axis = body["runs"], str(body["axis"])
     worst = max(entries, key=_leading)
     channel = worst["judged_by"]
-    says = f"{worst['run']}: {channel} error {_leading(worst):.2f} x its noise, fit {worst[f'{channel}_fit_percent']:.1f} %"
+    over = f"{_leading(worst):.2f} x its noise, " if _leading(worst) < MANY else ""
+    says = f"{worst['run']}: {channel} {f'error {over}' if over else ''}fit {worst[f'{channel}_fit_percent']:.1f} %"
     if worst["failing"]:
         says += f"; fails most at {shown_words(worst['where'][0]['condition'])}" if worst["where"] else ""
     else:
