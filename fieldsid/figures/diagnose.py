@@ -40,7 +40,8 @@ def figure(found: Diagnosis) -> Figure:
     """Return a sheet with the candidates at the left and where the model fails at the right."""
     sheet = canvas.sheet(13.0, 6.4)
     left, right = sheet.subplots(1, 2, width_ratios=(1.25, 1.0))
-    sure = f", probability {probability(found.candidates[0].probability)}" if found.effects else ""
+    chances = [c.probability for c in found.candidates]
+    sure = f", probability {probability(chances[0])}" if found.effects and chances[0] == max(chances) else ""
     says = f"{found.axis.value}, {found.verdict}: {found.says}{sure}"
     sheet.suptitle(fill(says, TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
     draw(bars_of(found), left)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
 
 MOST_PLACES, MOST_SPOKEN = 5, 3
 NAME_WIDTH = 30
+MANY = 100.0
+"""Times the noise floor from which on decimals say nothing."""
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
@@ -223,4 +224,6 @@ def _render_maneuver(to: Console, found: Diagnosis) -> None:
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.2f}" if isfinite(ratio) else "-"
+    from fieldsid.rounding import number
+
+    return f"{ratio:.2f}" if ratio < MANY else number(ratio, 3)

@@ -20,7 +20,7 @@ from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from fieldsid.online.identifier import OnlineIdentifier
-    from fieldsid.online.progress import Goal
+    from fieldsid.online.progress import Goal, Watch
     from fieldsid.online.samples import MessageReader, Sample
 
 SOURCE, GOAL = "Where the samples come from", "What is to be reached"
@@ -124,11 +124,14 @@ def command(
     _check_source(log, udp, follow=follow)
     feed = _Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
     goals, goals_from = _goals(axis, plan, want)
-    identifier, skipped = _begun(feed, state, bandwidth, forgetting)
+    from fieldsid.online.progress import Watch
+
+    watch = Watch(goals(float("nan")))
+    identifier, skipped = _begun(feed, state, watch, bandwidth, forgetting)
     body: Mapping[str, Any] = {}
     with _shown(as_json=as_json) as show:
         try:
-            for body in _looks(feed, identifier, goals, goals_from, every, state, skipped):
+            for body in _looks(feed, identifier, watch, goals, goals_from, every, state, skipped):
                 show(body)
                 if until_enough and body["verdict"] == "enough":
                     break
@@ -137,7 +140,7 @@ def command(
                 raise
         finally:
             if state is not None:
-                _save(state, identifier, feed.name)
+                _save(state, identifier, watch, feed.name)
     if not as_json:
         _end(body)
     if until_enough and body["verdict"] != "enough":
@@ -227,17 +230,18 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
 
 
-def _begun(feed: _Feed, state: Path | None, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
+def _begun(feed: _Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
     """Return the identifier, from its state where there is one, and the time up to which the source is known to it."""
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.state_file import load_state
 
     if state is None or not state.exists():
         return OnlineIdentifier(feed.axis, bandwidth=bandwidth, forgetting=forgetting), -inf
-    identifier, source = load_state(state, feed.axis)
+    identifier, source = load_state(state, feed.axis, watch)
     say(f"going on from `{state}`: {identifier.estimate().used} samples up to {identifier.time:.1f} s of `{source}`")
     if feed.is_log and source == feed.name and isfinite(identifier.time):
         return identifier, identifier.time
+    watch.forget()
     if source != feed.name:
         identifier.begin_again()
     return identifier, -inf
@@ -246,6 +250,7 @@ def _begun(feed: _Feed, state: Path | None, bandwidth: float, forgetting: float)
 def _looks(
     feed: _Feed,
     identifier: OnlineIdentifier,
+    watch: Watch,
     goals: Callable[[float], Mapping[str, Goal]],
     goals_from: str,
     every: float,
@@ -256,9 +261,7 @@ def _looks(
     import time as clock
 
     from fieldsid.online.look import look_body
-    from fieldsid.online.progress import Watch
 
-    watch = Watch(goals(float("nan")))
     due, saved, fresh = -inf, clock.monotonic(), True
 
     def look() -> Mapping[str, Any]:
@@ -279,16 +282,16 @@ def _looks(
                 yield look()
                 fresh = False
             if state is not None and clock.monotonic() - saved >= SAVE_EVERY_S:
-                _save(state, identifier, feed.name)
+                _save(state, identifier, watch, feed.name)
                 saved = clock.monotonic()
     if fresh:
         yield look()
 
 
-def _save(state: Path, identifier: OnlineIdentifier, source: str) -> None:
+def _save(state: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> None:
     from fieldsid.online.state_file import save_state
 
-    save_state(state, identifier, source)
+    save_state(state, identifier, watch, source)
 
 
 @contextmanager

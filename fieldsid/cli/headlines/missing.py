@@ -33,14 +33,21 @@ class Searched:
 
 def of_diagnosis(body: Body, searched: Searched) -> Headline:
     """Return the verdict with its numbers and probability."""
-    first = body["candidates"][0] if body["candidates"] else None
-    sure = f", probability {probability(first['probability'])}" if first and body["verdict"] in ("effect", "undecided") else ""
+    sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
     judged = named(body["validation_runs"]) if body["validation_runs"] else "a part of them held back"
     rests = (
         f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
         f"{counted(len(body['candidates']), 'hypothesis').replace('hypothesiss', 'hypotheses')} compared"
     )
     return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
+
+
+def _sure(body: Body) -> str:
+    """Return how probable the first candidate is; the evidence is no judge where it is for another, as in a log without noise."""
+    first, *others = (float(c["probability"]) for c in body["candidates"])
+    if any(p > first for p in others):
+        return "; named by the error on unseen runs, not by the evidence"
+    return f", probability {probability(first)}"
 
 
 def _short(body: Body) -> str:
