@@ -70,7 +70,7 @@ def test_where_an_addition_is_not_kept_the_next_command_is_about_the_parent(run_
     body = run_cli("extend", parent, *two_missing.train, "--add", "gyro_scale", "--json").json
     assert not body["kept"]
     assert body["left"]["fitted"] > 1.15
-    assert shlex.split(body["next"])[-2:] == ["--model", str(parent)]
+    assert shlex.split(body["next"])[-3:] == ["--model", str(parent), "--thorough"]
 
 
 def test_at_the_noise_the_next_command_uses_the_model(run_cli, logs, parent):

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 MOST_PLACES, MOST_SPOKEN = 5, 3
 NAME_WIDTH = 30
-MANY = 100.0
-"""Times the noise floor from which on decimals say nothing."""
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
@@ -138,8 +136,8 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
 
     to.print(_candidates(found))
     floor = found.noise_floor
-    times, angle = shown_in("rad")
-    noise = f"{number(times * floor.angle, 2)} {angle} and {number(times * floor.rate, 2)} {angle}/s"
+    factor, angle = shown_in("rad")
+    noise = f"{number(factor * floor.angle, 2)} {angle} and {number(factor * floor.rate, 2)} {angle}/s"
     to.print(
         Text(f"fitted, unseen: free-run error of those runs over the noise floor, {noise}; evidence: log, over the first row")
     )
@@ -153,17 +151,18 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
 
 
 def _candidates(found: Diagnosis) -> Any:
+    from fieldsid.cli.headlines.words import times
     from fieldsid.rounding import probability
 
     floor = found.noise_floor
     judged = found.base.validation.over(floor)
-    rows = [("as it is", "", _times(found.base.train.over(floor)), _times(judged), "", "")]
+    rows = [("as it is", "", times(found.base.train.over(floor)), times(judged), "", "")]
     rows += [
         (
             fill(c.effect.replace("+", " +"), NAME_WIDTH),
             probability(c.probability),
-            _times(c.errors.train.over(floor)),
-            _times(c.errors.validation.over(floor)),
+            times(c.errors.train.over(floor)),
+            times(c.errors.validation.over(floor)),
             "worse" if c.worse else f"{100 * c.explained:.0f} %",
             f"{c.score:+.0f}",
         )
@@ -221,9 +220,3 @@ def _render_maneuver(to: Console, found: Diagnosis) -> None:
         to.print()
         note = f"; {fly['note']}" if "note" in fly else ""
         to.print(Text(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}"))
-
-
-def _times(ratio: float) -> str:
-    from fieldsid.rounding import number
-
-    return f"{ratio:.2f}" if ratio < MANY else number(ratio, 3)

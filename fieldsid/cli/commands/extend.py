@@ -142,7 +142,8 @@ def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], valid
     if more:
         reading = ("--mapping", mapping) if mapping is not None else ()
         judged = repeated("--validate", validate)
-        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *reading)
+        longer = () if body["kept"] else ("--thorough",)  # what was named by the usual search has not paid
+        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *reading, *longer)
     else:
         command = used(body["axis"], body["model"])
     return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}

@@ -26,6 +26,8 @@ NAMES = {
     "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping",
 }  # fmt: skip
 ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule")
+MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
+"""Files that hold several of what they are named after, and words whose plural is their own."""
 MOST_SOURCES = 2
 LAST = 3
 
@@ -79,7 +81,9 @@ def _verdict(state: FolderState) -> str:
 
 
 def _many(count: int, name: str) -> str:
-    return f"{count} {name}" if count == 1 or name in ("laws", "gains", "diagnosis") else f"{count} {name}s"
+    if name in MANY_IN_ONE:
+        return name if count == 1 else f"{count} files of {name}"
+    return f"1 {name}" if count == 1 else f"{count} {SEVERAL.get(name, name + 's')}"
 
 
 def _entry(item: Item) -> dict[str, Any]:

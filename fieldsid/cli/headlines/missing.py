@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, is_noise, named, used
+from fieldsid.cli.headlines.words import Body, counted, is_noise, named, times, used
 from fieldsid.rounding import probability
 
 MODELS = "models"
@@ -121,7 +121,7 @@ def of_extension(body: Body) -> Headline:
     before, after = body["over_floor"]["before"], body["over_floor"]["after"]
     word = "kept" if body["pays"] else "kept because of --keep" if body["kept"] else "not kept"
     where = "unseen data" if body["unseen"] else "the runs fitted to"
-    says = f"{'+'.join(body['added'])} {word}: the error on {where} goes from {before:.2f} to {after:.2f} x the noise floor"
+    says = f"{'+'.join(body['added'])} {word}: the error on {where} goes from {times(before)} to {times(after)} x the noise floor"
     fitted = counted(len(body["learned_on"]), "run")
     return Headline(says, f"{fitted} fitted to ({named(body['learned_on'])}), judged by {named(body['judged_on'])}", body["next"])
 
@@ -165,6 +165,6 @@ def of_new_effect(body: Body, look: str) -> Headline:
 def left_says(body: Body) -> str:
     """Return what the model as it now is leaves."""
     sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
-    said = ", ".join(f"{error:.2f} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    said = ", ".join(f"{times(error)} x the noise floor on {name}" for name, error in sides if isfinite(error))
     quiet = all(is_noise(error) for _, error in sides if isfinite(error))
     return f"left: {said}: " + ("that is the noise" if quiet else "more is missing than the sensors' noise explains")

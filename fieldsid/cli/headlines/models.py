@@ -8,12 +8,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, is_noise, named, over_noise, used
+from fieldsid.cli.headlines.words import MANY, MOST_NAMED, Body, counted, is_noise, named, over_noise, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
 from fieldsid.rounding import number
-
-MANY = 100.0
-"""Times the noise from which on a log has none to speak of, as one of a towing tank or a simulation."""
 
 
 def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:

@@ -7,11 +7,14 @@ from math import isfinite
 from typing import Any
 
 from fieldsid.cli.headlines.typed import pasted
+from fieldsid.rounding import number
 
 Body = Mapping[str, Any]
 USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
 """What a model is for once it leaves no more than the noise."""
 MOST_NAMED = 3
+MANY = 100.0
+"""Times the noise from which on a log has none to speak of, as one of a towing tank or a simulation."""
 
 
 def counted(count: int, word: str) -> str:
@@ -29,6 +32,11 @@ def over_noise(errors: Body, floor: Body) -> float:
     """Return the worse channel's free-run error over its noise; NaN where neither was measured."""
     pairs = ((errors["angle_rms_rad"], floor["angle_rad"]), (errors["rate_rms_rad_s"], floor["rate_rad_s"]))
     return max((float(e) / float(f) for e, f in pairs if e and f and isfinite(e) and isfinite(f)), default=float("nan"))
+
+
+def times(over: float) -> str:
+    """Return an error over the noise floor; far above it decimals say nothing."""
+    return f"{over:.2f}" if over < MANY else number(over, 3)
 
 
 def is_noise(over: float) -> bool:
