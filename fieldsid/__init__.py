@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from fieldsid._version import __version__
 
 if TYPE_CHECKING:
+    from fieldsid.change.record import Change
     from fieldsid.comparison.compare import Comparison
     from fieldsid.diagnosis import Candidate, Diagnosis
     from fieldsid.errors import FieldsidError
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from fieldsid.face.gains import design_schedule, fit_laws, turn_radius, verify_schedule
     from fieldsid.face.runs import load
     from fieldsid.face.several import Several
+    from fieldsid.face.trial import compare_models, report
     from fieldsid.fitting.fit import Fit
     from fieldsid.logs import Run
     from fieldsid.models.axis import Axis
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from fieldsid.turning import Laws, TurnPrediction
 
 _ROOMS = {
+    "fieldsid.change.record": ("Change",),
     "fieldsid.comparison.compare": ("Comparison",),
     "fieldsid.diagnosis": ("Candidate", "Diagnosis"),
     "fieldsid.errors": ("FieldsidError",),
@@ -45,6 +48,7 @@ _ROOMS = {
     "fieldsid.face.gains": ("design_schedule", "fit_laws", "turn_radius", "verify_schedule"),
     "fieldsid.face.runs": ("load",),
     "fieldsid.face.several": ("Several",),
+    "fieldsid.face.trial": ("compare_models", "report"),
     "fieldsid.fitting.fit": ("Fit",),
     "fieldsid.logs": ("Run",),
     "fieldsid.models.axis": ("Axis",),
@@ -56,10 +60,10 @@ _ROOMS = {
 """Where the names are: the same as above, which is for mypy and editors alone."""
 
 __all__ = [
-    "Axis", "Candidate", "Comparison", "Diagnosis", "Extension", "FieldsidError", "Fit", "Laws", "Model", "OnlineEstimate",
-    "OnlineIdentifier", "Run", "Schedule", "Several", "TurnPrediction", "Verification", "__version__", "compare",
-    "design_schedule", "diagnose", "extend", "fit_laws", "identify", "load", "load_model", "save", "turn_radius",
-    "verify_schedule",
+    "Axis", "Candidate", "Change", "Comparison", "Diagnosis", "Extension", "FieldsidError", "Fit", "Laws", "Model",
+    "OnlineEstimate", "OnlineIdentifier", "Run", "Schedule", "Several", "TurnPrediction", "Verification", "__version__",
+    "compare", "compare_models", "design_schedule", "diagnose", "extend", "fit_laws", "identify", "load", "load_model",
+    "report", "save", "turn_radius", "verify_schedule",
 ]  # fmt: skip
 
 

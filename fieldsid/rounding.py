@@ -56,6 +56,11 @@ def number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
+def probability(p: float) -> str:
+    """Return a probability to three digits, and which side of the last one it is on: `0.982`, `> 0.999`."""
+    return f"{p:.3f}" if 0.001 <= p <= 0.999 else "< 0.001" if p < 0.001 else "> 0.999"
+
+
 def in_unit(unit: str) -> str:
     """Return a unit as it is printed behind a number: nothing where the number is a plain one, whose unit is 1."""
     return "" if unit == "1" else unit

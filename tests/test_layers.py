@@ -19,7 +19,7 @@ ORDER = (
     "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
-    "trial_folder", "change", "report", "figures", "views", "face",
+    "trial_folder", "change", "reporting", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""
@@ -35,7 +35,7 @@ SUB_ROOMS = {
     "plant": ("laws",),
     "turning": ("measured", "steady", "maneuvering"),
     "schedule": ("flown",),
-    "cli": ("help", "live", "trial", "commands"),
+    "cli": ("help", "headlines", "live", "trial", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its
 entry and what its folders share: of them, as of all files, no two import each other by any way round."""
@@ -204,7 +204,7 @@ def test_a_heavy_library_is_known_in_its_room_only(library):
         ("models", "from fieldsid.estimators import fit"),
         ("errors", "import fieldsid.cli.app"),
         ("logs", "from fieldsid import figures"),
-        ("models", "def f():\n    from fieldsid.report import page"),
+        ("models", "def f():\n    from fieldsid.reporting import page"),
         ("logs", "from . import run"),
         ("models", "from importlib import import_module\nimport_module('fieldsid.cli.app')"),
         ("schedule", "from fieldsid.cli.commands import plan"),

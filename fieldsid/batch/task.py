@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldsid._version import __version__
+from fieldsid.logs.load import MAPPING_FILE
 
 QUESTION = 1
 """Version of what is asked: raised where a row would come out differently."""
@@ -37,7 +38,9 @@ class Task:
     @property
     def key(self) -> str:
         """What tells this task from others: the log's place, size and change, the question, and the files that say more."""
-        named = (self.settings.mapping, self.settings.vehicle)
+        found = Path(self.log).parent / MAPPING_FILE  # what a log is read with where no mapping is named
+        picked_up = next((str(p) for p in (Path(MAPPING_FILE), found) if p.is_file()), None)
+        named = (self.settings.mapping or picked_up, self.settings.vehicle)
         said = [Path(name).read_text(encoding="utf-8", errors="replace") if name else "" for name in named]
         parts = [QUESTION, __version__, str(Path(self.log).resolve()), *_stamp(Path(self.log)), asdict(self.settings), said]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import degrees
 from typing import Any
 
-from fieldsid.display import Brief
+from fieldsid.display import Brief, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.numerics.arrays import FloatArray
@@ -116,7 +116,7 @@ class Answers(Brief):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Change(Brief):
+class Change(Plotted):
     """What has changed on one axis, of the parameters, the effects, the gains and the radius; `verdict` is a key of VERDICTS."""
 
     axis: Axis

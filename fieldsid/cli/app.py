@@ -77,8 +77,10 @@ def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     from fieldsid.cli.programs import program_of
 
     program, words, name = program_of(arguments)
+    from fieldsid.cli.headlines.typed import remember
     from fieldsid.cli.user_effects import load_own_effects
 
+    remember(arguments)
     if "--help" not in arguments:
         load_own_effects()
     return program(words, prog_name=name, standalone_mode=False, obj=session)

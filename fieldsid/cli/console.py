@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fieldsid.artifacts import plain
+from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
 
@@ -32,13 +33,37 @@ def messages() -> Console:
     return _console(stderr=True)
 
 
-def emit(body: Mapping[str, Any], *, as_json: bool, render: Callable[[Console], None]) -> Mapping[str, Any]:
-    """Print the body as one JSON object, or let `render` print it for a reader; return the body."""
+def emit(
+    body: Mapping[str, Any],
+    *,
+    as_json: bool,
+    render: Callable[[Console], None],
+    headline: Headline | None = None,
+    notes: Iterable[Note] = (),
+) -> Mapping[str, Any]:
+    """Print a result and return its body: as one JSON object, or for a reader.
+
+    A reader gets the headline, then the notes as warnings, then what `render` prints. Only what is no result, as a page of the
+    guide, has no headline.
+    """
+    whole = body if headline is None else {**body, "headline": headline.record()}
     if as_json:
-        sys.stdout.write(json.dumps(plain(body), allow_nan=False) + "\n")
-    else:
-        render(out())
-    return body
+        sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
+        return whole
+    to = out()
+    if headline is not None:
+        print_headline(to, headline)
+        warn(notes)
+        to.print()
+    render(to)
+    return whole
+
+
+def print_headline(to: Console, headline: Headline) -> None:
+    """Print the first lines of a result, each whole on a line of its own: they are read, and pasted."""
+    for i, line in enumerate(headline.lines):
+        to.print(Text(line, style="bold" if i == 0 else ""), soft_wrap=True)
+    to.file.flush()
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, left: int = 1) -> Table:

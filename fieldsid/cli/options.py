@@ -9,6 +9,10 @@ import typer
 
 from fieldsid.models.axis import Axis
 
+READ, LIMITS, WRITTEN, ANSWER = "What is read", "Limits", "What is written", "How it answers"
+GROUPS = ("Arguments", "Options", READ, LIMITS, WRITTEN, ANSWER)
+"""The groups of options on a command's page of help, in their order; what a command alone has may have groups of its own."""
+
 RunFiles = Annotated[
     list[Path],
     typer.Argument(
@@ -21,15 +25,22 @@ ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file w
 ModelFiles = Annotated[list[Path], typer.Argument(metavar="MODEL...", help="Model files, or one table of parameters over speed.")]
 ValidateRuns = Annotated[
     list[Path] | None,
-    typer.Option("--validate", metavar="RUN", help="A run the fit does not see; may repeat.", show_default=False),
+    typer.Option(
+        "--validate", metavar="RUN", help="A run the fit does not see; may repeat.", show_default=False, rich_help_panel=READ
+    ),
 ]
 AxisOption = Annotated[Axis, typer.Option("--axis", help="The plane to identify.")]
 MappingFile = Annotated[
     Path | None,
-    typer.Option("--mapping", "-m", metavar="YAML", help="Which column or topic is which signal.", show_default=False),
+    typer.Option(
+        "--mapping", "-m", metavar="YAML", help="Which column or topic is which signal.", show_default=False, rich_help_panel=READ
+    ),
 ]
 VehicleFile = Annotated[
-    Path | None, typer.Option("--vehicle", metavar="YAML", help="The vehicle's description and limits.", show_default=False)
+    Path | None,
+    typer.Option(
+        "--vehicle", metavar="YAML", help="The vehicle's description and limits.", show_default=False, rich_help_panel=READ
+    ),
 ]
 EffectNames = Annotated[
     str | None,
@@ -37,17 +48,36 @@ EffectNames = Annotated[
 ]
 FigureFile = Annotated[
     Path | None,
-    typer.Option("--figure", metavar="FILE", help="Draw a figure: .png, .svg or .pdf, by the suffix.", show_default=False),
+    typer.Option(
+        "--figure",
+        metavar="FILE",
+        help="Draw a figure: .png, .svg or .pdf, by the suffix.",
+        show_default=False,
+        rich_help_panel=WRITTEN,
+    ),
 ]
-FromS = Annotated[float | None, typer.Option("--from", metavar="S", help="Use samples from this time on.", show_default=False)]
-ToS = Annotated[float | None, typer.Option("--to", metavar="S", help="Use samples up to this time.", show_default=False)]
+FromS = Annotated[
+    float | None,
+    typer.Option("--from", metavar="S", help="Use samples from this time on.", show_default=False, rich_help_panel=READ),
+]
+ToS = Annotated[
+    float | None, typer.Option("--to", metavar="S", help="Use samples up to this time.", show_default=False, rich_help_panel=READ)
+]
 OutputDir = Annotated[
-    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder for what is written.", show_default=False)
+    Path | None,
+    typer.Option(
+        "-o", "--output", metavar="DIR", help="Folder for what is written.", show_default=False, rich_help_panel=WRITTEN
+    ),
 ]
-OutputFile = Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False)]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
-JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures next to the files that are written.")]
+OutputFile = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False, rich_help_panel=WRITTEN),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that exist.", rich_help_panel=WRITTEN)]
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.", rich_help_panel=ANSWER)]
+Figures = Annotated[
+    bool, typer.Option("--figures/--no-figures", help="Draw figures next to the files that are written.", rich_help_panel=WRITTEN)
+]
 
 
 def names_of(text: str | None) -> tuple[str, ...]:

@@ -20,12 +20,16 @@ def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
         raise _unknown(name, tuple(known))
     import typer
 
+    from fieldsid.cli.help.command_page import CommandPage
+
     module = import_module(known[name].module)
     program = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     if isinstance(module.command, typer.Typer):
+        for leaf in module.command.registered_commands:
+            leaf.cls = CommandPage
         program.add_typer(module.command, name=name)
         return program, list(arguments), "sysid"
-    program.command(name)(module.command)
+    program.command(name, cls=CommandPage)(module.command)
     return program, list(arguments[1:]), f"sysid {name}"
 
 

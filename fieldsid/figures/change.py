@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fieldsid.change.record import Answers, Change, GainChange, ParameterChange
+from fieldsid.change.record import CHANGED, Answers, Change, GainChange, ParameterChange
 from fieldsid.figures import canvas
 
+TITLE_WIDTH = 100
+MOST_TIMES = 3.0
+"""A band beyond so many times the gains is cut: it says that they are not known, however far it goes."""
 BEFORE, AFTER = canvas.SECOND, canvas.SIMULATED
 
 
 def figure(found: Change, names: tuple[str, str]) -> Figure:
     """Return a sheet: the answers to the same fin over each other, the changes in per cent, and the gains before and after."""
     sheet = canvas.sheet(11.0, 7.0)
-    sheet.suptitle(found.line, x=0.01, ha="left", fontsize=12, fontweight="bold")
+    sheet.suptitle(fill(found.line, TITLE_WIDTH), x=0.01, ha="left", fontsize=12, fontweight="bold")
     shown = [p for p in found.parameters if p.is_relative and np.isfinite(p.std_error)]
     halves = sheet.subfigures(2, 1, squeeze=False, height_ratios=(1.15, 1.0))
     top, bottom = halves[0, 0], halves[1, 0]
     if found.answers is not None:
         _draw_answers(found.answers, top.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0)), names)
-    axes = bottom.subplots(1, 2 if found.gains else 1, squeeze=False)[0]
-    draw(shown, axes[0])
+    panels = bottom.subplots(1, max(bool(shown) + bool(found.gains), 1), squeeze=False)[0]
+    if shown:
+        draw(shown, panels[0])
     if found.gains:
-        _draw_gains(found.gains, axes[1])
+        _draw_gains(found.gains, panels[-1])
+    elif not shown:
+        panels[0].set_axis_off()
     return sheet
 
 
@@ -46,7 +54,13 @@ def draw(parameters: list[ParameterChange], ax: Axes) -> None:
         ax.plot([100 * change], [place], marker="o", markersize=size, color=color)
     ax.set_yticks(places, [r[0] for r in rows])
     ax.margins(y=0.1)
-    canvas.dress(ax, x="change, %, with 95 % interval", title="parameters: what changed beyond its error")
+    canvas.dress(ax, x="change, %, with 95 % interval", title=_what_changed(parameters))
+
+
+def _what_changed(parameters: list[ParameterChange]) -> str:
+    """Return which parameters have changed beyond their errors."""
+    changed = [p.word for p in parameters if p.state == CHANGED]
+    return f"beyond its error changed: {', '.join(changed) or 'nothing'}"
 
 
 def _draw_answers(both: Answers, axes: np.ndarray, names: tuple[str, str]) -> None:
@@ -64,7 +78,13 @@ def _draw_gains(gains: tuple[GainChange, ...], ax: Axes) -> None:
     ax.plot(speeds, [g.old for g in gains], marker="o", color=BEFORE, label="before")
     low, high = ([(1 + g.interval95[i]) * g.old for g in gains] for i in (0, 1))
     ax.fill_between(speeds, low, high, color=AFTER, alpha=0.18, linewidth=0)
+    ax.vlines(speeds, low, high, color=AFTER, alpha=0.5, linewidth=1.2)  # a band over one speed has no width
     ax.plot(speeds, [g.new for g in gains], marker="o", color=AFTER, label="after, 95 % band")
-    ax.margins(y=0.25)
-    canvas.dress(ax, x="speed, m/s", y="kp, rad/rad", title="gain that would be designed")
+    ax.margins(x=0.15, y=0.25)
+    known = [v for v in (*(g.old for g in gains), *(g.new for g in gains)) if np.isfinite(v)]
+    reach = MOST_TIMES * max((abs(v) for v in known), default=1.0)
+    ax.set_ylim(*np.clip(ax.get_ylim(), -reach, reach))
+    least, most = (f([100 * g.change for g in gains]) for f in (min, max))
+    span = f"{least:+.0f} %" if round(least) == round(most) else f"{least:+.0f} to {most:+.0f} %"
+    canvas.dress(ax, x="speed, m/s", y="kp, rad/rad", title=f"the gain that would be designed changes by {span}")
     canvas.legend_above(ax)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, isfinite
+from textwrap import fill
 
 from matplotlib.figure import Figure, SubFigure
 
@@ -13,6 +14,7 @@ from fieldsid.models.model import Model
 from fieldsid.rounding import number
 
 MOST_BARS = 12
+TITLE_WIDTH = 44
 
 
 def figure(found: Comparison, model: Model, name: str) -> Figure:
@@ -38,12 +40,9 @@ def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
     for channel, ax in zip(failing, right.subplots(len(failing), 1, squeeze=False)[:, 0], strict=True):
         shown = channel.where[: MOST_BARS // len(failing)]
         where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in shown], ax)
-        says = f"where the error of the {channel.name} falls"
-        ax.set_title(
-            f"{says}\n({channel.over_floor:.1f} x its noise; label: rms there over the whole run's)",
-            loc="left",
-            fontsize=10,
-        )
+        says = f"the {channel.name} fails most at {shown[0].condition}" if shown else f"where the {channel.name} fails"
+        how = f"{channel.over_floor:.1f} x its noise; beside a bar: rms there\nover that of the whole run"
+        ax.set_title(f"{fill(says, TITLE_WIDTH)}\n{how}", loc="left", fontsize=10)
 
 
 def view_of(found: Comparison) -> motion.MotionView:

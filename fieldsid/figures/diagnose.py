@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from fieldsid.diagnosis import Diagnosis
 from fieldsid.figures import canvas, where
+from fieldsid.rounding import probability
 
 MOST_BARS = 10
 TITLE_WIDTH = 150
@@ -39,12 +40,14 @@ def figure(found: Diagnosis) -> Figure:
     """Return a sheet with the candidates at the left and where the model fails at the right."""
     sheet = canvas.sheet(13.0, 6.4)
     left, right = sheet.subplots(1, 2, width_ratios=(1.25, 1.0))
-    sheet.suptitle(fill(f"{found.axis.value}, {found.verdict}: {found.says}", TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
+    chances = [c.probability for c in found.candidates]
+    sure = f", probability {probability(chances[0])}" if found.effects and chances[0] == max(chances) else ""
+    says = f"{found.axis.value}, {found.verdict}: {found.says}{sure}"
+    sheet.suptitle(fill(says, TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
     draw(bars_of(found), left)
     where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in found.where[:MOST_BARS]], right)
-    right.set_title(
-        "share of the base model's error by condition\n(label: rms there over the whole run's)", loc="left", fontsize=10
-    )
+    most = f"the model as it is fails most at {found.where[0].condition}" if found.where else "the model as it is fails nowhere"
+    right.set_title(f"{most}\nbeside a bar: rms there over that of the whole run", loc="left", fontsize=10)
     return sheet
 
 
@@ -97,8 +100,4 @@ def words_of(b: Bar, error: float) -> str:
     if b.probability is None:
         return f"{error:.2f} x"
     does = "worse" if b.worse else f"{100 * b.explained:.0f} % explained"
-    return f"{error:.2f} x, {does}, probability {_chance(b.probability)}"
-
-
-def _chance(p: float) -> str:
-    return f"{p:.2f}" if p >= 0.005 else "below 0.01"
+    return f"{error:.2f} x, {does}, probability {probability(b.probability)}"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 
 from fieldsid.figures import canvas
 from fieldsid.models.axis import Axis
@@ -16,6 +17,7 @@ from fieldsid.planning.output.figure_data import LegFigure
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
 LIMIT: dict[str, Any] = {"color": "#B2182B", "linewidth": 1.1, "linestyle": (0, (4, 2))}
+AREA = "#EAF1F7"
 MOST_LEGS = 6
 
 
@@ -30,7 +32,7 @@ def draw_command(view: LegFigure, ax: Axes) -> None:
     """Draw the fin in deg, solid where it is commanded, thin where the autopilot is expected to have it."""
     canvas.dress(ax, y=f"{'rudder' if view.axis is Axis.YAW else 'elevator'}, deg", title=view.title)
     fin, ours = np.degrees(view.fin), view.autopilot < 0.5
-    ax.step(view.time, fin, where="post", color="0.25", linewidth=0.9, linestyle=":", label="autopilot")
+    ax.step(view.time, fin, where="post", color="0.1", linewidth=1.1, linestyle=":", label="autopilot steers")
     ax.step(view.time, np.where(ours, fin, np.nan), where="post", color=canvas.SECOND, linewidth=1.6, label="commanded")
     most = float(np.degrees(view.envelope.fin))
     for side in (-most, most):
@@ -44,8 +46,8 @@ def draw_angle(view: LegFigure, ax: Axes) -> None:
     yaw = view.axis is Axis.YAW
     canvas.dress(ax, y=f"{'heading' if yaw else 'pitch'}, deg", title=_errors(view))
     low, inner_low, inner_high, high = np.degrees(view.band)
-    ax.fill_between(view.time, low, high, color=canvas.SIMULATED, alpha=0.15, linewidth=0, label="95 %")
-    ax.fill_between(view.time, inner_low, inner_high, color=canvas.SIMULATED, alpha=0.3, linewidth=0, label="68 %")
+    ax.fill_between(view.time, low, high, color=canvas.SIMULATED, alpha=0.15, linewidth=0, label="95 % of the draws")
+    ax.fill_between(view.time, inner_low, inner_high, color=canvas.SIMULATED, alpha=0.3, linewidth=0, label="68 % of the draws")
     ax.plot(view.time, np.degrees(view.angle), color=canvas.SIMULATED, linewidth=1.4, label="expected")
     limit = view.envelope.heading if yaw else view.envelope.pitch
     if limit is not None:
@@ -64,14 +66,27 @@ def draw_track(view: LegFigure, ax: Axes) -> None:
         ax.plot(along, across, color=canvas.QUIET, linewidth=0.6, label="_" if i else "draw of the prior")
     ax.plot(view.along, view.across, color=canvas.SIMULATED, linewidth=1.5)
     ax.plot(view.along[:1], view.across[:1], marker="o", color=canvas.SECOND, markersize=5)
-    rooms = view.envelope.rooms()
-    room = min((rooms[k] for k in (("track", "across") if yaw else ("depth",)) if k in rooms), default=None)
-    if room is not None:
-        for side in (-room, room):
-            ax.axhline(side, **LIMIT)
+    room = view.envelope.track if yaw else view.envelope.depth_room()
+    for side in () if room is None else (-room, room):
+        ax.axhline(side, **LIMIT)
+    _draw_area(view, ax)
     if yaw:
         ax.set_aspect("equal", adjustable="datalim")
     ax.invert_yaxis()
+
+
+def _draw_area(view: LegFigure, ax: Axes) -> None:
+    """Draw the area there is: it begins where the run-up does; its width is seen from above alone."""
+    length, width = view.envelope.area_length, view.envelope.area_width
+    begin = -view.run_up_m
+    if view.axis is Axis.YAW and length is not None and width is not None:
+        ax.add_patch(Rectangle((begin, -0.5 * width), length, width, facecolor=AREA, edgecolor="none", zorder=0))
+        ax.autoscale_view()
+    for end in () if length is None else (begin, begin + length):
+        ax.axvline(end, **LIMIT)
+    if view.axis is Axis.YAW and width is not None:
+        for side in (-0.5, 0.5):
+            ax.axhline(side * width, **LIMIT)
 
 
 def save_plan_figure(
@@ -87,10 +102,13 @@ def save_plan_figure(
         ax.set_xlabel(label)
     handles = [h for ax in grid[0] for h in ax.get_legend_handles_labels()[0]]
     handles.append(Line2D([], [], label="limit", **LIMIT))
+    if any(v.envelope.area_length is not None for v in shown):
+        handles.append(Patch(color=AREA, label="area"))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False, fontsize=9)
     return canvas.save(figure, path, force=force, tasks=tasks)
 
 
 def _errors(view: LegFigure) -> str:
     """Return the expected errors in words."""
-    return "std errors bought: " + "  ".join(f"{name} {error}" for name, error in view.errors.items()) if view.errors else ""
+    known = ", ".join(f"{name} {error}" for name, error in view.errors.items())
+    return f"known afterwards to {known} (std error)" if known else ""

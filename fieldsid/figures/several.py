@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,12 +12,14 @@ from matplotlib.figure import Figure
 from fieldsid.comparison.compare import Comparison
 from fieldsid.figures import canvas
 
+TITLE_WIDTH = 110
+
 
 def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
     """Return a sheet of one run: angle, rate, what each model leaves of the rate, and the fin."""
     sheet = canvas.sheet(10.0, 7.5)
     over = ", ".join(f"{n} {c.leading.over_floor:.2f} x" for n, c in zip(names, found, strict=True))
-    sheet.suptitle(f"{found[0].run}: error over the noise: {over}", x=0.01, ha="left", fontsize=11)
+    sheet.suptitle(fill(f"{found[0].run}: error over the noise: {over}", TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
     axes = sheet.subplots(4, 1, sharex=True, height_ratios=(1.2, 1.2, 0.9, 0.6))
     record = found[0].shown.record
     for ax, values, ok in ((axes[0], record.angle, record.angle_ok), (axes[1], record.rate, record.rate_ok)):
@@ -27,7 +30,7 @@ def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
     canvas.dress(axes[0], y="angle, deg")
     canvas.legend_above(axes[0])
     canvas.dress(axes[1], y="rate, deg/s")
-    canvas.dress(axes[2], y="left of the rate")
+    canvas.dress(axes[2], y="rate error, deg/s")
     axes[3].step(record.time, np.degrees(record.fin), where="post", color="0.35", linewidth=1.2)
     canvas.dress(axes[3], x="time, s", y="fin, deg")
     sheet.align_ylabels(list(axes))

@@ -43,11 +43,23 @@ def draw_radius(prediction: TurnPrediction, ax: Axes) -> None:
         if np.isfinite(m.predicted) and abs(abs(m.turn.fin) - prediction.rudder_max) > 0.05 * prediction.rudder_max:
             words = f"{np.degrees(abs(m.turn.fin)):.0f}°: predicted {m.predicted:.2f} m"
             ax.annotate(words, (speed, circle.radius), textcoords="offset points", xytext=(8, 6), fontsize=8)
-    trust = {r.trust for r in prediction.rows}
-    words = f"rudder {np.degrees(prediction.rudder_max):.0f}°, 95 % bands; {', '.join(sorted(trust))}"
-    canvas.dress(ax, y="radius, m", title=words)
+    canvas.dress(ax, y="radius, m", title=f"{_tightest(prediction)}\n{_band(prediction)}")
     ax.set_ylim(bottom=0.0)
     ax.legend(frameon=False, fontsize=9, loc="best")
+
+
+def _tightest(prediction: TurnPrediction) -> str:
+    row = min(prediction.rows, key=lambda r: r.radius)
+    rudder = f"{np.degrees(prediction.rudder_max):.0f}° of rudder"
+    return f"with {rudder} the tightest turn is {row.radius:.2f} m to {row.side} at {row.speed:.2f} m/s, {row.trust}"
+
+
+def _band(prediction: TurnPrediction) -> str:
+    """Say what the bars or bands are of."""
+    drawn = "bars" if len({r.speed for r in prediction.rows}) <= FEW else "bands"
+    trust = {r.trust for r in prediction.rows}
+    wider = ", with the error of the model's form where nothing was measured" if trust != {"measured"} else ""
+    return f"{drawn}: 95 % of what the runs allow{wider}"
 
 
 def draw_time(prediction: TurnPrediction, ax: Axes) -> None:

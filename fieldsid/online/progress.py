@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan, sqrt
-from typing import Literal
+from typing import Any, Literal
 
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.identifier import OnlineEstimate
@@ -99,6 +99,15 @@ class RecentExcitation:
                 self._means[i] += share * (value - self._means[i])
                 self._squares[i] += share * (value * value - self._squares[i])
 
+    def state(self) -> dict[str, Any]:
+        """Return what it remembers, as plain values."""
+        return {"time": self._time, "weights": self._weights, "means": self._means, "squares": self._squares}
+
+    def recall(self, state: Mapping[str, Any]) -> None:
+        """Take up what another had remembered."""
+        self._time = _number(state["time"])
+        self._weights, self._means, self._squares = (list(map(float, state[k])) for k in ("weights", "means", "squares"))
+
     def rms(self) -> tuple[float, float]:
         """Return both, NaN before the first seconds are over."""
         return self._rms(0), self._rms(1)
@@ -120,6 +129,35 @@ class Watch:
         self.goals = dict(goals)
         self.excitation = RecentExcitation()
         self._looks: list[OnlineEstimate] = []
+
+    def state(self) -> dict[str, Any]:
+        """Return the looks of the last seconds as plain values, so that a program that was killed need not look for them anew."""
+        looks = [
+            {"time": e.time, "values": dict(e.values), "std_errors": dict(e.std_errors), "used": e.used, "speed": e.speed}
+            for e in self._looks
+        ]
+        return {"looks": looks, "excitation": self.excitation.state()}
+
+    def forget(self) -> None:
+        """Begin anew: what was seen was of another source."""
+        self.excitation = RecentExcitation()
+        self._looks.clear()
+
+    def recall(self, state: Mapping[str, Any], axis: Axis) -> None:
+        """Take up the looks of another watch over the same source."""
+        self.excitation.recall(state["excitation"])
+        self._looks = [
+            OnlineEstimate(
+                axis,
+                _number(e["time"]),
+                _numbers(e["values"]),
+                _numbers(e["std_errors"]),
+                int(e["used"]),
+                _number(e["speed"]),
+                {},
+            )
+            for e in state["looks"]
+        ]
 
     def look(self, now: OnlineEstimate) -> Progress:
         """Return how far an estimate is, by itself and by the looks before it."""
@@ -169,3 +207,12 @@ class Watch:
         if share >= 1.0:
             return "enough" if all(p.is_settled for p in known if p.name in self.goals) else "moving"
         return "not_excited" if isfinite(fin) and fin < QUIET_FIN_RAD else "collecting"
+
+
+def _number(value: float | None) -> float:
+    """Return a number as it was before it was written: NaN is written as nothing."""
+    return nan if value is None else float(value)
+
+
+def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
+    return {name: _number(v) for name, v in values.items()}

@@ -6,22 +6,24 @@ import json
 from pathlib import Path
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import read_text, write_text
+from fieldsid.artifacts import plain, read_text, write_text
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.online.identifier import OnlineIdentifier
+from fieldsid.online.progress import Watch
 
 SCHEMA = "fieldsid/online/1"
 
 
-def save_state(path: Path, identifier: OnlineIdentifier, source: str) -> Path:
-    """Write the state of an identifier fed from a source; raises ArtifactError."""
-    body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", "source": source, "state": identifier.state()}
+def save_state(path: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> Path:
+    """Write the state of an identifier fed from a source, and of the watch over it; raises ArtifactError."""
+    states = {"state": identifier.state(), "watch": plain(watch.state())}
+    body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", "source": source, **states}
     return write_text(path, json.dumps(body, allow_nan=False), force=True)
 
 
-def load_state(path: Path, axis: Axis) -> tuple[OnlineIdentifier, str]:
-    """Return the identifier of a file and the source it was fed from.
+def load_state(path: Path, axis: Axis, watch: Watch) -> tuple[OnlineIdentifier, str]:
+    """Return the identifier of a file and the source it was fed from; the watch takes up what it had seen.
 
     Raises ArtifactError for a file that is no such state, UsageError for one of the other axis.
     """
@@ -31,7 +33,9 @@ def load_state(path: Path, axis: Axis) -> tuple[OnlineIdentifier, str]:
         if not isinstance(body, dict) or body.get("schema") != SCHEMA:
             raise ArtifactError(f"`{path}` is no state of `sysid live`", found=f"no `schema: {SCHEMA}`", hint=hint)
         identifier = OnlineIdentifier.from_state(body["state"])
-    except (ValueError, KeyError, DataError) as error:
+        if identifier.axis is axis:
+            watch.recall(body["watch"], axis)
+    except (ValueError, KeyError, TypeError, DataError) as error:
         raise ArtifactError(f"`{path}` is no state of `sysid live`", found=str(error).splitlines()[0], hint=hint) from error
     if identifier.axis is not axis:
         raise UsageError(f"`{path}` is of {identifier.axis.value}, not {axis.value}", found=str(body.get("source")), hint=hint)

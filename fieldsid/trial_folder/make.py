@@ -10,7 +10,7 @@ from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.registry import near
 from fieldsid.templates import template_path
 
-RUNS, MODELS = "runs", "models"
+LOGS, RUNS, MODELS = "logs", "runs", "models"
 VEHICLE = "vehicle.yaml"
 
 _NAME = re.compile(r"^name: .*$", re.MULTILINE)
@@ -36,7 +36,7 @@ def new_trial(folder: Path, template: str = "torpedo") -> list[Path]:
             f"`{folder / there[0]}` exists", found=", ".join(there), hint="name another folder: `sysid init NAME`"
         )
     made = [write_text(folder / name, text) for name, text in texts.items()]
-    for place in (RUNS, MODELS):
+    for place in (LOGS, RUNS, MODELS):
         (folder / place).mkdir(exist_ok=True)
     return made
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut, facts
-from fieldsid.rounding import number
+from fieldsid.rounding import number, probability
 from fieldsid.views._words import percent, table
-from fieldsid.views.diagnosis import candidate_row, chance
+from fieldsid.views.diagnosis import candidate_row
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def line(c: Candidate) -> str:
     """Return effects, probability and evidence."""
-    return f"{c.effect}: probability {chance(c.probability)}; {cut(c.evidence, 250)}"
+    return f"{c.effect}: probability {probability(c.probability)}; {cut(c.evidence, 250)}"
 
 
 def page(c: Candidate) -> Page:
@@ -27,7 +27,7 @@ def page(c: Candidate) -> Page:
     known = facts(
         "Statistics",
         (
-            ("probability", chance(c.probability)),
+            ("probability", probability(c.probability)),
             ("explained", f"{percent(c.explained)} of the error above the noise floor"),
             ("evidence", c.evidence),
             ("confusable with", ", ".join(c.confusable_with)),

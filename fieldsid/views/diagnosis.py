@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut, facts, listed
-from fieldsid.rounding import number
+from fieldsid.rounding import number, probability
 from fieldsid.views._words import (
     counted,
     joined,
@@ -89,12 +89,7 @@ def candidate_row(c: Candidate) -> dict[str, Any]:
 def _row(c: Candidate, found: Diagnosis) -> tuple[str, ...]:
     floor = found.noise_floor
     errors = times(c.errors.train.over(floor)), times(c.errors.validation.over(floor))
-    return (c.effect, chance(c.probability), *errors, percent(c.explained), f"{c.score:+.0f}")
-
-
-def chance(p: float) -> str:
-    """Return a probability to three decimals."""
-    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+    return (c.effect, probability(c.probability), *errors, percent(c.explained), f"{c.score:+.0f}")
 
 
 VIEW = View("diagnosis", line, page, frames, lambda found: found.axis.value, figures)

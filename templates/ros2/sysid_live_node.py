@@ -28,9 +28,9 @@ class SysidLive(Node):
         super().__init__("sysid_live")
         self.axis = Axis(self.declare_parameter("axis", "yaw").value)
         self.state = Path(self.declare_parameter("state", "sysid_live.json").value)
-        known = load_state(self.state, self.axis) if self.state.exists() else None
-        self.online = known[0] if known else OnlineIdentifier(self.axis)
         self.watch, self.fin = Watch(default_goals(self.axis)), math.nan
+        known = load_state(self.state, self.axis, self.watch) if self.state.exists() else None
+        self.online = known[0] if known else OnlineIdentifier(self.axis)
         self.out = self.create_publisher(String, "~/estimate", 10)
         # Fin command in rad, positive where it turns as your model has it; here x is the rudder, y the elevator.
         self.create_subscription(Vector3Stamped, "/fins/command", self.on_fins, 10)
@@ -55,7 +55,7 @@ class SysidLive(Node):
         body = look_body(now, self.watch.look(now), source="ros2", goals_from="5 % of each value", unreadable=0, then="")
         self.out.publish(String(data=json.dumps(body)))
         self.get_logger().info(body["said"])
-        save_state(self.state, self.online, "ros2")
+        save_state(self.state, self.online, self.watch, "ros2")
 
 
 def main():

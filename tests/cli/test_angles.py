@@ -45,7 +45,8 @@ def test_a_bare_number_that_cannot_be_rad_is_refused_with_both_readings(run_cli,
 def test_degrees_and_radians_mean_the_same(run_cli, asked):
     for option in ("--fin-limit", "--rudder-max", "simulate --fin-max"):
         one, two, three = (
-            run_cli(*asked[option], a, "--json").json for a in ("0.2617993877991494", "15deg", "0.2617993877991494rad")
+            {k: v for k, v in run_cli(*asked[option], a, "--json").json.items() if k != "headline"}  # it repeats what was typed
+            for a in ("0.2617993877991494", "15deg", "0.2617993877991494rad")
         )
         assert str(one) == str(two) == str(three)
 

@@ -44,11 +44,14 @@ def test_the_hidden_effect_is_named_first_and_kept_and_drawn(run_cli, logs, tmp_
 def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(run_cli, logs):
     answer = run_cli("diagnose", *logs.train, "--axis", "yaw", "--validate", logs.unseen)
     assert answer.code == 0
-    assert max(len(line.rstrip()) for line in answer.out.splitlines()) <= 80
-    assert answer.out.startswith("effect: servo_lag (the fin follows")
+    assert max(map(len, trial.below(answer.out))) <= 80
+    assert answer.out.startswith("effect: servo_lag: the error on unseen runs falls from")
+    assert "servo_lag (the fin follows" in answer.out
     for part in ("as it is", "log evidence", "where the model as it is fails", "not tried: ", "needs roll, which the log lacks"):
         assert part in answer.out
-    assert "--add servo_lag --validate RUN" in answer.err
+    then = answer.out.splitlines()[2]
+    assert then.startswith("next: sysid identify ")
+    assert then.endswith(f"--add servo_lag --validate {logs.unseen}")
 
 
 def test_a_model_of_the_other_axis_is_refused(run_cli, logs, tmp_path):

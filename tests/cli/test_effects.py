@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from cli import trial
 
 from fieldsid.effects import all_effects
 from fieldsid.models.axis import Axis
@@ -18,7 +19,7 @@ def test_list_names_every_effect_of_the_axis(run_cli, axis):
 def test_list_as_text_names_them_all_in_eighty_columns(run_cli):
     out = run_cli("effects", "list").out
     assert all(name in out for name in all_effects())
-    assert max(len(line.rstrip()) for line in out.splitlines()) <= 80
+    assert max(map(len, trial.below(out))) <= 80
 
 
 @pytest.mark.parametrize("name", sorted(all_effects()))

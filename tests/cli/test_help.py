@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+import shlex
 
 import pytest
 
 from fieldsid.cli.help.catalogue import entries
 from fieldsid.cli.help.command_order import COMMAND_ORDER
+from fieldsid.cli.options import ANSWER, GROUPS
+from fieldsid.cli.trial.parsed import parse
 from fieldsid.templates import template_names, template_path
 
+LONGEST_GROUP = 10
+"""Options of one group at most: more are no longer taken in at a glance."""
 LEAVES = [
     *((name,) for name in entries() if name not in ("effects", "schedule")),
     *(("effects", sub) for sub in ("list", "show", "new")),
@@ -58,3 +63,28 @@ def test_a_template_promises_no_command_that_is_not_there(name):
 @pytest.mark.parametrize("name", ["sway_coupling", "heave_coupling", "speed_varying"])
 def test_a_source_is_one_that_a_reader_can_find(run_cli, name):
     assert "the paper" not in run_cli("effects", "show", name, "--json").json["source"]
+
+
+@pytest.mark.parametrize("leaf", LEAVES, ids=" ".join)
+def test_every_page_has_an_example_on_one_line_that_is_understood(run_cli, leaf):
+    examples = re.findall(r"^ *Example: sysid (.*)$", run_cli(*leaf, "--help").out, re.MULTILINE)
+    assert examples
+    for line in examples:
+        assert line.startswith(" ".join(leaf))
+        parsed = parse(shlex.split(line))
+        assert parsed is not None
+        assert parsed.name == " ".join(leaf)
+
+
+def test_no_group_of_options_is_long(run_cli):
+    for leaf in LEAVES:
+        groups = re.split(r"^(?=\S[^\n]*:$)", run_cli(*leaf, "--help").out, flags=re.MULTILINE)[1:]
+        assert max(len(re.findall(r"^  -", group, re.MULTILINE)) for group in groups) <= LONGEST_GROUP, leaf
+
+
+def test_the_groups_of_a_page_come_in_one_order_and_the_ways_to_answer_last(run_cli):
+    for leaf in LEAVES:
+        titles = re.findall(r"^(\S[^\n]*):$", run_cli(*leaf, "--help").out, re.MULTILINE)
+        shared = [t for t in titles if t in GROUPS]
+        assert shared == sorted(shared, key=GROUPS.index)
+        assert titles[-1] == ANSWER

@@ -33,7 +33,7 @@ def test_without_a_terminal_it_prints_a_line_a_look_and_the_table_at_the_end(run
     assert answer.code == 0
     assert "95 % band" in answer.out
     assert "next: sysid identify" in answer.out
-    assert max(map(len, answer.out.split("\nyaw, ")[1].splitlines()[1:5])) <= 80
+    assert max(map(len, answer.out.split("\nnext: ")[1].splitlines()[1:6])) <= 80
 
 
 def test_a_state_is_gone_on_from_and_ends_where_one_go_ends(run_cli, tmp_path):
@@ -115,3 +115,12 @@ def test_what_cannot_be_meant_is_said(run_cli, arguments, says):
     answer = run_cli("live", "--axis", "yaw", *arguments)
     assert answer.code == 2
     assert says in answer.err
+
+
+def test_a_program_that_was_killed_and_goes_on_still_knows_that_the_numbers_have_settled(run_cli, tmp_path):
+    run = trial.flown(tmp_path)
+    said = ("live", run, "--axis", "yaw", "--speed", "0", "--state", tmp_path / "state", "--want", "a22=30%,b2=30%")
+    first, again = run_cli(*said).out, run_cli(*said).out
+    assert "enough data, come up" in first
+    assert again.splitlines()[-7:] == first.splitlines()[-7:]
+    assert again.splitlines()[0].split()[2] == "enough"

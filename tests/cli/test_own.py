@@ -147,7 +147,7 @@ def test_python_in_the_folder_is_not_run_and_that_is_said(run_cli, folder):
 def test_an_effect_named_twice_is_taken_once(run_cli, folder):
     run = trial.flown(folder)
     twice, once = (run_cli("identify", run, "--axis", "yaw", "--effects", e, "--json").json for e in ("stall,stall", "stall"))
-    assert twice == once
+    assert twice | {"headline": {}} == once | {"headline": {}}  # which repeats what was typed
 
 
 @pytest.mark.parametrize("name", ["Servo_Lag", "servo_lag", "None", "9x"])

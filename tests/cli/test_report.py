@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 import pytest
 from cli import trial
 
-from fieldsid.report.pdf import browser
+from fieldsid.reporting.pdf import browser
 
 VOID = {"meta", "link", "br", "hr", "input", "img"}
 needs_browser = pytest.mark.skipif(browser() is None, reason="no browser that prints is installed")
@@ -133,7 +133,7 @@ def test_what_makes_no_report_is_said(run_cli, tmp_path, monkeypatch, asked, say
 
 
 def test_a_pdf_without_a_browser_is_refused_before_the_work(run_cli, made, monkeypatch, tmp_path):
-    monkeypatch.setattr("fieldsid.report.pdf.browser", lambda: None)
+    monkeypatch.setattr("fieldsid.reporting.pdf.browser", lambda: None)
     answer = run_cli("report", made, "-o", tmp_path / "r.pdf")
     assert answer.code == 2
     assert "print it to a file" in answer.err

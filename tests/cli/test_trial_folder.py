@@ -137,3 +137,19 @@ def test_status_writes_nothing(run_cli, folder):
     before = (folder / "journal.jsonl").read_bytes()
     assert run_cli("status").code == 0
     assert (folder / "journal.jsonl").read_bytes() == before
+
+
+def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cli, folder):
+    assert run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "--no-figures", "-o", "plan").code == 0
+    answer = run_cli("live", "--axis", "yaw", "--speed", "0")
+    assert answer.code == 0, answer.err
+    assert "taken from the trial folder: --plan plan/plan.yaml runs/pulses_1.4.parquet" in answer.err
+    assert "goals: `plan/plan.yaml`" in answer.out
+    stated = run_cli("live", "runs/pulses_1.0.parquet", "--axis", "yaw", "--speed", "0", "--want", "a22=9%")
+    assert "taken from" not in stated.err
+
+
+def test_batch_takes_the_logs_and_the_vehicle(run_cli, folder):
+    body = run_cli("batch", "--axis", "yaw", "--no-diagnose", "--workers", "1", "--json")
+    assert body.json["runs"] == 2
+    assert "--vehicle vehicle.yaml" in body.err

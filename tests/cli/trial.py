@@ -20,6 +20,11 @@ TRUTH = {
 }
 
 
+def below(out: str) -> list[str]:
+    """Return the lines below a result's headline, which fit a page; a verdict, or a command to paste, is one line."""
+    return [line.rstrip() for line in out.split("\n\n", 1)[1].splitlines() if not line.startswith(("model: ", "figure: "))]
+
+
 def vehicle(axis: Axis, *effects: str, **values: float) -> Model:
     return Model(axis, effects, TRUTH[axis] | values, {}, (), np.zeros((0, 0)), SpeedLaw(1.4), Noise(0.005, 0.004))
 

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.change.record import CHANGED, TRIM_ANGLE, shown
-from fieldsid.cli.console import emit, table, warn
+from fieldsid.cli.console import emit, table
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import typed_with
 from fieldsid.errors import UsageError
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import own_kind
@@ -56,13 +58,29 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
         for c, f in zip(found, drawn, strict=True)
     ]
     body = {"schema": "fieldsid/compare-models/1", "before": str(old), "after": str(new), "changes": changes}
-    emit(body, as_json=as_json, render=lambda to: _render(to, found, changes))
-    if not as_json:
-        for c in found:
-            warn(c.notes, of=c.axis.value)
-        if twice:
-            warn([Note("shared_runs", f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone")])
-    return body
+    notes = [Note(n.code, f"{c.axis.value}: {n.message}", n.data) for c in found for n in c.notes]
+    if twice:
+        said = f"both sides were fitted to {', '.join(twice)}: a difference is one of the models alone"
+        notes.append(Note("shared_runs", said, {}))
+    return emit(
+        body, as_json=as_json, render=lambda to: _render(to, found, changes), headline=_headline(found, changes), notes=notes
+    )
+
+
+def _headline(found: Sequence[Change], changes: Sequence[Mapping[str, Any]]) -> Headline:
+    """Return what has changed, axis by axis, and what to do about the first change that asks for something."""
+    by_axis = [f"{c.axis.value}: {c.line}" if len(found) > 1 else c.line for c in found]
+    rests = [_rests_on(c, body) for c, body in zip(found, changes, strict=True)]
+    drawn = all(body["figure"] for body in changes)
+    then = next((str(body["next"]) for body in changes if body["next"]), "" if drawn else typed_with("-o", "figures/"))
+    return Headline("; ".join(by_axis), "; ".join(rests), then)
+
+
+def _rests_on(found: Change, body: Mapping[str, Any]) -> str:
+    count = [len(names) for names in body["models"]]
+    speeds = ", ".join(f"{s:.2f}" for s in found.speeds)
+    tests = sum(1 + (len(p.speeds) if len(p.speeds) > 1 else 0) for p in found.parameters)
+    return f"{count[0]} model file{'s' * (count[0] > 1)} before, {count[1]} after, at {speeds} m/s; {tests} tests at once"
 
 
 def _side(path: Path) -> Side:
@@ -126,6 +144,10 @@ def _next(found: Change, sides: Sequence[Side]) -> str | None:
         return shlex.join(["sysid", "schedule", "design", *map(str, new), "-o", "gains_after.yaml"])
     if found.verdict == "form":
         lacking, add = (old, found.added) if found.added else (new, found.removed)
+        made, others = lacking[0].with_name(f"{lacking[0].stem}+{'+'.join(add)}.yaml"), new if found.added else old
+        if made.exists():  # it was extended so already: that one can be compared
+            pair = (made, others[0]) if found.added else (others[0], made)
+            return None if made in others else shlex.join(["sysid", "compare", *map(str, pair)])
         return shlex.join(["sysid", "extend", str(lacking[0]), *_runs(lacking[0]), *(w for e in add for w in ("--add", e))])
     return f"sysid plan --axis {axis} --speeds {speeds}" if found.verdict == "unclear" else None
 
@@ -140,22 +162,11 @@ def _render(to: Console, found: Sequence[Change], changes: Sequence[Mapping[str,
     for i, (change, body) in enumerate(zip(found, changes, strict=True)):
         if i:
             to.print()
-        _render_one(to, change, body)
+        _render_one(to, change, body, title=change.axis.value if len(found) > 1 else "")
 
 
-def _render_one(to: Console, found: Change, body: Mapping[str, Any]) -> None:
-    to.print(found.line, soft_wrap=True)
-    count = [len(names) for names in body["models"]]
-    speeds = ", ".join(f"{s:.2f}" for s in found.speeds)
-    tests = sum(1 + (len(p.speeds) if len(p.speeds) > 1 else 0) for p in found.parameters)
-    to.print(
-        f"rests on {count[0]} model file{'s' * (count[0] > 1)} before, {count[1]} after, at {speeds} m/s; {tests} tests at once",
-        soft_wrap=True,
-    )
-    if body["next"]:
-        to.print(f"next: {body['next']}", soft_wrap=True)
-    to.print()
-    to.print(table("", ("", "m/s", "before", "after", "change  "), [r for p in found.parameters for r in _rows(p)]))
+def _render_one(to: Console, found: Change, body: Mapping[str, Any], *, title: str) -> None:
+    to.print(table(title, ("", "m/s", "before", "after", "change  "), [r for p in found.parameters for r in _rows(p)]))
     to.print("* beyond its errors, all tests together wrong in one comparison of twenty")
     _render_gains(to, found)
     _render_radius(to, found)

@@ -8,7 +8,7 @@ from math import exp, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.console import emit, table, warn
+from fieldsid.cli.console import emit, table
 from fieldsid.cli.progress import get_ready
 from fieldsid.errors import UsageError
 
@@ -71,11 +71,15 @@ def several_models(
         "figures": figures,
         "skipped_runs": skips.records,
     }
-    emit(body, as_json=as_json, render=lambda to: _render(to, body, found_of, names))
-    if not as_json:
-        warn(left_out(logs, models[0].axis))
+    from fieldsid.artifacts import inputs_of
+    from fieldsid.cli.headlines.models import of_several
+    from fieldsid.cli.inputs import files_of
+
+    headline = of_several(body, names, files_of(logs), inputs_of(Path(str(body["best"]))), close=CLOSE)
+    notes = left_out(logs, models[0].axis)
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, body, found_of, names), headline=headline, notes=notes)
     skips.end(len(found_of[0]))
-    return body
+    return result
 
 
 def _score(found: Sequence[Comparison]) -> float:
@@ -107,22 +111,8 @@ def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folde
 
 
 def _render(to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> None:
-    scores = sorted(zip((_score(f) for f in found_of), names, strict=True))
-    (least, best), (second, _) = scores[:2]
-    others = ", ".join(f"{n} at {s:.2f} x" for s, n in scores[1:])
-    if second <= CLOSE * least:
-        to.print(f"{best} follows no better than the next: {least:.2f} x the noise; {others}", soft_wrap=True)
-    else:
-        to.print(f"{best} follows best: {least:.2f} x the noise; {others}", soft_wrap=True)
     runs = [c.run for c in found_of[0]]
-    to.print(f"rests on {len(runs)} run{'s' * (len(runs) > 1)}, geometric mean of the worse channel of each", soft_wrap=True)
-    seen = [
-        f"{n} was fitted to {', '.join(m['fitted_to'])}" for n, m in zip(names, body["models"], strict=True) if m["fitted_to"]
-    ]
-    for said in seen:
-        to.print(f"{said}: no fair judge of it", soft_wrap=True)
     rows = [(run, *(f"{found[i].leading.over_floor:.2f}" for found in found_of)) for i, run in enumerate(runs)]
-    to.print()
     to.print(table("error over the noise", ("run", *names), rows))
     for path in body["figures"]:
         to.print(f"figure: {path}", soft_wrap=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import sys
 import time
 from collections import Counter
@@ -40,7 +39,7 @@ Timeout = Annotated[float, typer.Option("--timeout", metavar="S", min=0.1, help=
 Memory = Annotated[float, typer.Option("--memory", metavar="MB", min=100.0, help="Most memory of one process.")]
 WithTrend = Annotated[bool, typer.Option("--trend", help="Say and draw where parameters changed over the runs' dates.")]
 
-MOST_REASONS, MOST_NAMED = 8, 4
+MOST_REASONS = 8
 
 
 def command(
@@ -121,16 +120,17 @@ def command(
         ],
         "trend": [_of_trend(t) for t in trends],
         "figure": str(drawn) if drawn is not None and trends else None,
-        "next": _next(logs, axis, output, trend=trend),
     }
-    emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    from fieldsid.cli.headlines.trial import of_batch
+
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=of_batch(body, trend=trend))
     if (trend or figure is not None) and not trends:
         say(f"no trend: fewer than 6 runs of different dates know a parameter of {axis.value}")
     if trends and (dated := sum(row.get("time_from") == "file" for row in rows)):
         say(f"{dated} of {len(rows)} runs have no date in their log: theirs is that of the file's last change")
     if unusable:
         raise typer.Exit(GATE_FAILED)
-    return body
+    return result
 
 
 def _logs(found: Sequence[Path], output: Path) -> list[Path]:
@@ -189,22 +189,10 @@ def _of_trend(trend: Trend) -> dict[str, Any]:
     }
 
 
-def _next(logs: Sequence[Path], axis: Axis, output: Path, *, trend: bool) -> str:
-    """Return the line that shows the trend, once there is a table; nothing after it."""
-    if trend:
-        return ""
-    if len(logs) > MOST_NAMED:
-        return "the same line with `--trend`"
-    return shlex.join(["sysid", "batch", *map(str, logs), "--axis", axis.value, "-o", str(output), "--trend"])
-
-
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
     bad = body["skipped_runs"]
-    to.print(Text(f"{body['runs']} runs identified, {len(bad)} not; {_said(body)}", style="bold"), soft_wrap=True)
-    known = f", {body['known_logs']} of them known" if body["known_logs"] else ""
-    to.print(f"{body['logs']} logs{known}, took {body['seconds']:.1f} s on {body['where']}", soft_wrap=True)
     for t in body["trend"]:
         _render_trend(to, t)
     why: dict[str, list[str]] = {}
@@ -218,14 +206,6 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     to.print(f"table: {body['table']} and {body['csv']}", soft_wrap=True)
     if body["figure"]:
         to.print(f"figure: {body['figure']}", soft_wrap=True)
-    if body["next"]:
-        to.print(f"next: {body['next']}", soft_wrap=True)
-
-
-def _said(body: Mapping[str, Any]) -> str:
-    verdicts = ", ".join(f"{count} {name}" for name, count in body["verdicts"].items())
-    effects = ", ".join(f"{name} {count}" for name, count in list(body["effects"].items())[:4])
-    return (verdicts or "not diagnosed") + (f" ({effects})" if effects else "")
 
 
 def _render_trend(to: Console, trend: Mapping[str, Any]) -> None:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.console import emit, messages, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
 from fieldsid.cli.progress import get_ready, refuse_closed
 from fieldsid.cli.session import drawing
+from fieldsid.cli.voice import shown_in, shown_words
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -111,12 +112,15 @@ def command(
         "skipped_runs": skips.records,
         "warnings": [{"code": n.code, "message": n.message} for n in notes],
     }
-    if not as_json:
-        warn(notes)
-    emit(body, as_json=as_json, render=lambda to: _render(to, entries, top))
+    from fieldsid.artifacts import inputs_of
+    from fieldsid.cli.headlines.models import of_compare
+    from fieldsid.cli.inputs import files_of
+
+    headline = of_compare(body, files_of(logs), inputs_of(model))
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, entries, top), headline=headline, notes=notes)
     _gate(entries, min_fit)
     skips.end(len(entries))
-    return body
+    return result
 
 
 def _refuse_part(*given: object) -> None:
@@ -178,6 +182,7 @@ def _drawn(
 def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
     return {
         "run": c.run,
+        "fitted_to": c.run in c.model.runs,
         "speed_m_s": c.shown.record.speed,
         "angle_rms_rad": c.merit.angle_rms,
         "rate_rms_rad_s": c.merit.rate_rms,
@@ -229,24 +234,26 @@ def _as_flown(c: Comparison, code: str) -> dict[str, Any] | None:
 def _render(to: Console, entries: Sequence[Mapping[str, Any]], top: int) -> None:
     from fieldsid.rounding import number
 
+    times, angle = shown_in("rad")
     rows = [
         (
             e["run"],
             number(e["speed_m_s"], 3),
-            number(e["angle_rms_rad"], 2),
-            number(e["noise_floor"]["angle_rad"], 2),
+            number(times * e["angle_rms_rad"], 2),
+            number(times * e["noise_floor"]["angle_rad"], 2),
             number(e["angle_fit_percent"], 3),
-            number(e["rate_rms_rad_s"], 2),
-            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(times * e["rate_rms_rad_s"], 2),
+            number(times * e["noise_floor"]["rate_rad_s"], 2),
             number(e["rate_fit_percent"], 3),
         )
         for e in entries
     ]
     to.print(table("", ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %"), rows))
+    to.print(f"angle in {angle}, rate in {angle}/s")
     for e in entries:
         for flown in filter(None, (e["command_times"], e["own_speed"])):
-            angle, rate = (number(flown["as_logged"][name], 2) for name in ("angle_rms_rad", "rate_rms_rad_s"))
-            to.print(f"{flown['says']}; angle rms {angle}, rate rms {rate} as logged", soft_wrap=True)
+            logged = [number(times * flown["as_logged"][name], 2) for name in ("angle_rms_rad", "rate_rms_rad_s")]
+            to.print(f"{flown['says']}; angle rms {logged[0]}, rate rms {logged[1]} as logged", soft_wrap=True)
     for e in entries:
         _render_where(to, e, top)
     for e in entries:
@@ -274,7 +281,7 @@ def _render_where(to: Console, e: Mapping[str, Any], top: int) -> None:
 def _places(title: str, where: Sequence[Mapping[str, Any]]) -> Table:
     rows = [
         (
-            w["condition"],
+            shown_words(w["condition"]),
             f"{100 * w['share_of_error']:.0f} %",
             f"{100 * w['share_of_samples']:.0f} %",
             f"{w['rms_ratio']:.2f}",

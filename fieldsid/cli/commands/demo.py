@@ -15,6 +15,7 @@ import typer
 
 from fieldsid.cli.app import run
 from fieldsid.cli.console import WIDTH, emit
+from fieldsid.cli.headlines.trial import of_demo
 from fieldsid.cli.options import Force, JsonFlag, OutputDir
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
@@ -60,11 +61,15 @@ def command(
 
     The program plans a maneuver, flies it and a few others with a vehicle whose dynamics hold one effect more than the
     textbook's, and works on the logs like a user who does not know. The files and figures stay in DIR, ./sysid-demo if not given.
+
+    Example: sysid demo --effect sway_coupling -o tour
     """
     began = perf_counter()
     with compiling(context, _compile_loops) as warmup:
         body = _tour(effect, output, began, warmup, force=force, told=JSON if as_json else VERBOSE if verbose else BRIEF)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body, figures=verbose))
+    if not as_json:
+        sys.stdout.write("\n")
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body, figures=verbose), headline=of_demo(body))
 
 
 def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, force: bool, told: str) -> dict[str, Any]:
@@ -170,15 +175,6 @@ def _flown(trial: Trial, folder: Path, leg: Leg) -> str:
 
 
 def _render(to: Console, body: Mapping[str, Any], *, figures: bool) -> None:
-    from fieldsid.models.axis import NAMES, Axis
-
-    hidden = body["hidden"]
-    own = {n: v for n, v in hidden["values"].items() if n not in NAMES[Axis(hidden["axis"])].base}
-    numbers = ", ".join(f"{n} = {v:.3g}" for n, v in own.items())
-    named = " and ".join(body["named"]) or "nothing"
-    to.print(f"\nHidden in the trial was {hidden['effect']} ({numbers}); diagnose named {named}.", soft_wrap=True)
-    drawn = [f for f in body["files"] if f.endswith(".png")]
-    to.print(f"{len(body['files'])} files are in {body['folder']}, {len(drawn)} of them figures{':' * figures}", soft_wrap=True)
-    for file in drawn if figures else ():
-        to.print(f"  {file}", soft_wrap=True)
-    to.print(f"The tour took {body['seconds']:.1f} s. `sysid --help` lists every command.")
+    for file in (f for f in body["files"] if figures and f.endswith(".png")):
+        to.print(f"figure: {file}", soft_wrap=True)
+    to.print("`sysid --help` lists every command.")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.console import emit, table
 from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in, shown_words
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -77,11 +77,12 @@ def command(
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
     body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
     body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, context, force=force)}
-    if not as_json:
-        warn(found.notes)
-    emit(body, as_json=as_json, render=lambda to: _render(to, found, body))
+    from fieldsid.cli.headlines.missing import Searched, of_diagnosis
+
+    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, found, body), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
-    return body
+    return result
 
 
 def _known(path: Path | None, axis: Axis) -> Model | None:
@@ -133,33 +134,35 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
 
     from fieldsid.rounding import number
 
-    to.print(Text(f"{found.verdict}: {found.says}", style="bold"))
-    to.print()
     to.print(_candidates(found))
     floor = found.noise_floor
-    noise = f"{number(floor.angle, 2)} rad and {number(floor.rate, 2)} rad/s"
+    factor, angle = shown_in("rad")
+    noise = f"{number(factor * floor.angle, 2)} {angle} and {number(factor * floor.rate, 2)} {angle}/s"
     to.print(
         Text(f"fitted, unseen: free-run error of those runs over the noise floor, {noise}; evidence: log, over the first row")
     )
     _render_words(to, found)
     _render_where(to, found)
     _render_skipped(to, found.skipped)
-    _render_next(to, found, body)
+    _render_maneuver(to, found)
     for key in ("file", "figure"):
         if body[key]:
             to.print(f"{key}: {body[key]}", soft_wrap=True)
 
 
 def _candidates(found: Diagnosis) -> Any:
+    from fieldsid.cli.headlines.words import times
+    from fieldsid.rounding import probability
+
     floor = found.noise_floor
     judged = found.base.validation.over(floor)
-    rows = [("as it is", "", _times(found.base.train.over(floor)), _times(judged), "", "")]
+    rows = [("as it is", "", times(found.base.train.over(floor)), times(judged), "", "")]
     rows += [
         (
             fill(c.effect.replace("+", " +"), NAME_WIDTH),
-            _probability(c.probability),
-            _times(c.errors.train.over(floor)),
-            _times(c.errors.validation.over(floor)),
+            probability(c.probability),
+            times(c.errors.train.over(floor)),
+            times(c.errors.validation.over(floor)),
             "worse" if c.worse else f"{100 * c.explained:.0f} %",
             f"{c.score:+.0f}",
         )
@@ -176,6 +179,9 @@ def _render_words(to: Console, found: Diagnosis) -> None:
 
     if found.verdict in ("sufficient", "disturbed"):
         return
+    if found.effects:
+        to.print()
+        to.print(Text(found.says))
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < RIVAL_PROBABILITY_RATIO:
             continue
@@ -186,7 +192,7 @@ def _render_words(to: Console, found: Diagnosis) -> None:
 
 def _render_where(to: Console, found: Diagnosis) -> None:
     rows = [
-        (p.condition, f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
+        (shown_words(p.condition), f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
         for p in found.where[:MOST_PLACES]
     ]
     to.print()
@@ -206,25 +212,11 @@ def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
         to.print(Text(f"not tried: {', '.join(names)}: {reason}"))
 
 
-def _render_next(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
+def _render_maneuver(to: Console, found: Diagnosis) -> None:
     from rich.text import Text
 
     fly = found.next_maneuver
     if fly:
         to.print()
-        command = f": `{fly['command']}`" if "command" in fly else ""
         note = f"; {fly['note']}" if "note" in fly else ""
-        to.print(Text(f"next: {fly['maneuver']}, {fly['why']}{note}{command}"))
-    if found.effects:
-        unseen = " --validate RUN" if body["validation_runs"] else ""
-        model = body["model"] or "MODEL"
-        adds = " ".join(f"--add {n}" for n in found.effects)
-        messages().print(Text(f"add it: `sysid extend {model} RUN... {adds}{unseen}`"), soft_wrap=True)
-
-
-def _probability(p: float) -> str:
-    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.2f}" if isfinite(ratio) else "-"
+        to.print(Text(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}"))

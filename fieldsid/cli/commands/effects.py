@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.console import emit, table
+from fieldsid.cli.headlines.missing import of_catalogue, of_effect, of_new_effect
+from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.options import Force, JsonFlag
 from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.user_effects import OWN_EFFECTS, load_own_effects
@@ -38,22 +41,28 @@ NewFile = Annotated[
 
 @command.command("list", short_help="List every effect by stage.")
 def list_(axis: OneAxis = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
-    """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor."""
+    """List every effect by its stage of the signal path: actuator, hydrodynamics, sensor.
+
+    Example: sysid effects list --axis yaw
+    """
     from fieldsid.effects import all_effects
 
     known = all_effects(axis).values()
     body = {"schema": "fieldsid/effects/1", "axis": axis, "effects": [_described(e) for e in known]}
-    return emit(body, as_json=as_json, render=lambda to: _render_list(to, known))
+    return emit(body, as_json=as_json, render=lambda to: _render_list(to, known), headline=of_catalogue(body))
 
 
 @command.command("show", short_help="Show all that is known of one effect.")
 def show(name: EffectName, as_json: JsonFlag = False) -> Mapping[str, Any]:
-    """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source."""
+    """Show one effect: equation, coefficients, telltale, what excites it, what it is mistaken for, source.
+
+    Example: sysid effects show servo_lag
+    """
     from fieldsid.effects import pick_effect
 
     effect = pick_effect(name)
     body = {"schema": "fieldsid/effect/1", **_described(effect)}
-    return emit(body, as_json=as_json, render=lambda to: _render_one(to, effect))
+    return emit(body, as_json=as_json, render=lambda to: _render_one(to, effect), headline=of_effect(body))
 
 
 @command.command("new", short_help="Start an effect of your own.")
@@ -74,7 +83,8 @@ def new(
     write_text(path, _started(name, axis, path), force=force)
     load_own_effects()  # what was broken in a file that is replaced is so no more
     body = {"schema": "fieldsid/new-effect/1", "name": name, "axis": axis, "file": str(path)}
-    return emit(body, as_json=as_json, render=lambda _to: say(f"wrote {path}: edit it, then {_look_at(path, name)}"))
+    headline = of_new_effect(body, _look_at(path, name))
+    return emit(body, as_json=as_json, render=lambda to: to.print(f"effect: {path}", soft_wrap=True), headline=headline)
 
 
 def _refuse_name(name: str, path: Path) -> None:
@@ -113,10 +123,11 @@ def _started(name: str, axis: Axis, path: Path) -> str:
 
 
 def _look_at(path: Path, name: str) -> str:
-    """Return what to do when it is edited: outside the working folder's own it is not read from here."""
+    """Return the line to look at it when it is edited: it is read from the working folder's own place alone."""
+    show = pasted("effects", "show", name)
     if path.parent.resolve() == Path(OWN_EFFECTS).resolve():
-        return f"`sysid effects show {name}`"
-    return f"put it in the `{OWN_EFFECTS}/` of the folder you work in"
+        return show
+    return f"mkdir -p {OWN_EFFECTS} && cp {quote(str(path))} {OWN_EFFECTS}/ && {show}"
 
 
 def _changes(name: str, axis: Axis) -> tuple[tuple[str, str], ...]:
@@ -176,7 +187,6 @@ def _render_list(to: Console, known: Iterable[Effect]) -> None:
     for effect in known:
         if effect.definition is not None:
             to.print(f"{effect.name} is not built in: {effect.origin}", soft_wrap=True)
-    to.print("`sysid effects show NAME` tells the equation, the telltale and what excites it.")
 
 
 def _form_in_words(effect: Effect, form: Variant) -> str:
@@ -200,7 +210,6 @@ def _render_one(to: Console, effect: Effect) -> None:
         ("source", effect.source),
         ("origin", effect.origin),
     ]
-    to.print(f"{effect.name}: {effect.says}\n")
     to.print(table("", ("", ""), facts, left=2))
     rows = [
         (c.name, in_unit(c.unit), f"{c.low:g} .. {c.high:g}", c.says + (" (each run its own)" if c.per_run else ""))

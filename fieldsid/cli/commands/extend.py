@@ -8,15 +8,18 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.console import emit, table
+from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
+from fieldsid.cli.headlines.typed import pasted, repeated
+from fieldsid.cli.headlines.words import used
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
+from fieldsid.cli.voice import shown_in
 from fieldsid.errors import ArtifactError, UsageError
 
 if TYPE_CHECKING:
@@ -27,9 +30,6 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 SCHEMA = "fieldsid/extend/1"
-AT_THE_FLOOR = {"yaw": "turn-radius", "pitch": "schedule design"}
-"""What a model is for once it leaves no more than the noise."""
-MORE = "more is missing than the sensors' noise explains"
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
@@ -75,11 +75,9 @@ def command(
     body, notes = _extended(
         context, model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
     )
-    if not as_json:
-        warn(notes)
-    emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=of_extension(body), notes=notes)
     skips.end(len(runs or []) + len(validate or []) - len(skips.records))
-    return body
+    return result
 
 
 def _names(given: Sequence[str] | None) -> list[str]:
@@ -140,15 +138,12 @@ def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], valid
     fitted, unseen = found.gain.left(kept=body["kept"])
     more = any(error > SUFFICIENT_ERROR_RATIO for error in (fitted, unseen))
     if more:
-        options = [
-            f"--axis {body['axis']}",
-            f"--model {quote(body['model'])}",
-            *(f"--validate {quote(str(p))}" for p in validate),
-        ]
-        options += [f"--mapping {quote(str(mapping))}"] if mapping is not None else []
-        command = " ".join(["sysid diagnose", *(quote(str(p)) for p in runs), *options])
+        reading = ("--mapping", mapping) if mapping is not None else ()
+        judged = repeated("--validate", validate)
+        longer = () if body["kept"] else ("--thorough",)  # what was named by the usual search has not paid
+        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *reading, *longer)
     else:
-        command = f"sysid {AT_THE_FLOOR[body['axis']]} {quote(body['model'])}"
+        command = used(body["axis"], body["model"])
     return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}
 
 
@@ -209,28 +204,26 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
         "effects": list(load_model(back).effects),
         "parent": {"path": str(parent.path), "sha256": parent.sha256, "state": parent.state},
     }
-    return emit(body, as_json=as_json, render=lambda to: _render_undone(to, body))
+    return emit(body, as_json=as_json, render=lambda to: _render_undone(to, body), headline=of_undoing(body))
 
 
 def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
-    messages().print(f"undone: {body['undone']} stays where it is, its parent is", soft_wrap=True)
-    to.print(body["model"], soft_wrap=True)
+    to.print(f"model: {body['model']}; {body['undone']} stays where it is", soft_wrap=True)
 
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
-    from fieldsid.rounding import in_unit, number
+    from fieldsid.rounding import number
 
-    before, after = body["over_floor"]["before"], body["over_floor"]["after"]
-    where = "unseen data" if body["unseen"] else "the runs fitted to"
-    said = f"{'+'.join(body['added'])}: the error on {where} goes from {before:.2f} to {after:.2f} x the noise floor"
-    to.print(Text(said, style="bold"))
-    to.print()
+    times, angle = shown_in("rad")
     floor = body["noise_floor"]
     rows = [
-        (f"{unit}, {side}", number(b[key], 3), number(a[key], 3), number(floor[noise], 3))
-        for key, noise, unit in (("angle_rms_rad", "angle_rad", "angle, rad"), ("rate_rms_rad_s", "rate_rad_s", "rate, rad/s"))
+        (f"{unit}, {side}", *(number(times * v, 3) for v in (b[key], a[key], floor[noise])))
+        for key, noise, unit in (
+            ("angle_rms_rad", "angle_rad", f"angle, {angle}"),
+            ("rate_rms_rad_s", "rate_rad_s", f"rate, {angle}/s"),
+        )
         for side, b, a in (
             ("unseen", body["before"]["validation"], body["after"]["validation"]),
             ("fitted", body["before"]["train"], body["after"]["train"]),
@@ -240,21 +233,15 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
     to.print()
     found = [
-        (n, _value(c["value"], c["std_error"], at_bound=c["at_bound"]), in_unit(c["unit"]))
+        (n, _value(factor * c["value"], factor * c["std_error"], at_bound=c["at_bound"]), unit)
         for n, c in body["coefficients"].items()
+        for factor, unit in [shown_in(c["unit"])]
     ]
     to.print(table("", ("coefficient", "value", "unit"), found, left=2))
     to.print()
     to.print(Text(_verdict(body)))
-    to.print(Text(_says_left(body)))
+    to.print(Text(left_says(body)))
     to.print(f"model: {body['model']}", soft_wrap=True)
-    to.print(Text(f"next: {body['next']}"), soft_wrap=True)
-
-
-def _says_left(body: Mapping[str, Any]) -> str:
-    sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
-    said = ", ".join(f"{error:.2f} x the noise floor on {name}" for name, error in sides if isfinite(error))
-    return f"left: {said}: " + (MORE if body["left"]["more_than_noise"] else "that is the noise")
 
 
 def _verdict(body: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table, warn
+from fieldsid.cli.console import emit, table
 from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile
 from fieldsid.cli.session import tasks_of
 
@@ -40,6 +40,7 @@ def command(
 
     Example: sysid fit models/*.yaml -o law.yaml
     """
+    from fieldsid.cli.headlines.gains import of_fit
     from fieldsid.errors import UsageError
     from fieldsid.plant.laws.axis_laws import fit_laws, law_notes, report, save_laws
     from fieldsid.plant.parameter_source import load_parameter_source
@@ -54,9 +55,7 @@ def command(
         body["file"] = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
         if figures:
             body["figure"] = str(_draw(laws, output.with_suffix(".png"), context, force=force))
-    if not as_json:
-        warn(law_notes(laws))
-    return emit(body, as_json=as_json, render=lambda to: _render(to, laws, body))
+    return emit(body, as_json=as_json, render=lambda to: _render(to, laws, body), headline=of_fit(body), notes=law_notes(laws))
 
 
 def _draw(laws: Laws, path: Path, context: typer.Context, *, force: bool) -> Path:
@@ -93,8 +92,6 @@ def _render(to: Console, laws: Laws, body: Mapping[str, Any]) -> None:
     for key in ("file", "figure"):
         if body[key]:
             to.print(f"{key}: {body[key]}", soft_wrap=True)
-    if not body["file"]:
-        messages().print("nothing was written: add `-o law.yaml` to keep the laws and their figure")
 
 
 def _render_left_out(to: Console, law: ParameterLaw) -> None:

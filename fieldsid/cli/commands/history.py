@@ -13,6 +13,8 @@ from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.options import FigureFile, Force, JsonFlag, ModelFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in
+from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,9 +48,11 @@ def command(
         "intact": all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
         "figure": _drawn(line, model, figure, context, force=force),
     }
-    if not as_json:
-        _warn(line)
-    return emit(body, as_json=as_json, render=lambda to: _render(to, line, body))
+    from fieldsid.artifacts import inputs_of
+    from fieldsid.cli.headlines.models import of_history
+
+    headline = of_history(body, inputs_of(model))
+    return emit(body, as_json=as_json, render=lambda to: _render(to, line, body), headline=headline, notes=_notes(line))
 
 
 def _entry(g: Generation) -> dict[str, Any]:
@@ -72,14 +76,16 @@ def _drawn(line: Sequence[Generation], model: Path, path: Path | None, context: 
     return str(save(figure(line, model.name), path, force=force, tasks=tasks_of(context)))
 
 
-def _warn(line: Sequence[Generation]) -> None:
+def _notes(line: Sequence[Generation]) -> list[Note]:
+    found: list[Note] = []
     for g in line:
         if g.state == "changed":
-            say(f"warning: `{g.path}` has changed since its child was made from it [parent_changed]")
+            found.append(Note("parent_changed", f"`{g.path}` has changed since its child was made from it", {}))
         elif g.state == "missing":
-            say(f"warning: `{g.path}` is missing: the line is not known before it [parent_missing]")
-        for path in g.step.changed_data if g.step else ():
-            say(f"warning: `{path}` has changed since `{g.path.name}` was made from it [data_changed]")
+            found.append(Note("parent_missing", f"`{g.path}` is missing: the line is not known before it", {}))
+        changed = g.step.changed_data if g.step else ()
+        found += [Note("data_changed", f"`{p}` has changed since `{g.path.name}` was made from it", {}) for p in changed]
+    return found
 
 
 def _render(to: Console, line: Sequence[Generation], body: Mapping[str, Any]) -> None:
@@ -89,8 +95,6 @@ def _render(to: Console, line: Sequence[Generation], body: Mapping[str, Any]) ->
     rows = [row for g in line if g.step for row in _rows(g)]
     if rows:
         to.print(table("", ("added", "error of", "before", "after", "noise", "x floor"), rows, left=2))
-    else:
-        to.print("nothing was added yet")
     to.print()
     for g in line:
         if g.step:
@@ -108,13 +112,13 @@ def _rows(g: Generation) -> list[tuple[str, ...]]:
 
     if g.step is None:
         return []
-    gain = g.step.gain
+    gain, (times, angle) = g.step.gain, shown_in("rad")
     before, after = (p.validation if gain.unseen else p.train for p in (gain.before, gain.after))
     channels = [
         (name, b, a, floor)
         for name, b, a, floor in (
-            ("angle, rad", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
-            ("rate, rad/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
+            (f"angle, {angle}", before.angle_rms_rad, after.angle_rms_rad, gain.noise_floor.angle),
+            (f"rate, {angle}/s", before.rate_rms_rad_s, after.rate_rms_rad_s, gain.noise_floor.rate),
         )
         if isfinite(b)
     ]
@@ -123,6 +127,6 @@ def _rows(g: Generation) -> list[tuple[str, ...]]:
     over = [f"{gain.over_floor[0]:.2f} -> {gain.over_floor[1]:.2f}", *([""] * (len(words) - 1))]
     channels += [("", float("nan"), float("nan"), float("nan"))] * (len(words) - len(channels))
     return [
-        (w, name, *(number(v, 3) if name else "" for v in (b, a, floor)), x)
+        (w, name, *(number(times * v, 3) if name else "" for v in (b, a, floor)), x)
         for w, (name, b, a, floor), x in zip(words, channels, over, strict=True)
     ]

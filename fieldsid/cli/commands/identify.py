@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, progress, table
+from fieldsid.cli.console import emit, progress, table
 from fieldsid.cli.options import (
     AxisOption,
     EffectNames,
@@ -26,6 +26,7 @@ from fieldsid.cli.options import (
 )
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import drawing
+from fieldsid.cli.voice import shown_estimate, shown_in
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from fieldsid.fitting.fit import Fit
     from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.fitting.predict.predict import Prediction
-    from fieldsid.logs import Run
+    from fieldsid.logs import Note, Run
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
@@ -100,9 +101,12 @@ def command(
     models = _written(fits, [files_of(group) for group in groups], output, context, figures=figures, force=force)
     entries = [_entry(fit, model, of) for fit, model, of in zip(fits, models, groups, strict=True)]
     body = {"schema": "fieldsid/identify/1", "axis": axis, "fits": entries, "skipped_runs": skips.records}
-    emit(body, as_json=as_json, render=lambda to: _render(to, entries))
+    from fieldsid.cli.headlines.models import of_identify
+
+    headline = of_identify(body, [files_of(group) for group in groups])
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, entries), headline=headline, notes=_warnings(entries))
     skips.end(len(used))
-    return body
+    return result
 
 
 def _written(
@@ -200,17 +204,18 @@ def _parameters(fit: Fit) -> dict[str, dict[str, Any]]:
     }
 
 
-def _render_warnings(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Say each kind of warning once, with the numbers of the first run that has it."""
+def _warnings(entries: Sequence[Mapping[str, Any]]) -> list[Note]:
+    """Return each kind of warning once, with the numbers of the first run that has it."""
+    from fieldsid.logs import Note
+
     seen: dict[str, list[str]] = {}
     first: dict[str, str] = {}
     for e in entries:
         for w in e["warnings"]:
             seen.setdefault(w["code"], []).append(_label(e))
             first.setdefault(w["code"], w["message"])
-    for code, runs in seen.items():
-        others = "" if len(runs) == 1 else f" (and {len(runs) - 1} more like it)"
-        to.print(f"warning: {runs[0]}: {first[code]} \\[{code}]{others}", soft_wrap=True)
+    more = {code: "" if len(runs) == 1 else f" (and {len(runs) - 1} more like it)" for code, runs in seen.items()}
+    return [Note(code, f"{runs[0]}: {first[code]}{more[code]}", {}) for code, runs in seen.items()]
 
 
 def _render_reasons(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
@@ -228,31 +233,25 @@ def _label(entry: Mapping[str, Any]) -> str:
 
 
 def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
-    from fieldsid.rounding import in_unit, interval, number, with_error
+    from fieldsid.rounding import number
 
-    _render_warnings(to, entries)
     rows = [
-        (
-            _label(e) if i == 0 else "",
-            p["shown"],
-            with_error(p["value"], p["std_error"]),
-            in_unit(p["unit"]),
-            interval(*p["interval95"]),
-        )
+        (_label(e) if i == 0 else "", p["shown"], *shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"]))
         for e in entries
         for i, p in enumerate(e["parameters"].values())
     ]
+    times, angle = shown_in("rad")
     to.print(table("", ("run", "parameter", "value", "unit", "95 % interval"), rows, left=2))
     to.print()
     merits = [
         (
             r["run"],
             number(r["speed_m_s"], 3),
-            number(r["angle_rms_rad"], 2),
-            number(e["noise_floor"]["angle_rad"], 2),
+            number(times * r["angle_rms_rad"], 2),
+            number(times * e["noise_floor"]["angle_rad"], 2),
             number(r["angle_fit_percent"], 3),
-            number(r["rate_rms_rad_s"], 2),
-            number(e["noise_floor"]["rate_rad_s"], 2),
+            number(times * r["rate_rms_rad_s"], 2),
+            number(times * e["noise_floor"]["rate_rad_s"], 2),
             number(r["rate_fit_percent"], 3),
         )
         for e in entries
@@ -260,10 +259,8 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
     ]
     columns = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
     to.print(table("", columns, merits))
-    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in rad, rate in rad/s")
+    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in {angle}, rate in {angle}/s")
     _render_reasons(to, entries)
     for e in entries:
         if e["model"]:
             to.print(f"model: {e['model']}", soft_wrap=True)
-    if not any(e["model"] for e in entries):
-        messages().print("nothing was written: add `-o DIR` to keep the models and their figures")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,6 +27,7 @@ def command(
     Example: sysid init pandan --template torpedo
     """
     from fieldsid.cli.console import emit
+    from fieldsid.cli.headlines.trial import of_trial
     from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, append
     from fieldsid.trial_folder.make import new_trial
 
@@ -42,7 +42,6 @@ def command(
     def render(console: Console) -> None:
         for file in files:
             console.print(str(file), markup=False, soft_wrap=True)
-        console.print(f"next: fill in vehicle.yaml, then `cd {shlex.quote(name)} && sysid status`", markup=False, soft_wrap=True)
 
     body = {"schema": "fieldsid/init/1", "folder": name, "template": template, "files": [str(f) for f in files]}
-    emit(body, as_json=as_json, render=render)
+    emit(body, as_json=as_json, render=render, headline=of_trial(body))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -32,15 +31,15 @@ def command(
 
     Example: sysid inspect run7.mcap --write-mapping mapping.yaml
     """
-    from fieldsid.cli.console import emit, say, tracked
+    from fieldsid.cli.console import emit, tracked
+    from fieldsid.cli.headlines.logs import of_inspection
     from fieldsid.logs.inspection import inspect_log, write_proposal
 
     for path, on_share in tracked([log], "reading"):
         found = inspect_log(path, mapping=mapping, msg_path=msg_path, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
-    emit(found.record(written), as_json=as_json, render=lambda console: _render(found, console))
-    if written is not None:
-        say(f"wrote {written}; check it, then: sysid import {quote(str(log))} --mapping {quote(str(written))} -o runs/")
+    body = found.record(written)
+    emit(body, as_json=as_json, render=lambda console: _render(found, console), headline=of_inspection(body, mapping))
 
 
 def _render(found: Inspection, console: Console) -> None:
@@ -49,7 +48,6 @@ def _render(found: Inspection, console: Console) -> None:
     from fieldsid.cli.console import table
 
     record: dict[str, Any] = found.record(None)
-    console.print(Text(f"{record['path']}: {record['format']}, {record['span']}"))
     rows = [(c["name"], c["type"], str(c["count"]), c["rate"], c["holds"]) for c in record["shown"]]
     console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
     console.print(Text("\nmapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), style="bold"))

@@ -20,8 +20,11 @@ from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from fieldsid.online.identifier import OnlineIdentifier
-    from fieldsid.online.progress import Goal
+    from fieldsid.online.progress import Goal, Watch
     from fieldsid.online.samples import MessageReader, Sample
+
+SOURCE, GOAL = "Where the samples come from", "What is to be reached"
+"""The groups of its own options on the page of help."""
 
 Log = Annotated[
     Path | None,
@@ -30,24 +33,55 @@ Log = Annotated[
     ),
 ]
 Factor = Annotated[
-    float, typer.Option("--speed", metavar="FACTOR", min=0.0, help="How many times as fast as logged to replay; 0 does not wait.")
+    float,
+    typer.Option(
+        "--speed",
+        metavar="FACTOR",
+        min=0.0,
+        help="How many times as fast as logged to replay; 0 does not wait.",
+        rich_help_panel=SOURCE,
+    ),
 ]
-Follow = Annotated[bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.")]
+Follow = Annotated[
+    bool, typer.Option("--follow", "-f", help="Go on as the log grows: CSV, MCAP, a bag's folder.", rich_help_panel=SOURCE)
+]
 Port = Annotated[
     int | None,
-    typer.Option("--udp", metavar="PORT", min=1, max=65535, help="Take JSON lines as UDP on this machine.", show_default=False),
+    typer.Option(
+        "--udp",
+        metavar="PORT",
+        min=1,
+        max=65535,
+        help="Take JSON lines as UDP on this machine.",
+        show_default=False,
+        rich_help_panel=SOURCE,
+    ),
 ]
 Idle = Annotated[
     float | None,
-    typer.Option("--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False),
+    typer.Option(
+        "--idle", metavar="S", min=0.1, help="End when nothing has come for so long.", show_default=False, rich_help_panel=SOURCE
+    ),
 ]
 PlanFile = Annotated[
     Path | None,
-    typer.Option("--plan", metavar="YAML", help="The accuracy to reach is what this plan promised.", show_default=False),
+    typer.Option(
+        "--plan",
+        metavar="YAML",
+        help="The accuracy to reach is what this plan promised.",
+        show_default=False,
+        rich_help_panel=GOAL,
+    ),
 ]
 Want = Annotated[
     str | None,
-    typer.Option("--want", metavar="A=5%,...", help="The accuracy to reach; 5 % of each but the trim.", show_default=False),
+    typer.Option(
+        "--want",
+        metavar="A=5%,...",
+        help="The accuracy to reach; 5 % of each but the trim.",
+        show_default=False,
+        rich_help_panel=GOAL,
+    ),
 ]
 StateFile = Annotated[
     Path | None,
@@ -56,7 +90,9 @@ StateFile = Annotated[
 Every = Annotated[float, typer.Option("--every", metavar="S", min=0.1, help="Seconds of the log between two looks.")]
 Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
 Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor; 1 forgets nothing.")]
-UntilEnough = Annotated[bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.")]
+UntilEnough = Annotated[
+    bool, typer.Option("--until-enough", help="End at enough data; exit code 1 where that is not reached.", rich_help_panel=GOAL)
+]
 
 SAVE_EVERY_S = 1.0
 
@@ -88,11 +124,14 @@ def command(
     _check_source(log, udp, follow=follow)
     feed = _Feed(axis, log, speed if speed > 0.0 else inf, follow, udp, inf if idle is None else idle, mapping)
     goals, goals_from = _goals(axis, plan, want)
-    identifier, skipped = _begun(feed, state, bandwidth, forgetting)
+    from fieldsid.online.progress import Watch
+
+    watch = Watch(goals(float("nan")))
+    identifier, skipped = _begun(feed, state, watch, bandwidth, forgetting)
     body: Mapping[str, Any] = {}
     with _shown(as_json=as_json) as show:
         try:
-            for body in _looks(feed, identifier, goals, goals_from, every, state, skipped):
+            for body in _looks(feed, identifier, watch, goals, goals_from, every, state, skipped):
                 show(body)
                 if until_enough and body["verdict"] == "enough":
                     break
@@ -101,7 +140,7 @@ def command(
                 raise
         finally:
             if state is not None:
-                _save(state, identifier, feed.name)
+                _save(state, identifier, watch, feed.name)
     if not as_json:
         _end(body)
     if until_enough and body["verdict"] != "enough":
@@ -191,17 +230,18 @@ def _goals(axis: AxisOption, plan: Path | None, want: str | None) -> tuple[Calla
     return (lambda _speed: default_goals(axis)), f"{100.0 * DEFAULT_ACCURACY:.0f} % of each value"
 
 
-def _begun(feed: _Feed, state: Path | None, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
+def _begun(feed: _Feed, state: Path | None, watch: Watch, bandwidth: float, forgetting: float) -> tuple[OnlineIdentifier, float]:
     """Return the identifier, from its state where there is one, and the time up to which the source is known to it."""
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.state_file import load_state
 
     if state is None or not state.exists():
         return OnlineIdentifier(feed.axis, bandwidth=bandwidth, forgetting=forgetting), -inf
-    identifier, source = load_state(state, feed.axis)
+    identifier, source = load_state(state, feed.axis, watch)
     say(f"going on from `{state}`: {identifier.estimate().used} samples up to {identifier.time:.1f} s of `{source}`")
     if feed.is_log and source == feed.name and isfinite(identifier.time):
         return identifier, identifier.time
+    watch.forget()
     if source != feed.name:
         identifier.begin_again()
     return identifier, -inf
@@ -210,6 +250,7 @@ def _begun(feed: _Feed, state: Path | None, bandwidth: float, forgetting: float)
 def _looks(
     feed: _Feed,
     identifier: OnlineIdentifier,
+    watch: Watch,
     goals: Callable[[float], Mapping[str, Goal]],
     goals_from: str,
     every: float,
@@ -220,9 +261,7 @@ def _looks(
     import time as clock
 
     from fieldsid.online.look import look_body
-    from fieldsid.online.progress import Watch
 
-    watch = Watch(goals(float("nan")))
     due, saved, fresh = -inf, clock.monotonic(), True
 
     def look() -> Mapping[str, Any]:
@@ -243,16 +282,16 @@ def _looks(
                 yield look()
                 fresh = False
             if state is not None and clock.monotonic() - saved >= SAVE_EVERY_S:
-                _save(state, identifier, feed.name)
+                _save(state, identifier, watch, feed.name)
                 saved = clock.monotonic()
     if fresh:
         yield look()
 
 
-def _save(state: Path, identifier: OnlineIdentifier, source: str) -> None:
+def _save(state: Path, identifier: OnlineIdentifier, watch: Watch, source: str) -> None:
     from fieldsid.online.state_file import save_state
 
-    save_state(state, identifier, source)
+    save_state(state, identifier, watch, source)
 
 
 @contextmanager

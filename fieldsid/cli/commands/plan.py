@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, progress, say
-from fieldsid.cli.options import Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
+from fieldsid.cli.options import LIMITS, WRITTEN, Figures, Force, JsonFlag, OutputDir, VehicleFile, names_of
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in
 from fieldsid.models.axis import Axis
 
 if TYPE_CHECKING:
@@ -26,42 +27,58 @@ if TYPE_CHECKING:
 Text = str | None
 
 
-def _option(name: str, metavar: str, says: str) -> Any:
-    return typer.Option(name, metavar=metavar, help=says, show_default=False)
+GOAL, FLOWN, KNOWN = "What to learn", "How it is flown", "What is known before"
+"""The groups of its own options on the page of help."""
 
 
-Speeds = Annotated[Text, _option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.")]
-Believed = Annotated[Path | None, _option("--model", "YAML", "What is known before: a model or a prior file.")]
-PlannedAxis = Annotated[Axis | None, _option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.")]
-PriorName = Annotated[Text, _option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.")]
+def _option(name: str, metavar: str, says: str, group: str) -> Any:
+    return typer.Option(name, metavar=metavar, help=says, show_default=False, rich_help_panel=group)
+
+
+Speeds = Annotated[Text, _option("--speeds", "M_S,..", "`1.0,1.4,1.8` or `1.0:1.8:0.4`; the prior's own if not given.", GOAL)]
+Believed = Annotated[Path | None, _option("--model", "YAML", "What is known before: a model or a prior file.", KNOWN)]
+PlannedAxis = Annotated[Axis | None, _option("--axis", "AXIS", "The plane to plan for; yaw, or that of a diagnosis.", GOAL)]
+PriorName = Annotated[Text, _option("--prior", "NAME", "A prior that is shipped, torpedo where no model is given.", KNOWN)]
 Want = Annotated[
     Text,
     _option(
         "--want",
         "a22=5%,..",
         "Standard errors to reach at every speed, in shares of the value; of the trim, in shares of full fin.",
+        GOAL,
     ),
 ]
-Minutes = Annotated[float | None, _option("--minutes", "MIN", "Time there is for all legs, turns included.")]
-Area = Annotated[Text, _option("--area", "LxW", "Length along the leg and width across it, m.")]
-DepthBand = Annotated[Text, _option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.")]
-MaxHeading = Annotated[Text, _option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.")]
-MaxTrack = Annotated[float | None, _option("--max-track", "M", "Largest distance from the leg's line.")]
-MaxPitch = Annotated[Text, _option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.")]
-MaxRoll = Annotated[Text, _option("--max-roll", "ANGLE", "Largest roll, `20deg`.")]
-FinMax = Annotated[Text, _option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.")]
-FinRate = Annotated[Text, _option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.")]
-Share = Annotated[float, typer.Option("--risk", metavar="SHARE", help="Accepted probability of leaving the envelope.")]
-WindowS = Annotated[float | None, _option("--window", "S", "Length of the part that is identified on; 33, to separate 60.")]
-RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight run before it.")]
-RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.")]
-Radius = Annotated[bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.")]
-OpenLoop = Annotated[bool, typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.")]
-Separate = Annotated[Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.")]
-FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.")]
-Course = Annotated[Text, _option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.")]
-Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.")]
-Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.")]
+Minutes = Annotated[float | None, _option("--minutes", "MIN", "Time there is for all legs, turns included.", LIMITS)]
+Area = Annotated[Text, _option("--area", "LxW", "Length along the leg and width across it, m.", LIMITS)]
+DepthBand = Annotated[Text, _option("--depth-band", "M:M", "Shallowest and deepest, m; entered at the middle.", LIMITS)]
+MaxHeading = Annotated[Text, _option("--max-heading", "ANGLE", "Largest deviation of heading; 60deg in yaw, or `none`.", LIMITS)]
+MaxTrack = Annotated[float | None, _option("--max-track", "M", "Largest distance from the leg's line.", LIMITS)]
+MaxPitch = Annotated[Text, _option("--max-pitch", "ANGLE", "Largest pitch; 30deg in pitch, or `none`.", LIMITS)]
+MaxRoll = Annotated[Text, _option("--max-roll", "ANGLE", "Largest roll, `20deg`.", LIMITS)]
+FinMax = Annotated[Text, _option("--fin-max", "ANGLE", "Fin limit; the vehicle's own if not given, else 0.26 rad.", LIMITS)]
+FinRate = Annotated[Text, _option("--fin-rate", "ANGLE", "Fin rate limit per second; the vehicle's own if not given.", LIMITS)]
+Share = Annotated[
+    float, typer.Option("--risk", metavar="SHARE", help="Accepted probability of leaving the envelope.", rich_help_panel=LIMITS)
+]
+WindowS = Annotated[
+    float | None, _option("--window", "S", "Length of the part that is identified on; 33, to separate 60.", FLOWN)
+]
+RunUpS = Annotated[float, typer.Option("--run-up", metavar="S", help="Straight run before it.", rich_help_panel=FLOWN)]
+RateHz = Annotated[float, typer.Option("--rate", metavar="HZ", help="The vehicle's command rate.", rich_help_panel=FLOWN)]
+Radius = Annotated[
+    bool, typer.Option("--radius", help="Add full-fin circles, so that the turn radius is measured.", rich_help_panel=GOAL)
+]
+OpenLoop = Annotated[
+    bool,
+    typer.Option("--open-loop", help="Leave out maneuvers that follow the motion, such as the zig-zag.", rich_help_panel=FLOWN),
+]
+Separate = Annotated[Text, _option("--separate", "A,B", "What tells these effects apart; `none` is the plain model.", GOAL)]
+FromDiagnosis = Annotated[Path | None, _option("--from", "YAML", "A diagnosis: tell its rivals apart.", GOAL)]
+Course = Annotated[
+    Text, _option("--course", "ANGLE", "Compass course of the legs, `90deg`: a MOOS helm then watches headings.", FLOWN)
+]
+Write = Annotated[Text, _option("--write", "csv,..", "Some of csv, ros2, moos, dune, ardupilot; else all.", WRITTEN)]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the search and of the draws.", rich_help_panel=FLOWN)]
 
 
 def command(
@@ -127,10 +144,9 @@ def command(
         check_effects([(model, made.model)])
     files = [] if output is None else _written(made.plan, made.model, asked, output, write, context, figures=figures, force=force)
     body = {"schema": "fieldsid/plan/1", **made.body, "files": [str(f) for f in files]}
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body))
-    if output is None:
-        say("nothing was written: add `-o DIR` for the plan, the fin commands, mission snippets and the figure")
-    return result
+    from fieldsid.cli.headlines.trial import of_plan
+
+    return emit(body, as_json=as_json, render=lambda to: _render(to, made.plan, body), headline=of_plan(body, model))
 
 
 def _check_write(write: str | None, output: Path | None) -> None:
@@ -175,6 +191,7 @@ def _render(to: Console, plan: Plan, body: Mapping[str, Any]) -> None:
     from fieldsid.cli.console import table
     from fieldsid.rounding import number
 
+    times, angle = shown_in("rad")
     rows = [
         (
             number(leg.speed, 3),
@@ -183,11 +200,11 @@ def _render(to: Console, plan: Plan, body: Mapping[str, Any]) -> None:
             number(leg.duration_s / 60, 2),
             number(leg.distance_m, 3),
             f"{100 * leg.break_probability:.1f}%",
-            *(number(v, 2) for v in _reached(leg.excursions)),
+            *(number(v, 2) for v in _reached(leg.excursions, times)),
         )
         for leg in plan.legs
     ]
-    columns = ("speed", "maneuver", "passes", "min", "m", "risk", "angle rad", "side m")
+    columns = ("speed", "maneuver", "passes", "min", "m", "risk", f"angle {angle}", "side m")
     to.print(table(f"{plan.vehicle}, {plan.axis.value}: what to fly", columns, rows, left=2))
     errors = [(number(leg.speed, 3), name, *_bought(e, leg.passes)) for leg in plan.legs for name, e in leg.expected.items()]
     to.print(table("what it buys", ("speed", "parameter", "expected", "error", "at worst", "pulses need"), errors, left=2))
@@ -217,9 +234,9 @@ def _render_limits(to: Console, plan: Plan) -> None:
         to.print(f"not in the risk, only to be watched in flight: {', '.join(watched)}")
 
 
-def _reached(excursions: Mapping[str, float]) -> tuple[float, float]:
-    """Return the 95 % quantiles of angle and sideways distance, of whichever axis moves."""
-    angle = max(excursions.get(k, 0.0) for k in ("heading", "pitch"))
+def _reached(excursions: Mapping[str, float], times: float) -> tuple[float, float]:
+    """Return the 95 % quantiles of angle, so many times what it is in rad, and sideways distance, of whichever axis moves."""
+    angle = times * max(excursions.get(k, 0.0) for k in ("heading", "pitch"))
     return angle, max(excursions.get(k, 0.0) for k in ("track", "depth"))
 
 

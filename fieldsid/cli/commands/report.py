@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say
+from fieldsid.cli.console import emit
 from fieldsid.cli.options import Force, JsonFlag
-from fieldsid.cli.progress import get_ready, refuse_existing
+from fieldsid.cli.progress import get_ready
+from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -39,24 +40,14 @@ def command(files: Files = None, output: Page = None, force: Force = False, as_j
 
     Example: sysid report pandan -o pandan.pdf
     """
-    from fieldsid.errors import UsageError
-
     given = files or [Path()]
     state = _state(given)
     path = output or state.folder / "report.html"
-    if path.suffix not in (".html", ".pdf"):
-        raise UsageError("a report is HTML or PDF", found=f"`{path}`", hint=f"write `{path.with_suffix('.html')}`")
-    refuse_existing(path, force=force)
-    from fieldsid.report.pdf import check_browser
+    from fieldsid.reporting.write import check_report, written
 
-    if path.suffix == ".pdf":
-        check_browser(path)
+    check_report(path, force=force)
     get_ready()
-    from fieldsid.report.material import material_of
-    from fieldsid.report.sections import context_of
-
-    context = context_of(material_of(state))
-    text = _written(context, path, force=force)
+    context, text = written(state, path, force=force)
     body = {
         "schema": "fieldsid/report/1",
         "file": str(path),
@@ -67,10 +58,11 @@ def command(files: Files = None, output: Page = None, force: Force = False, as_j
         "figures": text.count('<svg class="chart"') + text.count('<svg class="bars"'),
         "skipped": context["skipped"],
     }
-    if not as_json:
-        for line in context["skipped"]:
-            say(f"warning: {line} [not_in_report]")
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    from fieldsid.cli.headlines.trial import of_report
+
+    notes = [Note("not_in_report", line, {}) for line in context["skipped"]]
+    headline = of_report(body, state.folder)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=headline, notes=notes)
 
 
 def _state(given: Sequence[Path]) -> FolderState:
@@ -89,20 +81,6 @@ def _state(given: Sequence[Path]) -> FolderState:
     return state_of(here if above == here.resolve() else above, files=given)
 
 
-def _written(context: Mapping[str, Any], path: Path, *, force: bool) -> str:
-    from fieldsid.artifacts import write_text
-    from fieldsid.report.page import html_of
-    from fieldsid.report.pdf import print_pdf
-
-    text = html_of(context)
-    if path.suffix == ".pdf":
-        print_pdf(text, path, force=force)
-    else:
-        write_text(path, text, force=force)
-    return text
-
-
 def _render(to: Console, body: Mapping[str, Any]) -> None:
-    for v in body["verdicts"]:
+    for v in body["verdicts"][1:]:
         to.print(f"{v['what']}: {v['says']}", markup=False, soft_wrap=True)
-    to.print(f"report: {body['file']} ({body['bytes'] / 1e6:.2f} MB, {body['figures']} figures)", markup=False, soft_wrap=True)

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, say, table
-from fieldsid.cli.options import Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
+from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.headlines.gains import of_design, of_export, of_verification
+from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
+from fieldsid.cli.voice import shown_in
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,20 +44,28 @@ FinLimit = Annotated[
         "--fin-limit",
         metavar="ANGLE",
         help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
+        rich_help_panel=LIMITS,
     ),
 ]
 FinRate = Annotated[
-    str | None, typer.Option("--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.")
+    str | None,
+    typer.Option(
+        "--fin-rate", metavar="ANGLE", help="Fastest fin per s; the vehicle's or model's if not given.", rich_help_panel=LIMITS
+    ),
 ]
 FinLag = Annotated[
-    float | None, typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.")
+    float | None,
+    typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.", rich_help_panel=LIMITS),
 ]
 Delay = Annotated[
-    float | None, typer.Option("--delay", metavar="S", help="Dead time from command to fin; the model's if not given.")
+    float | None,
+    typer.Option("--delay", metavar="S", help="Dead time from command to fin; the model's if not given.", rich_help_panel=LIMITS),
 ]
 Latency = Annotated[
     float | None,
-    typer.Option("--latency", metavar="S", help="The autopilot's own, sensor to command, with half its period."),
+    typer.Option(
+        "--latency", metavar="S", help="The autopilot's own, sensor to command, with half its period.", rich_help_panel=LIMITS
+    ),
 ]
 Depth = Annotated[bool, typer.Option("--depth", help="Add the depth loop above pitch.")]
 OwnLaw = Annotated[
@@ -144,7 +154,8 @@ def design(
     if output is not None:
         inputs = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
-    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, source, body))
+    headline = of_design(body, models)
+    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, source, body), headline=headline)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -202,10 +213,11 @@ def verify(
         "passed": all(g.passed for g in gates),
         "figure": None if output is None else _draw(known, checked, output, context, force=force),
     }
-    emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body))
+    headline = of_verification(body, schedule, models or source.paths)
+    result = emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body), headline=headline)
     if not body["passed"]:
         raise typer.Exit(1)
-    return body
+    return result
 
 
 @command.command("export", short_help="Write the gains for the vehicle's software.")
@@ -246,7 +258,8 @@ def export(
         from fieldsid.artifacts import write_text
 
         body["file"] = str(write_text(output, text, force=force))
-    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body))
+    headline = of_export(body, schedule) if body["file"] else None  # without a file the text is all there is
+    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body), headline=headline)
 
 
 def _export_into(schedule: Schedule, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
@@ -270,7 +283,7 @@ def _limits(
     """Return fin limit and fin rate: the options, else the vehicle's, else the largest fin the models were trained on."""
     from fieldsid.face.arguments import fin_limits_of, vehicle_of
 
-    return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, messages().print)
+    return fin_limits_of(fin_limit, fin_rate, vehicle_of(vehicle), source, say)
 
 
 def _draw(schedule: Schedule, checked: Verification, path: Path, context: typer.Context, *, force: bool) -> str:
@@ -287,15 +300,15 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
     from fieldsid.schedule.verdict import fin_of, lost
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
-    extra = ("kz",) if schedule.depth else ()
+    (times, angle), extra = shown_in("rad"), ("kz",) if schedule.depth else ()
     rows = [
         (
             number(r.speed, 3),
             number(r.gains.kp),
             number(r.gains.ki, 3),
             number(r.gains.kd, 3),
-            number(r.feed_forward, 3),
-            number(r.fin_limit, 3),
+            number(times * r.feed_forward, 3),
+            number(times * r.fin_limit, 3),
             *((number(r.depth_gain, 3),) if schedule.depth else ()),
             f"{r.phase_margin_deg:.0f}",
             f"{r.slowed:.2f}",
@@ -306,7 +319,7 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
         for r in schedule.rows
     ]
     columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "settle s", "held", "data")
-    to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed", columns, rows, left=0))
+    to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angle}", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
     counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
     to.print(f"counted with: {'; '.join(counted)}")
@@ -323,18 +336,11 @@ def _render_design(to: Console, schedule: Schedule, source: ParameterSource, bod
         )
     if body["file"]:
         to.print(f"schedule: {body['file']}", soft_wrap=True)
-    else:
-        messages().print("nothing was written: add `-o gains.yaml` to verify and export it")
 
 
 def _render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) -> None:
     from math import degrees
 
-    from rich.text import Text
-
-    to.print(Text(f"{body['verdict']}: {body['says']}", style="bold"), soft_wrap=True)
-    to.print(Text(body["rests_on"]), soft_wrap=True)
-    to.print()
     small, usual, large = (degrees(step.size) for step in checked.scheduled[0].steps)
     columns = (
         "m/s", "phase", "least", "dB", "delay", "over", "most", f"{small:.0f}", f"{usual:.0f}", "most", f"{large:.0f}", "const",

@@ -10,6 +10,7 @@ import typer
 
 from fieldsid.cli.console import emit
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile
+from fieldsid.cli.voice import shown_in
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ def command(
 
     Example: sysid simulate model.yaml --maneuver zigzag:amplitude=15deg --speed 1.4 -o zigzag.csv
     """
+    from fieldsid.cli.headlines.models import of_simulation
     from fieldsid.cli.user_effects import read_model
 
     if (maneuver is None) == (run is None):
@@ -83,7 +85,8 @@ def command(
         "seconds": float(made.time[-1] - made.time[0]),
         "signals": {n: {"low": float(v.min()), "high": float(v.max()), "end": float(v[-1])} for n, v in made.signals.items()},
     }
-    return emit(body, as_json=as_json, render=lambda to: _render(to, body))
+    headline = of_simulation(body, known.axis.value, maneuver, run)
+    return emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=headline)
 
 
 def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
@@ -115,10 +118,14 @@ def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | Non
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from fieldsid.cli.console import table
+    from fieldsid.logs.run import SIGNALS
     from fieldsid.rounding import number
 
-    to.print(
-        f"{body['run']}: {body['samples']} samples, {body['seconds']:.1f} s" + (f", in {body['file']}" if body["file"] else "")
-    )
-    rows = [(name, *(number(v[k]) for k in ("low", "high", "end"))) for name, v in body["signals"].items()]
-    to.print(table("", ("signal", "low", "high", "end"), rows))
+    rows = [
+        (name, *(number(factor * v[k]) for k in ("low", "high", "end")), unit)
+        for name, v in body["signals"].items()
+        for factor, unit in [shown_in(SIGNALS[name])]
+    ]
+    to.print(table("", ("signal", "low", "high", "end", "unit"), rows))
+    if body["file"]:
+        to.print(f"run: {body['file']}", soft_wrap=True)

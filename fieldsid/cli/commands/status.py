@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.console import emit, table
+from fieldsid.cli.headlines.trial import of_status
 from fieldsid.cli.options import JsonFlag
+from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,6 +26,8 @@ NAMES = {
     "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping",
 }  # fmt: skip
 ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule")
+MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
+"""Files that hold several of what they are named after, and words whose plural is their own."""
 MOST_SOURCES = 2
 LAST = 3
 
@@ -63,9 +67,9 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
         "unreadable_journal_lines": state.broken_lines,
         "next": {"why": why, "command": line},
     }
-    if state.broken_lines and not as_json:
-        say(f"warning: {state.broken_lines} lines of the journal cannot be read [journal]")
-    return emit(body, as_json=as_json, render=lambda to: _render(to, state, body))
+    broken = f"{state.broken_lines} lines of the journal cannot be read"
+    notes = [Note("journal", broken, {})] if state.broken_lines else []
+    return emit(body, as_json=as_json, render=lambda to: _render(to, state, body), headline=of_status(body), notes=notes)
 
 
 def _verdict(state: FolderState) -> str:
@@ -77,7 +81,9 @@ def _verdict(state: FolderState) -> str:
 
 
 def _many(count: int, name: str) -> str:
-    return f"{count} {name}" if count == 1 or name in ("laws", "gains", "diagnosis") else f"{count} {name}s"
+    if name in MANY_IN_ONE:
+        return name if count == 1 else f"{count} files of {name}"
+    return f"1 {name}" if count == 1 else f"{count} {SEVERAL.get(name, name + 's')}"
 
 
 def _entry(item: Item) -> dict[str, Any]:
@@ -86,15 +92,10 @@ def _entry(item: Item) -> dict[str, Any]:
 
 
 def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:
-    to.print(body["verdict"], markup=False, soft_wrap=True)
-    to.print(f"because: {body['next']['why']}", markup=False, soft_wrap=True)
-    if body["next"]["command"]:
-        to.print(f"next: {body['next']['command']}", markup=False, soft_wrap=True)
     used = {s.path for i in state.of_kind("run") for s in i.sources}  # a log that has become a run says no more
     listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
     shown = sorted(listed, key=lambda i: (ORDER.index(i.kind), i.path))
     if shown:
-        to.print()
         to.print(table("", ("file", "what", "made from", ""), [_row(i) for i in shown], left=4))
     kept = [e for e in state.entries if e.verdict][-LAST:]
     if kept:

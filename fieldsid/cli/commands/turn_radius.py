@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table, warn
+from fieldsid.cli.console import emit, say, table
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.skipped_logs import Skips
+from fieldsid.cli.voice import shown_in
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,6 +77,7 @@ def command(
     Example: sysid turn-radius models/*.yaml --rudder-max 0.35 --measured circle.parquet -o turning/
     """
     from fieldsid.angles import FIN, parse_angle
+    from fieldsid.cli.headlines.gains import of_turn
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.speeds import speeds_of
@@ -101,11 +103,10 @@ def command(
     body["skipped_runs"] = skips.records
     if output is not None:
         body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
-    if not as_json:
-        warn(prediction.notes)
-    emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body))
+    headline, notes = of_turn(body, models), prediction.notes
+    result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
-    return body
+    return result
 
 
 def _fin_zero(text: str) -> float:
@@ -178,6 +179,8 @@ def _written(
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
     from fieldsid.rounding import number
 
+    times, angle = shown_in("rad")
+    methods = ", ".join(sorted({r.method for r in prediction.rows}))
     columns = ("side", "m/s", "radius m", "from", "to (95 %)", "model's", "deg/s", "180 deg s", "trust")
     rows = [
         (
@@ -194,7 +197,11 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
         for r in prediction.rows
     ]
     to.print(
-        table(f"rudder {prediction.rudder_max:.4g} rad, {', '.join(sorted({r.method for r in prediction.rows}))}", columns, rows)
+        table(
+            f"rudder {times * prediction.rudder_max:.4g} {angle}, {methods}",
+            columns,
+            rows,
+        )
     )
     _render_measured(to, prediction)
     for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
@@ -213,12 +220,12 @@ def _render_measured(to: Console, prediction: TurnPrediction) -> None:
 
     if not prediction.measured:
         return
-    rows = []
+    rows, times = [], shown_in("rad")[0]
     for m in prediction.measured:
         circle = m.turn.circle
         off = 100.0 * (m.predicted / circle.radius - 1.0)
         band = f"{number(m.predicted95[0], 3)} .. {number(m.predicted95[1], 3)}"
         radius = with_error(circle.radius, circle.radius_std_error)
-        rows.append((m.turn.run, number(m.turn.fin, 3), radius, number(m.predicted), band, f"{off:+.1f}"))
+        rows.append((m.turn.run, number(times * m.turn.fin, 3), radius, number(m.predicted), band, f"{off:+.1f}"))
     to.print()
     to.print(table("measured circles", ("run", "fin", "radius m", "predicted", "95 %", "off %"), rows))

@@ -11,6 +11,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from fieldsid.cli.console import print_headline
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.voice import shown_estimate, shown_in
+
 STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
 BAR = 20
 
@@ -18,7 +22,9 @@ BAR = 20
 def screen(body: Mapping[str, Any]) -> RenderableType:
     """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
     head = Text(body["said"], style=STYLE[body["verdict"]])
-    return Group(head, Text(rests_on(body), style="dim"), Text(), _parameters(body), Text(), _meters(body), _met(body))
+    return Group(
+        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), _parameters(body), Text(), _meters(body), _met(body)
+    )
 
 
 def line(body: Mapping[str, Any]) -> str:
@@ -38,29 +44,26 @@ def rests_on(body: Mapping[str, Any]) -> str:
 
 
 def final(to: Console, body: Mapping[str, Any]) -> None:
-    """Print the last look: verdict, what it rests on, the table, the next command."""
-    to.print(Text(body["said"], style=STYLE[body["verdict"]]), soft_wrap=True)
-    to.print(rests_on(body), soft_wrap=True)
+    """Print the last look: verdict, what it rests on, the next command, the table."""
+    print_headline(to, Headline(body["said"], rests_on(body), body["next"]))
     to.print()
     to.print(_parameters(body))
-    if body["next"]:
-        to.print(f"\nnext: {body['next']}", soft_wrap=True)
 
 
 def _parameters(body: Mapping[str, Any]) -> Table:
-    from fieldsid.rounding import in_unit, interval, with_error
-
     made = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name in ("", "value", "unit", "95 % band", "error", "wanted", ""):
         made.add_column(name, justify="right" if name else "left", header_style="dim", no_wrap=True)
     for name, p in body["parameters"].items():
-        wanted, unit = _error(p["goal_std_error"], p["value"]), in_unit(p["unit"])
+        (factor, unit), wanted = shown_in(p["unit"]), p["goal_std_error"]
+        value = None if p["value"] is None else factor * p["value"]
+        wanted = _error(None if wanted is None else abs(factor) * wanted, value)
         if p["std_error"] is None:
-            made.add_row(name, "-", unit, "-", "-", "-", "")
+            made.add_row(name, "-", unit, "-", "-", wanted, "")
             continue
-        band, error = interval(*p["interval95"]), _error(p["std_error"], p["value"])
+        shown, _, band = shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])
         state = Text("settled", style="green") if p["settled"] else Text("moving", style="yellow")
-        made.add_row(name, with_error(p["value"], p["std_error"]), unit, band, error, wanted, state)
+        made.add_row(name, shown, unit, band, _error(factor * p["std_error"], value), wanted, state)
     return made
 
 

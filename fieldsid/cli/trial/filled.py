@@ -11,7 +11,7 @@ from types import MappingProxyType
 from fieldsid.cli.trial.parsed import Parsed
 from fieldsid.trial_folder.make import MODELS, RUNS
 from fieldsid.trial_folder.next_step import chosen_models, run_words, trained_runs, unseen_runs
-from fieldsid.trial_folder.state import MODEL, FolderState, Item
+from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
 
 Fill = Callable[[Parsed, FolderState], list[str]]
 
@@ -82,6 +82,27 @@ def _schedule(parsed: Parsed, state: FolderState) -> list[str]:
     return [] if parsed.values.get("schedule") else [i.path for i in state.of_kind("schedule")[-1:]]
 
 
+def _live(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the newest run, where nothing else is listened to, and what the plan of the axis promised."""
+    runs = [] if parsed.values.get("log") or parsed.values.get("udp") else _newest(state)
+    axis, is_stated = parsed.values.get("axis"), parsed.values.get("plan") or parsed.values.get("want")
+    plans = [] if is_stated else [i.path for i in state.of_kind("plan") if (i.body or {}).get("axis") == axis]
+    return [*runs, *[word for plan in plans[-1:] for word in ("--plan", plan)]]
+
+
+def _newest(state: FolderState) -> list[str]:
+    """Return the run that was written last, of runs and logs together where none was imported."""
+    items = state.of_kind(RUN) or state.of_kind(LOG)
+    return [max(items, key=lambda i: (state.place(i).stat().st_mtime_ns, i.path)).path] if items else []
+
+
+def _batch(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the folder's logs, its runs where there are no logs, and the vehicle, whose fin limits are not looked for by it."""
+    logs = [] if parsed.values.get("logs") else [i.path for i in state.of_kind(LOG) or state.of_kind(RUN)]
+    vehicle = [] if parsed.values.get("vehicle") else [w for i in state.of_kind("vehicle")[:1] for w in ("--vehicle", i.path)]
+    return [*logs, *vehicle]
+
+
 FILLS: Mapping[str, Fill] = MappingProxyType(
     {
         "import": _import,
@@ -96,6 +117,8 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
         "schedule design": _models,
         "schedule verify": _schedule,
         "schedule export": _schedule,
+        "live": _live,
+        "batch": _batch,
     }
 )
 """What each command takes from the folder it is run in."""

@@ -13,7 +13,6 @@ from typing import Any, Self, TextIO
 
 import typer
 
-from fieldsid.artifacts import plain
 from fieldsid.cli.console import say
 from fieldsid.cli.exit_codes import BAD_INPUT, DONE, INTERRUPTED, OUR_BUG
 from fieldsid.cli.trial.filled import filled, in_words, wants
@@ -84,7 +83,7 @@ class _Kept:
         outputs = self._stamps(Path(p) for p, seen in after.items() if self._before.get(p) != seen)
         body: Mapping[str, Any] = result if isinstance(result, Mapping) else {}
         named = body.get("effects") if self._words[0] == "diagnose" else None
-        said = verdict if not verdict.startswith("{") else str(plain(body).get("verdict") or "")
+        said = str(body["headline"]["says"]) if "headline" in body else verdict if not verdict.startswith("{") else ""
         entry = Entry(
             self._time, ("sysid", *self._words), code, round(perf_counter() - self._began, 3),
             said[:LONGEST_VERDICT], self._inputs, outputs, tuple(named or ()),

@@ -27,7 +27,7 @@ class LegFigure:
     """One leg over time (n,) s: fin (rad), where the autopilot steers, angle (rad) and its quantiles (4, n).
 
     `along` and `across` (n,) are the track on the prior's mean, `tracks` (2, m, n) those of some draws, in m; `errors`
-    the parameters' expected standard errors in words.
+    the parameters' expected standard errors in words; before the window lie `run_up_m` of straight run.
     """
 
     axis: Axis
@@ -42,6 +42,7 @@ class LegFigure:
     tracks: FloatArray
     envelope: Envelope
     errors: Mapping[str, str]
+    run_up_m: float
 
 
 def figure_data(plan: Plan, leg: Leg, model: Model) -> LegFigure:
@@ -59,4 +60,5 @@ def figure_data(plan: Plan, leg: Leg, model: Model) -> LegFigure:
     return LegFigure(
         plan.axis, f"{leg.speed:g} m/s  {leg.candidate.maneuver}", mean.time[:n], shown, steered[:n], mean.angle[:n],
         np.quantile(flights.angle[:n], LEVELS, axis=1), along[:n], across[:n], tracks, leg.envelope_in(envelope), errors,
+        leg.run_up_s * leg.speed,
     )  # fmt: skip

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fieldsid.change.compare import compare_models
 from fieldsid.comparison.compare import compare
 from fieldsid.diagnosis import Candidate, Diagnosis, Errors, Pair
 from fieldsid.extension import Extension, Gain
@@ -104,8 +105,11 @@ def held():
     turns = turn_radius(source, [1.0, 1.4], 0.3, measured=[turned], draws=20)
     schedule = design_schedule(source, 0.3)
     verification = verify_schedule(schedule, source, draws=3)
+    weaker = replace(model_named("after", speed=1.0), values={"a22": 1.1, "b2": -1.0, "C0": 0.02})
+    change = compare_models(source_of_models([slow], ["slow"]), source_of_models([weaker], ["after"]), fin_limit=0.3)
     records = (
-        run, fit, fit.model, comparison, diagnosis, best, Extension(lagged, gain, 115.3), turns, turns.rows[0], turns.measured[0],
+        change, run, fit, fit.model,
+        comparison, diagnosis, best, Extension(lagged, gain, 115.3), turns, turns.rows[0], turns.measured[0],
         measure_turn(turned), source.laws, schedule, schedule.rows[0], verification, verification.scheduled[0],
     )  # fmt: skip
     return {type(record).__name__: record for record in records}

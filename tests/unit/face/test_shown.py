@@ -20,8 +20,8 @@ from fieldsid.logs import Note
 from fieldsid.registry import members
 
 KINDS = (
-    "Candidate", "Check", "Comparison", "Diagnosis", "Extension", "Fit", "Laws", "MeasuredRow", "MeasuredTurn", "Model", "Row",
-    "Run", "Schedule", "TurnPrediction", "TurnRow", "Verification",
+    "Candidate", "Change", "Check", "Comparison", "Diagnosis", "Extension", "Fit", "Laws", "MeasuredRow", "MeasuredTurn", "Model",
+    "Row", "Run", "Schedule", "TurnPrediction", "TurnRow", "Verification",
 )  # fmt: skip
 DRAWN = tuple(k for k in KINDS if k not in ("Candidate", "Check", "MeasuredRow", "Model", "Row", "TurnRow"))
 BASE = "a22 = 1.100 +/- 0.013 1/s, b2 = -1.200 +/- 0.021 1/s^2, C0 = 0.0200 +/- 0.0004 rad/s^2"
@@ -80,6 +80,7 @@ def test_a_repr_says_what_matters(held, kind, says):
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
+        ("Change", ("yaw authority -16.7 +/- ", "damping", "gains")),
         ("Comparison", ("pulses", "fit", "x the noise", "worst at")),
         ("TurnPrediction", ("rudder 0.3 rad, u_turn", "m at 1.00 .. 1.40 m/s", "extrapolated", "1 measured circle")),
         ("TurnRow", ("1.00 m/s, port: radius", "u-turn in", "u_turn, extrapolated")),

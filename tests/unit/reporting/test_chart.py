@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from fieldsid.report.chart import MOST_POINTS, WIDTH, Band, Panel, Series, bars, chart, legend, nice_ticks, thinned
+from fieldsid.reporting.chart import MOST_POINTS, WIDTH, Band, Panel, Series, bars, chart, legend, nice_ticks, thinned
 
 X = np.linspace(0.0, 10.0, 11)
 

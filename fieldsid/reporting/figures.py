@@ -11,7 +11,7 @@ from fieldsid.comparison.compare import Channel, Comparison
 from fieldsid.extension import Generation
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.report.chart import Band, Panel, Series, bars, chart, legend, thinned
+from fieldsid.reporting.chart import Band, Panel, Series, bars, chart, legend, thinned
 
 DEG = np.degrees(1.0)
 MOST_BARS = 8

@@ -12,9 +12,9 @@ import numpy as np
 
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import DOWN_TO_NOISE
-from fieldsid.report import figures
-from fieldsid.report.material import AxisMaterial, Material, Shown
-from fieldsid.rounding import in_unit, interval, number, with_error
+from fieldsid.reporting import figures
+from fieldsid.reporting.material import AxisMaterial, Material, Shown
+from fieldsid.rounding import in_unit, interval, number, probability, with_error
 from fieldsid.trial_folder.journal import Entry, made_by
 from fieldsid.trial_folder.state import FolderState, Item
 
@@ -170,23 +170,17 @@ def _candidates(item: Item | None) -> list[dict[str, str]]:
         return []
     body = item.body
     floor = body["noise_floor"]
-    rows: list[tuple[str, float | None, Any, Any, float | None, float | None]] = [
-        ("as it is", None, body["base"]["train"], body["base"]["validation"], None, None)
-    ]
-    rows += [
-        (c["effect"], c["probability"], c["train"], c["validation"], c["explained"], c.get("log_evidence"))
-        for c in body["candidates"][:MOST_CANDIDATES]
-    ]
+    base = {"effect": "as it is", "train": body["base"]["train"], "validation": body["base"]["validation"]}
     return [
         {
-            "effect": name,
-            "probability": "" if p is None else "< 0.001" if p < 0.001 else f"{p:.3f}",
-            "fitted": _over(train, floor),
-            "unseen": _over(unseen, floor),
-            "explained": "" if share is None else f"{100 * share:.0f} %" if share >= 0 else "worse",
-            "evidence": "" if evidence is None else f"{evidence:+.0f}",
+            "effect": c["effect"],
+            "probability": probability(c["probability"]) if "probability" in c else "",
+            "fitted": _over(c["train"], floor),
+            "unseen": _over(c["validation"], floor),
+            "explained": "worse" if c.get("worse") else f"{100 * c['explained']:.0f} %" if "explained" in c else "",
+            "evidence": f"{c['log_evidence']:+.0f}" if "log_evidence" in c else "",
         }
-        for name, p, train, unseen, share, evidence in rows
+        for c in [base, *body["candidates"][:MOST_CANDIDATES]]
     ]
 
 

@@ -1,0 +1,94 @@
+"""Headlines from laws to gains: fit, turn-radius, schedule design, verify, export."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import pasted, typed_with
+from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.cli.voice import shown_in
+from fieldsid.rounding import number, with_error
+
+TARGET = "ros2"
+SLOWER = 60.0
+"""Phase margin in degrees to ask for where less did not hold: the upper end of the textbooks' 30 to 60 (Franklin et al., 6.4)."""
+
+
+def of_fit(body: Body) -> Headline:
+    """Return how the authority grows with speed."""
+    laws, points = body["laws"], body["points"]
+    powers = [
+        f"|{name}| as u^{with_error(law['exponent']['value'], law['exponent']['std_error'])}"
+        for name, law in laws.items()
+        if law["exponent"]
+    ]
+    odd = [p["name"] for law in laws.values() for p in law["leave_one_out"] if not p["belongs"]]
+    says = ", ".join(powers) or f"{counted(len(laws), 'law')} over speed, too few speeds to test an exponent"
+    rests = f"{counted(len(points), 'point')}, {number(body['speed_low_m_s'], 3)} .. {number(body['speed_high_m_s'], 3)} m/s"
+    rests += f"; does not belong: {named(list(dict.fromkeys(odd)))}" if odd else ""
+    if body["file"] is None:
+        return Headline(says, rests, typed_with("-o", f"law_{body['axis']}.yaml"))
+    if body["axis"] == "yaw":
+        return Headline(says, rests, pasted("turn-radius", body["file"]))
+    return Headline(says, rests, pasted("schedule", "design", body["file"], "-o", "gains.yaml"))
+
+
+def of_turn(body: Body, models: Sequence[Path]) -> Headline:
+    """Return the tightest turn of both sides with its band."""
+    rows = body["rows"]
+    tightest = min(rows, key=lambda r: float(r["radius_m"]))
+    low, high = tightest["interval95"]
+    says = (
+        f"tightest turn {number(tightest['radius_m'], 3)} m to {tightest['side']} at {number(tightest['speed_m_s'], 3)} m/s, "
+        f"95 % {number(low, 3)} .. {number(high, 3)} m, {tightest['trust']}"
+    )
+    speeds = sorted({float(r["speed_m_s"]) for r in rows})
+    methods = ", ".join(sorted({str(r["method"]) for r in rows}))
+    circles = f"{counted(len(body['measured']), 'measured circle')}" if body["measured"] else "no measured circle"
+    times, unit = shown_in("rad")
+    rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
+    rests = f"{named([str(m) for m in models])}, {rudder}; {methods} at {counted(len(speeds), 'speed')}; {circles}"
+    return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
+
+
+def of_design(body: Body, models: Sequence[Path]) -> Headline:
+    """Return the span of the gains and the least margin."""
+    rows = body["rows"]
+    first, last = rows[0], rows[-1]
+    margins = [float(r["phase_margin_deg"]) for r in rows if r["phase_margin_deg"] is not None]
+    kp = f"kp {number(first['kp'], 3)} at {number(first['speed_m_s'], 3)} m/s"
+    if len(rows) > 1:
+        kp += f" to {number(last['kp'], 3)} at {number(last['speed_m_s'], 3)} m/s"
+    least = min((m for m in margins if isfinite(m)), default=float("inf"))
+    says = f"{kp}, {body['controller']}; " + (
+        f"least phase margin {least:.0f} deg" if isfinite(least) else "no loop crosses unity"
+    )
+    beyond = sum(not r["supported"] for r in rows)
+    rests = f"{named([str(m) for m in models])}, {counted(int(body['provenance']['draws']), 'draw')} of their errors" + (
+        f"; {beyond} of {len(rows)} rows without data" if beyond else ""
+    )
+    next_ = pasted("schedule", "verify", body["file"]) if body["file"] else typed_with("-o", "gains.yaml")
+    return Headline(says, rests, next_)
+
+
+def of_verification(body: Body, schedule: Path, models: Sequence[Path]) -> Headline:
+    """Return whether the gains hold, with what is worst."""
+    says, rests = f"{body['verdict']}: {body['says']}", str(body["rests_on"]).removeprefix("rests on ")
+    if body["verdict"] in ("holds", "passed") and body["passed"]:
+        out = Path(f"{schedule.stem}_{TARGET}.yaml")
+        return Headline(says, rests, pasted("schedule", "export", schedule, "--to", TARGET, "-o", out))
+    again = schedule.with_name(f"{schedule.stem}_slower.yaml")
+    asked = (float(g["wanted"]) for g in body["gates"] if g["gate"] == "phase_margin_deg" and not g["passed"])
+    margin = f"{max(asked, default=SLOWER):g}"
+    return Headline(says, rests, pasted("schedule", "design", models, "--phase-margin", margin, "-o", again))
+
+
+def of_export(body: Body, schedule: Path) -> Headline:
+    """Return what was written for the vehicle."""
+    report = pasted("report", *(("--force",) if Path("report.html").exists() else ()))
+    return Headline(
+        f"{schedule} written as {body['target']}: {body['file']}", "the gains as they were designed, not verified again", report
+    )

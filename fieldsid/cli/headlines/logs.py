@@ -1,0 +1,61 @@
+"""Headlines of what becomes of a log: inspect, import."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import pasted, typed_with
+from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.models.axis import NAMES, Axis
+
+PROOF = "evidence"
+"""Code of a finding that says why a column was taken for a signal: nothing is wrong there."""
+
+
+def of_inspection(body: Body, mapping: Path | None) -> Headline:
+    """Return what a log holds, and how it becomes a run."""
+    log, signals, findings = body["path"], body["signals"], [f for f in body["findings"] if f["code"] != PROOF]
+    said = counted(len(findings), "finding") if findings else "nothing found that would spoil an identification"
+    if not signals:
+        says = (
+            f"{log} is no run yet: {'none of its names says what its numbers are' if not body['problem'] else 'see the findings'}"
+        )
+    else:
+        says = f"{log} holds {counted(len(signals), 'signal')} for {body['span']}; {said}"
+    how = (
+        "its own names"
+        if not body["mapping_needed"]
+        else f"`{mapping}`"
+        if mapping
+        else "a proposed mapping: check units and signs"
+    )
+    return Headline(says, f"{body['format']}, {counted(len(body['channels']), 'channel')}, by {how}", _after(body, mapping))
+
+
+def _after(body: Body, mapping: Path | None) -> str:
+    known = body["mapping_file"] or mapping
+    if body["mapping_needed"] and known is None:
+        return typed_with("--write-mapping", "mapping.yaml", *(("--force",) if Path("mapping.yaml").exists() else ()))
+    return pasted("import", body["path"], *(("--mapping", known) if known else ()), "-o", "runs/")
+
+
+def of_import(body: Body) -> Headline:
+    """Return how many runs there are now, and the first fit of them."""
+    runs = body["runs"]
+    seconds = sum(float(r["duration_s"]) for r in runs)
+    axes = [a.value for a in Axis if any({NAMES[a].fin, NAMES[a].fin_measured} & set(r["signals"]) for r in runs)] or ["yaw"]
+    files = [r["file"] for r in runs]
+    joint = ("--joint",) if len(files) > 1 else ()
+    noted = sum(len(r["notes"]) for r in runs)
+    says = f"{counted(len(runs), 'run')}, {seconds:.0f} s, " + (counted(noted, "note") if noted else "nothing to note")
+    return Headline(
+        says,
+        f"{named(_logs(runs))}: SI and radians, one clock, gaps left as gaps",
+        pasted("identify", files, "--axis", axes[0], *joint, "-o", "models/") if files else "",
+    )
+
+
+def _logs(runs: Sequence[Body]) -> list[str]:
+    return list(dict.fromkeys(Path(r["log"]).name for r in runs))

@@ -1,0 +1,170 @@
+"""Headlines of the search for what is missing: diagnose, extend, effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
+from fieldsid.cli.headlines.words import Body, counted, is_noise, named, times, used
+from fieldsid.rounding import probability
+
+MODELS = "models"
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """What was searched: the training files, those that judged, the known model, the mapping, how long."""
+
+    runs: Sequence[Path]
+    unseen: Sequence[Path]
+    model: Path | None
+    mapping: Path | None
+    thorough: bool
+
+    @property
+    def reading(self) -> tuple[str, ...]:
+        """The option that reads the logs."""
+        return ("--mapping", str(self.mapping)) if self.mapping is not None else ()
+
+
+def of_diagnosis(body: Body, searched: Searched) -> Headline:
+    """Return the verdict with its numbers and probability."""
+    sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
+    judged = named(body["validation_runs"]) if body["validation_runs"] else "a part of them held back"
+    rests = (
+        f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
+        f"{counted(len(body['candidates']), 'hypothesis').replace('hypothesiss', 'hypotheses')} compared"
+    )
+    return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
+
+
+def _sure(body: Body) -> str:
+    """Return how probable the first candidate is; the evidence is no judge where it is for another, as in a log without noise."""
+    first, *others = (float(c["probability"]) for c in body["candidates"])
+    if any(p > first for p in others):
+        return "; named by the error on unseen runs, not by the evidence"
+    return f", probability {probability(first)}"
+
+
+def _short(body: Body) -> str:
+    """Return the sentence of a verdict with the effects by their names alone; what each is stands in the whole sentence."""
+    says = str(body["says"])
+    before, end, after = says.rpartition("): ")
+    return (
+        f"{' and '.join(body['effects'])}: {after}" if body["effects"] and end and before.startswith(body["effects"][0]) else says
+    )
+
+
+def _after(body: Body, of: Searched) -> str:
+    axis = str(body["axis"])
+    judged = repeated("--validate", of.unseen)
+    if body["effects"]:
+        adds = repeated("--add", body["effects"])
+        return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged, *of.reading))
+    if body["verdict"] == "undecided":
+        return _deciding(body, axis)
+    if body["verdict"] == "unexplained":
+        longer = ("--thorough", *(("--force",) if body["file"] or body["figure"] else ()))
+        return pasted("effects", "new", "unexplained", "--axis", axis) if of.thorough else typed_with(*longer)
+    if body["verdict"] == "disturbed":
+        known = ("--effects", ",".join(body["known"])) if body["known"] else ()
+        joint = ("--joint",) if len(of.runs) > 1 else ()
+        return pasted("identify", of.runs, "--axis", axis, *joint, *known, "--method", "pem", *of.reading, "-o", "models_pem/")
+    return _on_model(of, axis, lambda model: used(axis, model))
+
+
+def _deciding(body: Body, axis: str) -> str:
+    """Return how a maneuver is planned that tells the rivals apart."""
+    if body["file"]:
+        return pasted("plan", "--from", body["file"], "-o", "plan")
+    fly = body["next_maneuver"] or {}
+    return f"{fly['command']} --axis {axis} -o plan" if "command" in fly else typed_with("-o", "diagnosis.yaml")
+
+
+def _on_model(of: Searched, axis: str, then: Callable[[str], str]) -> str:
+    """Return a line on the model that was diagnosed: one known, one that was identified of the same runs, or one still to be."""
+    if (model := of.model or _identified(of.runs, axis)) is not None:
+        return then(str(model))
+    joint = ("--joint",) if len(of.runs) > 1 else ()
+    stem = "joint" if joint else _stem(of.runs[0])
+    made = pasted("identify", of.runs, "--axis", axis, *joint, *of.reading, "-o", f"{MODELS}/")
+    return f"{made} && {then(f'{MODELS}/{stem}_{axis}.yaml')}"
+
+
+def _stem(log: Path) -> str:
+    from fieldsid.logs.several.run_names import stem_of
+
+    return stem_of(log)
+
+
+def _identified(runs: Sequence[Path], axis: str) -> Path | None:
+    """Return a model without effects that was fitted to just these runs, in `models` here or beside them."""
+    from fieldsid.artifacts import inputs_of, read_yaml
+    from fieldsid.logs.unknown_file import own_kind
+
+    wanted = {p.resolve() for p in runs}
+    places = dict.fromkeys([Path(MODELS), *(p.parent.parent / MODELS for p in runs[:1])])
+    for path in (p for place in places for p in sorted(place.glob("*.yaml"))):
+        if own_kind(path) == "model" and {p.resolve() for p in inputs_of(path)} == wanted:
+            body = read_yaml(path)
+            if body.get("axis") == axis and not body.get("effects"):
+                return path
+    return None
+
+
+def of_extension(body: Body) -> Headline:
+    """Return whether the addition is kept, and how the error fell."""
+    before, after = body["over_floor"]["before"], body["over_floor"]["after"]
+    word = "kept" if body["pays"] else "kept because of --keep" if body["kept"] else "not kept"
+    where = "unseen data" if body["unseen"] else "the runs fitted to"
+    says = f"{'+'.join(body['added'])} {word}: the error on {where} goes from {times(before)} to {times(after)} x the noise floor"
+    fitted = counted(len(body["learned_on"]), "run")
+    return Headline(says, f"{fitted} fitted to ({named(body['learned_on'])}), judged by {named(body['judged_on'])}", body["next"])
+
+
+def of_undoing(body: Body) -> Headline:
+    """Return which model counts again."""
+    return Headline(
+        f"undone: {body['model']} counts again, with {', '.join(body['effects']) or 'no effects'}",
+        f"the parent that {body['undone']} names, {body['parent']['state']}",
+        pasted("history", body["model"]),
+    )
+
+
+def of_catalogue(body: Body) -> Headline:
+    """Return how many effects there are."""
+    effects = body["effects"]
+    stages = [str(e["stage"]) for e in effects]
+    shares = ", ".join(f"{stages.count(s)} {s}" for s in dict.fromkeys(stages))
+    own = sum("/" in str(e["origin"]) for e in effects)
+    return Headline(
+        f"{counted(len(effects), 'effect')}: {shares}",
+        "what is built in" + (f" and {own} of your own" if own else "; your own go into effects/"),
+        pasted("effects", "show", effects[0]["name"]),
+    )
+
+
+def of_effect(body: Body) -> Headline:
+    """Return what an effect is, and the maneuver that shows it."""
+    name, axis = str(body["name"]), str(body["axes"][0])
+    return Headline(
+        f"{name}: {body['says']}", str(body["source"]), pasted("plan", "--axis", axis, "--separate", f"none,{name}", "-o", "plan")
+    )
+
+
+def of_new_effect(body: Body, look: str) -> Headline:
+    """Return what was written; look: the line to look at it."""
+    says, rests = f"wrote {body['file']}: edit its moment and coefficients", f"the template of an effect, for {body['axis']}"
+    return Headline(says, rests, look)
+
+
+def left_says(body: Body) -> str:
+    """Return what the model as it now is leaves."""
+    sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
+    said = ", ".join(f"{times(error)} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    quiet = all(is_noise(error) for _, error in sides if isfinite(error))
+    return f"left: {said}: " + ("that is the noise" if quiet else "more is missing than the sensors' noise explains")

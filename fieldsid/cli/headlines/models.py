@@ -1,0 +1,163 @@
+"""Headlines of what is done with a model: identify, compare, simulate, history."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+
+from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
+from fieldsid.cli.headlines.words import MANY, MOST_NAMED, Body, counted, is_noise, named, over_noise, used
+from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
+from fieldsid.rounding import number
+
+
+def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
+    """Return the parameters and what is left; files: of each fit."""
+    fits, axis = body["fits"], str(body["axis"])
+    over = [over_noise(f, f["noise_floor"]) for f in fits]
+    most = max(range(len(fits)), key=lambda i: over[i])
+    left = _left(over[most], fits[most])
+    if len(fits) == 1:
+        says = f"{_parameters(fits[0])}; {left}"
+    else:
+        says = f"{counted(len(fits), 'model')}, {_span(fits)}; {left}, most in {fits[most]['run']}"
+    runs = [r for f in fits for r in f["runs"]]
+    seconds = sum(float(r["segment_s"][1] - r["segment_s"][0]) for r in runs)
+    methods = ", ".join(sorted({str(f["method"]) for f in fits}))
+    rests = f"{counted(len(runs), 'run')} fitted to, {seconds:.0f} s of {named([str(r['run']) for r in runs])}; {methods}"
+    return Headline(says, rests, _after_fit(body, axis, over, files))
+
+
+def _left(over: float, fit: Body) -> str:
+    """Return what a fit leaves; of a log without noise, whose floor is that of its digits, how well it follows."""
+    if over >= MANY:
+        followed = (f"{n} fit {fit[f'{n}_fit_percent']:.1f} %" for n in ("angle", "rate") if isfinite(fit[f"{n}_fit_percent"]))
+        return f"{', '.join(followed)}, of a log with next to no noise: something is missing"
+    return f"what is left is {over:.2f} x the noise" + ("" if is_noise(over) else ": something is missing")
+
+
+def _parameters(fit: Body) -> str:
+    """Return the numbers of a fit that are not of one run alone."""
+    base = list(fit["parameters"].values())[:MOST_NAMED]
+    shown = [(p["shown"], shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])) for p in base]
+    return ", ".join(f"{name} = {value} {unit}".rstrip() for name, (value, unit, _) in shown)
+
+
+def _span(fits: Sequence[Body]) -> str:
+    name = next(iter(fits[0]["parameters"]))
+    values = sorted(float(f["parameters"][name]["value"]) for f in fits if name in f["parameters"])
+    return f"{name} {number(values[0], 3)} .. {number(values[-1], 3)}"
+
+
+def _after_fit(body: Body, axis: str, over: Sequence[float], files: Sequence[Sequence[Path]]) -> str:
+    fits = body["fits"]
+    written = [str(f["model"]) for f in fits if f["model"]]
+    if not written:
+        return typed_with("-o", "models/")
+    if not all(is_noise(o) for o in over):
+        logs = [p for group in files for p in group]
+        known = ("--model", written[0]) if len(written) == 1 and fits[0]["effects"] else ()
+        return pasted("diagnose", logs, "--axis", axis, *known)
+    if len(written) > 1:
+        return pasted("fit", written, "-o", f"law_{axis}.yaml")
+    return used(axis, written[0])
+
+
+def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
+    """Return the worst run's worse channel, and on what it was judged; inputs: what the model was fitted to."""
+    entries, axis = body["runs"], str(body["axis"])
+    worst = max(entries, key=_leading)
+    channel = worst["judged_by"]
+    over = f"{_leading(worst):.2f} x its noise, " if _leading(worst) < MANY else ""
+    says = f"{worst['run']}: {channel} {f'error {over}' if over else ''}fit {worst[f'{channel}_fit_percent']:.1f} %"
+    if worst["failing"]:
+        says += f"; fails most at {shown_words(worst['where'][0]['condition'])}" if worst["where"] else ""
+    else:
+        says += ": nothing is left but the noise"
+    seen = [e["run"] for e in entries if e["fitted_to"]]
+    judged = (
+        "which it was not fitted to"
+        if not seen
+        else "which it was fitted to: no fair judge"
+        if len(seen) == len(entries)
+        else (f"{named(seen)} of them it was fitted to")
+    )
+    rests = f"a free run over {counted(len(entries), 'run')}, {judged}"
+    return Headline(says, rests, after_compare(body["model"], axis, bool(worst["failing"]), runs, inputs))
+
+
+def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:
+    """Return what to do with a model that does or does not follow its runs."""
+    from fieldsid.models.model import load_model
+
+    if not fails:
+        return used(axis, model)
+    fitted = [p for p in inputs if p.exists()]
+    unseen = [p for p in runs if p.resolve() not in {f.resolve() for f in fitted}]
+    known = ("--model", model) if load_model(Path(model)).effects else ()
+    judged = repeated("--validate", unseen) if fitted else []
+    return pasted("diagnose", fitted or list(runs), "--axis", axis, *known, *judged)
+
+
+def _leading(entry: Body) -> float:
+    return float(entry["over_floor"][entry["judged_by"]])
+
+
+def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: Sequence[Path], *, close: float) -> Headline:
+    """Return which of several models follows the runs best, if any; inputs: what that one was fitted to."""
+    scores = sorted(zip((float(m["over_floor"]) for m in body["models"]), names, strict=True))
+    (least, best), (second, _) = scores[:2]
+    others = ", ".join(f"{n} at {s:.2f} x" for s, n in scores[1:])
+    word = "follows no better than the next" if second <= close * least else "follows best"
+    over = body["models"][0]["runs"]
+    seen = [
+        f"{n} was fitted to {named(m['fitted_to'])}: no fair judge of it"
+        for n, m in zip(names, body["models"], strict=True)
+        if m["fitted_to"]
+    ]
+    rests = f"{counted(len(over), 'run')}, geometric mean of the worse channel of each" + (f"; {'; '.join(seen)}" if seen else "")
+    entry = next(m for m in body["models"] if m["model"] == body["best"])
+    fails = any(e["failing"] for e in entry["runs"])
+    return Headline(
+        f"{best} {word}: {least:.2f} x the noise; {others}",
+        rests,
+        after_compare(body["best"], str(body["axis"]), fails, runs, inputs),
+    )
+
+
+def of_simulation(body: Body, axis: str, maneuver: str | None, run: Path | None) -> Headline:
+    """Return how far a simulated motion goes."""
+    name = "yaw_rad" if axis == "yaw" else "pitch_rad"
+    reach = body["signals"][name]
+    how = f"the maneuver {maneuver}" if maneuver else f"the fin of {run}"
+    times, unit = shown_in("rad")
+    swing = f"{number(times * reach['low'], 3)} .. {number(times * reach['high'], 3)} {unit}"
+    says = f"{body['seconds']:.1f} s, {axis} {swing} under {how}"
+    rests = f"{body['model']}, {counted(body['samples'], 'sample')}"
+    if body["file"] is None:
+        return Headline(says, rests, typed_with("-o", "simulated.parquet"))
+    next_ = (
+        pasted("identify", body["file"], "--axis", axis, "-o", "models/")
+        if run is None
+        else pasted("compare", body["model"], run)
+    )
+    return Headline(says, rests, next_)
+
+
+def of_history(body: Body, inputs: Sequence[Path]) -> Headline:
+    """Return how the error fell along a model's line; inputs: what it was fitted to."""
+    steps = [g for g in body["generations"] if g.get("over_floor")]
+    axis, model = str(body["axis"]), str(body["model"])
+    logs = [p for p in inputs if p.exists()]
+    if not steps:
+        next_ = pasted("diagnose", logs, "--axis", axis) if logs else pasted("status")
+        return Headline("nothing was added yet", f"{model}, whose line begins with itself", next_)
+    first, last = steps[0]["over_floor"]["before"], steps[-1]["over_floor"]["after"]
+    added = ", then ".join("+".join(g["added"]) for g in steps)
+    says = f"with {added} the error fell from {first:.2f} to {last:.2f} x the noise floor"
+    state = "every file is as it was" if body["intact"] else "not every file is as it was"
+    more = not is_noise(last) and logs
+    next_ = pasted("diagnose", logs, "--axis", axis, "--model", model) if more else used(axis, model)
+    return Headline(says, f"{counted(len(body['generations']), 'model')}, each hash checked: {state}", next_)

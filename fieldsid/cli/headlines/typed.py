@@ -1,0 +1,53 @@
+"""The command line under way, and lines made ready to paste: quoted, several files of one folder as a pattern."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from glob import escape
+from os.path import commonprefix
+from pathlib import Path
+
+FEW = 3
+"""Files up to which each is named; more are given by a pattern that matches just them, where there is one."""
+_WORDS: list[tuple[str, ...]] = [()]
+
+
+def remember(words: Sequence[str]) -> None:
+    """Keep the words of the command that is about to run, `sysid` left out."""
+    _WORDS[0] = tuple(words)
+
+
+def typed_with(*more: str) -> str:
+    """Return the command line under way with more words behind it; `--json` is left out."""
+    return pasted(*(w for w in _WORDS[0] if w != "--json"), *more)
+
+
+def pasted(*words: str | Path | Sequence[str | Path]) -> str:
+    """Return a command line of `sysid`; a word may be a list of files, all of them or the pattern that stands for them."""
+    parts: list[str] = ["sysid"]
+    for word in words:
+        parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else _files([Path(_near(p)) for p in word])
+    return " ".join(parts)
+
+
+def repeated(option: str, files: Sequence[str | Path]) -> list[str]:
+    """Return an option that takes one file, once for each of them."""
+    return [word for file in files for word in (option, str(file))]
+
+
+def _files(paths: Sequence[Path]) -> list[str]:
+    folders, suffixes = {p.parent for p in paths}, {p.suffix for p in paths}
+    if len(paths) > FEW and len(folders) == len(suffixes) == 1:
+        folder, suffix = folders.pop(), suffixes.pop()
+        start = commonprefix([p.stem for p in paths])  # noqa: RUF071 - characters are what is meant
+        if suffix and sorted(folder.glob(f"{escape(start)}*{suffix}")) == sorted(paths):
+            before = "" if folder == Path() else f"{shlex.quote(str(folder))}/"
+            return [f"{before}{shlex.quote(start) if start else ''}*{suffix}"]
+    return [shlex.quote(str(p)) for p in paths]
+
+
+def _near(word: str | Path) -> str:
+    """Return a path below the working folder without what leads to that."""
+    here = Path.cwd()
+    return str(word.relative_to(here)) if isinstance(word, Path) and word.is_relative_to(here) else str(word)

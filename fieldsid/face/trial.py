@@ -1,0 +1,46 @@
+"""The trial as a whole: `sysid compare OLD NEW` and `sysid report` as functions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fieldsid.face.arguments import File, own_effects, vehicle_of
+from fieldsid.face.models import Models, source_of
+
+if TYPE_CHECKING:
+    from fieldsid.change.record import Change
+    from fieldsid.vehicle import Vehicle
+
+
+def compare_models(old: Models, new: Models, *, vehicle: Vehicle | File | None = None) -> Change:
+    """Return which parameters and effects have changed beyond their errors between two states, and what follows for the gains.
+
+    old, new: the models of one axis before and after, flown at a speed in common. vehicle: whose fin limit and fin rate count,
+    without it that of the working folder, else the largest fin in the old models' runs. Raises UsageError for models of two
+    axes or without a common speed.
+    """
+    from fieldsid.change.compare import compare_models as compare_sources
+    from fieldsid.schedule.linear_plant import FinLimits
+
+    own_effects()
+    before, known = source_of(old), vehicle_of(vehicle)
+    limit = None if known is None else known.fin_max_rad(before.axis.value)
+    stated = FinLimits(rate=None if known is None else known.fin_rate_rad_s)
+    return compare_sources(before, source_of(new), fin_limit=limit, stated=stated)
+
+
+def report(folder: File = ".", output: File | None = None, *, force: bool = False) -> Path:
+    """Write what a trial folder has come to into one HTML file, or a PDF by its suffix, and return its path.
+
+    output: `report.html` in the folder if not given. Raises UsageError for a folder without runs and models or for another
+    suffix, ArtifactError for a file that exists, where not forced, and for a PDF without a browser.
+    """
+    from fieldsid.reporting.write import written
+    from fieldsid.trial_folder.state import state_of
+
+    own_effects()
+    place = Path(folder)
+    path = Path(output) if output is not None else place / "report.html"
+    written(state_of(place), path, force=force)
+    return path
