@@ -19,8 +19,8 @@ from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, coefficien
 from fieldsid.turning.maneuvering.fit import Fitted
 
 CHAINS = 8
-STEPS = 46
-"""Steps of a chain, each of about five simulations of all runs."""
+STEPS, EVERY = 76, 2
+"""Steps of a chain, each of about five simulations of all runs, and of which of them the turns are worked out."""
 BEFORE_ADAPTED, LEFT_OUT = 14, 16
 """Steps before the Gaussian is moved, and those of them and after them that are left out."""
 START_SHARE = 0.5
@@ -52,7 +52,7 @@ def draw_posterior(fitted: Fitted, rng: np.random.Generator) -> Posterior:
     # few draws tell 22 by 22 numbers badly: half of the spread stays that of the maximum
     about = _Gaussian.of(went.mean(axis=0), np.asarray(0.5 * (fitted.covariance + np.cov(went.T)), dtype=np.float64))
     later = _moved(fitted.cost_at, about, first[:, -1], STEPS - BEFORE_ADAPTED, rng)
-    return Posterior(later[:, LEFT_OUT - BEFORE_ADAPTED :])
+    return Posterior(later[:, LEFT_OUT - BEFORE_ADAPTED :: EVERY])
 
 
 @dataclass(frozen=True, slots=True)
