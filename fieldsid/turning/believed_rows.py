@@ -17,6 +17,8 @@ from fieldsid.turning.steady.speed_loss import SurgeModel
 SEED = 20240511
 MAX_IDENTIFIED_WIDTH = 0.35
 """Widest band of a turn that counts as identified, over the radius."""
+LEAST_EFFECTIVE = 10.0
+"""Independent draws: with fewer the median is off by more than 0.4 of the spread, and the spread itself by more than a fifth."""
 MAX_UNSETTLED = 0.05
 """Share of the draws without a settled turn above which a turn is not taken as identified."""
 
@@ -30,14 +32,16 @@ def believed_rows(
     """
     own = blended_turns(source, np.array(speeds, dtype=np.float64), rudder, surge, 1, np.random.default_rng(SEED))
     return [
-        _believed_row(source, belief.turn(float(speed), rudder, sign), float(own[side].radius[0, i]), float(speed), side, rudder)
+        _believed_row(
+            source, belief, belief.turn(float(speed), rudder, sign), float(own[side].radius[0, i]), float(speed), side, rudder
+        )
         for side, sign in SIDES.items()
         for i, speed in enumerate(speeds)
     ]
 
 
 def _believed_row(
-    source: ParameterSource, turn: BelievedTurn, of_model: float, speed: float, side: str, rudder: float
+    source: ParameterSource, belief: Belief, turn: BelievedTurn, of_model: float, speed: float, side: str, rudder: float
 ) -> TurnRow:
     if not np.isfinite(turn.radius):
         raise ModelError(
@@ -45,7 +49,7 @@ def _believed_row(
             found=f"rudder {rudder:.3g} rad",
             hint="fly a turning circle there, and give it with `--measured`",
         )
-    because = _missing(turn, flown=source.supports(speed))
+    because = _missing(turn, flown=source.supports(speed), usual=belief.fitted.is_usual)
     after = turn.transient
     time = float(after.time_180[0])
     low, high = turn.interval95
@@ -73,13 +77,15 @@ def _believed_row(
     )
 
 
-def _missing(turn: BelievedTurn, *, flown: bool) -> tuple[str, ...]:
+def _missing(turn: BelievedTurn, *, flown: bool, usual: bool) -> tuple[str, ...]:
     """Return why a turn is not taken as identified; empty where the runs reached it and its band is narrow."""
     low, high = turn.interval95
     short = {
         "a turn this tight was not flown": turn.curvature_covered >= MIN_COVERED_SHARE,
         "a fin angle this large was not flown": turn.fin_covered >= MIN_COVERED_SHARE,
         "this speed was not flown": flown,
+        "the draws are worth too few independent ones": turn.effective >= LEAST_EFFECTIVE,
+        "the fit lies where no vehicle of the ensemble does": usual,
     }
     return (*(says for says, fine in short.items() if not fine), *doubts_of_draws(high - low, turn.radius, turn.unsettled))
 

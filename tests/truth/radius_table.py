@@ -1,8 +1,10 @@
 """Full-rudder radius of hulls nobody tuned to: errors, coverage and width of the bands, by kind and by training set.
 
 Every hull is drawn, flown with sensor noise, identified, and turned to both sides at five speeds:
-    python tests/truth/radius_table.py --draws 40 --seed 7 [--sets pulses,pulses+zigzag] [--json rows.json]
-Every second hull logs no sway. Seed 1 is that of the prior (`radius_prior.py`): measure with another.
+    python tests/truth/radius_table.py --draws 300 --seed 7 --json rows.json [--minutes 8] [--sets pulses,pulses+zigzag]
+    python tests/truth/radius_table.py --pool rows.json more.json
+Rows are saved after every hull; the same command goes on where the last one ended, after so many minutes if asked to.
+Of every fourteen hulls seven log no sway. Seed 1 is that of the prior (`radius_prior.py`): measure with another.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import json
 import sys
 import time
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -50,6 +53,7 @@ class Outcome:
     high: float
     trust: str
     refused: str = ""
+    seed: int = 0
 
     @property
     def error(self) -> float:
@@ -81,7 +85,7 @@ def evaluate(hull: Hull, draw: int, which: str, seed: int) -> list[Outcome]:
     nan = float("nan")
 
     def outcome(key: tuple[float, str], radius: float, low: float, high: float, trust: str, refused: str = "") -> Outcome:
-        return Outcome(draw, hull.kind, which, sway, key[0], key[1], truth[key], radius, low, high, trust, refused)
+        return Outcome(draw, hull.kind, which, sway, key[0], key[1], truth[key], radius, low, high, trust, refused, seed)
 
     try:
         models = []
@@ -132,27 +136,47 @@ def table(rows: list[Outcome]) -> list[str]:
     return lines
 
 
-def main() -> None:
-    """Draw, fly, identify, turn, and print the table."""
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--draws", type=int, default=14)
-    asked.add_argument("--first", type=int, default=0)
-    asked.add_argument("--seed", type=int, default=7)
-    asked.add_argument("--sets", default=",".join(SETS))
-    asked.add_argument("--json", type=Path)
-    given = asked.parse_args()
-    rows: list[Outcome] = []
+def saved(paths: Sequence[Path]) -> list[Outcome]:
+    """Return the rows that were saved, those of files that hold the same ones once."""
+    rows = [Outcome(**row) for path in paths if path.exists() for row in json.loads(path.read_text())]
+    return list({(r.seed, r.draw, r.training, r.speed, r.side): r for r in rows}.values())
+
+
+def measured(given: argparse.Namespace) -> list[Outcome]:
+    """Return the rows asked for, those saved before taken as they are."""
+    rows = saved([given.json] if given.json else [])
+    done = {(r.seed, r.draw, r.training) for r in rows}
     begun = time.monotonic()
     for draw in range(given.first, given.first + given.draws):
+        missing = [which for which in given.sets.split(",") if (given.seed, draw, which) not in done]
+        if not missing:
+            continue
+        if time.monotonic() - begun > 60.0 * given.minutes:
+            print(f"stopped before hull {draw}: the same command goes on", file=sys.stderr)
+            break
         hull = draw_hull(draw, given.seed)
-        for which in given.sets.split(","):
+        for which in missing:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 rows += evaluate(hull, draw, which, given.seed)
         print(f"{draw} {hull.kind} {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
         if given.json:
             given.json.write_text(json.dumps([asdict(r) for r in rows]))
-    print("\n".join(table(rows)))
+    return rows
+
+
+def main() -> None:
+    """Draw, fly, identify, turn, and print the table; or print that of rows saved before."""
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--draws", type=int, default=14)
+    asked.add_argument("--first", type=int, default=0)
+    asked.add_argument("--seed", type=int, default=7)
+    asked.add_argument("--sets", default=",".join(SETS))
+    asked.add_argument("--minutes", type=float, default=float("inf"))
+    asked.add_argument("--json", type=Path)
+    asked.add_argument("--pool", type=Path, nargs="+", default=())
+    given = asked.parse_args()
+    print("\n".join(table(saved(given.pool) if given.pool else measured(given))))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from fieldsid.plant.yaw_plant import steady_fins
 from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, coefficients, simulate
 from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
 from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
-from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, settled_turns, weighted_quantile
+from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
 from fieldsid.turning.model_error import STALL_LOG_SD
 from fieldsid.turning.steady.transient import Transient, read_off
 
@@ -37,8 +37,9 @@ MAX_TRACK_S = 240.0
 class BelievedTurn:
     """One turn: radius (m) with its 95 % band, rate (rad/s, magnitude), path speed (m/s).
 
-    `curvature_covered` and `fin_covered` are what was flown over what the turn has, at most one, `unsettled` is the weight of
-    the draws that have no settled turn there, `transient` that of the likeliest draw.
+    `curvature_covered` and `fin_covered` are what was flown over what the turn has, at most one, `unsettled` is the share of
+    the draws that have no settled turn there, `effective` how many independent draws they are worth, `transient` that of the
+    likeliest vector.
     """
 
     radius: float
@@ -48,6 +49,7 @@ class BelievedTurn:
     curvature_covered: float
     fin_covered: float
     unsettled: float
+    effective: float
     transient: Transient
 
 
@@ -68,18 +70,19 @@ class Belief:
         """Return the turn to starboard (side +1) or port (-1) from a straight run at `entry` m/s at `rudder` rad."""
         fin = _fin(self.models, entry, rudder, side)
         turns = settled_turns(self.posterior, np.array([entry]), fin)
-        ok = np.isfinite(turns.radius[:, 0]) & (side * turns.rate[:, 0] > 0.0)
-        weights = np.where(ok, self.posterior.weights, 0.0)
-        log_radius = np.log(np.where(ok, turns.radius[:, 0], np.nan))
-        middle = float(np.exp(weighted_quantile(log_radius, weights, 0.5)))
+        radius, rate = turns.radius[:, 0], turns.rate[:, 0]
+        ok = np.isfinite(radius) & (side * rate > 0.0)
+        log_radius = np.log(np.where(ok, radius, np.nan))
+        middle = float(np.exp(_median(log_radius)))
         covered = min(self.largest_curvature * middle, 1.0) if np.isfinite(middle) else 0.0
         fin_covered = min(max(float(np.max(np.abs(r.fin))) for r in self.runs) / max(abs(fin), 1e-9), 1.0)
-        spread = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
-        low, high = _band(log_radius, weights, spread)
-        rate = weighted_quantile(np.abs(turns.rate[:, 0]), weights, 0.5)
-        speed = weighted_quantile(turns.path_speed[:, 0], weights, 0.5)
+        effective = effective_draws(np.where(ok, log_radius, _median(log_radius)).reshape(self.posterior.chains.shape[:2]))
+        form = FORM_LOG_SD + UNSEEN_LOG_SD * (1.0 - covered) + STALL_LOG_SD * (1.0 - fin_covered)
+        drawn = float(np.std(log_radius[ok])) / np.sqrt(max(effective, 1.0)) if ok.any() else 0.0
+        low, high = _band(log_radius[ok], float(np.hypot(form, drawn)))
+        states = _median(np.abs(rate[ok])), _median(turns.path_speed[ok, 0])
         way = self._transient(entry, fin, side)
-        return BelievedTurn(middle, (low, high), rate, speed, covered, fin_covered, float(1.0 - weights.sum()), way)
+        return BelievedTurn(middle, (low, high), *states, covered, fin_covered, float(1.0 - ok.mean()), effective, way)
 
     @property
     def largest_curvature(self) -> float:
@@ -141,9 +144,15 @@ def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> f
     return -sign * steady_fins(acting, [values], side * sign * rudder, speed)[0]
 
 
-def _band(log_radius: FloatArray, weights: FloatArray, spread: float) -> tuple[float, float]:
-    """Return the 95 % band of weighted draws (n,), each spread by a normal error of the equations."""
+def _median(values: FloatArray) -> float:
+    """Return the median of what is not NaN, NaN where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else float("nan")
+
+
+def _band(log_radius: FloatArray, spread: float) -> tuple[float, float]:
+    """Return the 95 % band of draws (n,), each spread by a normal error of the equations."""
     nodes, parts = np.polynomial.hermite_e.hermegauss(15)
     whole = (log_radius[:, None] + spread * nodes[None, :]).ravel()
-    shares = (weights[:, None] * parts[None, :]).ravel()
+    shares = np.broadcast_to(parts, (log_radius.size, parts.size)).ravel()
     return float(np.exp(weighted_quantile(whole, shares, 0.025))), float(np.exp(weighted_quantile(whole, shares, 0.975)))

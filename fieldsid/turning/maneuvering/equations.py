@@ -26,7 +26,10 @@ NAMES = (
     "wash", "sway_viscous", "yaw_viscous", "yaw_drag", "surge_viscous",
 )  # fmt: skip
 """In order: L, D, M, t, R, a, k, Yv, Yr, Nv, Nr, C, c, d0, servo's lag (s), X, its rate limit (rad/s), e, Y0, N0, b, X0."""
-LOGARITHMS = {"length", "drag", "rudder", "gyration", "cross_drag", "stall", "lag", "rate_limit", "yaw_drag"}
+LOGARITHMS = {
+    "length", "drag", "rudder", "gyration", "cross_drag", "stall", "lag", "rate_limit", "yaw_drag",
+    "sway_viscous", "yaw_viscous", "surge_viscous",
+}  # fmt: skip
 IN_LOGARITHM = np.array([n in LOGARITHMS for n in NAMES])
 REFERENCE_SPEED_M_S = 1.5
 STEP_S = 0.05

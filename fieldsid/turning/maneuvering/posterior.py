@@ -1,11 +1,15 @@
-"""Draws from the posterior of the maneuvering model by importance sampling, twice adapted, and the turns that they settle to.
+"""Draws from the posterior of the maneuvering model by elliptical slices, and the turns that they settle to.
 
-Proposals are Student's t about the maximum (population Monte Carlo: Cappe and others 2004); the weight of a draw is its
-posterior over the density it was proposed with. Draws without a settled turn are rejected for that turn and counted.
+Chains start about the maximum and move on ellipses of a Gaussian that is fitted to the posterior (generalised elliptical slice
+sampling: Nishihara, Murray and Adams 2014): no step is rejected, and none is tuned. What is left of the first part of the
+chains moves the Gaussian to where they went. The posterior bends: weights of draws from a Gaussian or a Student's t about the
+maximum were worth 1 to 26 of 400. Draws without a settled turn are rejected for that turn and counted.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,67 +18,111 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, coefficients, settle
 from fieldsid.turning.maneuvering.fit import Fitted
 
-DEGREES = 7.0
-BISECTIONS = 30
-LEAST_SHARE = 0.1
-"""Share of the last proposal's spread that stays, so that no direction is lost to few draws."""
-KEPT = 160
-ROUNDS = (150, 250, 400)
-"""Draws of each adaptation, the last of which are kept."""
-LEAST_EFFECTIVE = 66.0
-"""Three draws for every coefficient: weights are flattened until they are worth as many."""
+CHAINS = 8
+STEPS, EVERY = 76, 2
+"""Steps of a chain, each of about five simulations of all runs, and of which of them the turns are worked out."""
+BEFORE_ADAPTED, LEFT_OUT = 14, 16
+"""Steps before the Gaussian is moved, and those of them and after them that are left out."""
+START_SHARE = 0.5
+"""Chains start within this share of the Gaussian's spread: the posterior bends away from all of it."""
+WIDER = 1.2
+"""The Gaussian's spread over the posterior's: narrower tails than the posterior's would hold a chain."""
+NARROWEST_RAD = 1e-6
+"""Of an ellipse: below it a step stays where it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Posterior:
-    """Vectors (n, 22) with weights (n,) that sum to one."""
+    """Vectors (c, s, 22) of c chains, s steps each."""
 
-    vectors: FloatArray
-    weights: FloatArray
+    chains: FloatArray
+
+    @property
+    def vectors(self) -> FloatArray:
+        """All draws, (c s, 22)."""
+        return self.chains.reshape(-1, self.chains.shape[-1])
 
 
 def draw_posterior(fitted: Fitted, rng: np.random.Generator) -> Posterior:
     """Return draws of the coefficients from the posterior of a fit."""
-    centre, spread = fitted.vector, fitted.covariance
-    vectors, weights = centre[None, :], np.ones(1)
-    for count in ROUNDS:
-        root = np.linalg.cholesky(0.5 * (spread + spread.T))
-        size = centre.size
-        scale = np.sqrt(DEGREES / rng.chisquare(DEGREES, count))
-        z = rng.standard_normal((count, size)) * scale[:, None]
-        vectors = centre + z @ root.T
-        log_proposal = -0.5 * (DEGREES + size) * np.log1p(np.sum(z**2, axis=1) / DEGREES)
-        log_weight = np.array([-0.5 * (fitted.cost_at(v) - fitted.cost) for v in vectors]) - log_proposal
-        weights = _flattened(log_weight)
-        centre = weights @ vectors
-        away = vectors - centre
-        spread = (away * weights[:, None]).T @ away + LEAST_SHARE * spread
-    return _resampled(vectors, weights, rng)
+    about = _Gaussian.of(fitted.vector, fitted.covariance)
+    now = about.centre + START_SHARE / WIDER * rng.standard_normal((CHAINS, about.centre.size)) @ about.root.T
+    first = _moved(fitted.cost_at, about, now, BEFORE_ADAPTED, rng)
+    went = first[:, BEFORE_ADAPTED // 2 :].reshape(-1, about.centre.size)
+    # few draws tell 22 by 22 numbers badly: half of the spread stays that of the maximum
+    about = _Gaussian.of(went.mean(axis=0), np.asarray(0.5 * (fitted.covariance + np.cov(went.T)), dtype=np.float64))
+    later = _moved(fitted.cost_at, about, first[:, -1], STEPS - BEFORE_ADAPTED, rng)
+    return Posterior(later[:, LEFT_OUT - BEFORE_ADAPTED :: EVERY])
 
 
-def _resampled(vectors: FloatArray, weights: FloatArray, rng: np.random.Generator) -> Posterior:
-    """Return draws of equal weight, taken systematically (Kitagawa 1996): a turn is worked out for each of them."""
-    places = (np.arange(KEPT) + rng.uniform()) / KEPT
-    chosen = np.searchsorted(np.cumsum(weights), places).clip(max=weights.size - 1)
-    return Posterior(vectors[chosen], np.full(KEPT, 1.0 / KEPT))
+@dataclass(frozen=True, slots=True)
+class _Gaussian:
+    centre: FloatArray
+    root: FloatArray
+    precision: FloatArray
+
+    @classmethod
+    def of(cls, centre: FloatArray, covariance: FloatArray) -> _Gaussian:
+        whole = 0.5 * WIDER**2 * (covariance + covariance.T)
+        return cls(
+            centre, np.asarray(np.linalg.cholesky(whole), dtype=np.float64), np.asarray(np.linalg.inv(whole), dtype=np.float64)
+        )
 
 
-def _flattened(log_weight: FloatArray) -> FloatArray:
-    """Return weights (n,), raised to the largest power not above one at which they are worth enough draws (Ionides 2008)."""
-    low, high = 0.0, 1.0
-    power = 1.0
-    for _ in range(BISECTIONS):
-        weights = np.exp(power * (log_weight - log_weight.max()))
-        weights /= weights.sum()
-        if 1.0 / float(np.sum(weights**2)) >= LEAST_EFFECTIVE:
-            low = power
-        else:
-            high = power
-        if low == 1.0:
+def _moved(
+    cost: Callable[[FloatArray], float], about: _Gaussian, start: FloatArray, steps: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return the chains (c, steps, 22) that go on from states (c, 22)."""
+
+    def rest(vector: FloatArray) -> float:
+        away = vector - about.centre
+        return -0.5 * (cost(vector) - float(away @ about.precision @ away))
+
+    out = np.empty((start.shape[0], steps, start.shape[1]))
+    for chain in range(start.shape[0]):
+        vector = start[chain]
+        height = rest(vector)
+        for step in range(steps):
+            vector, height = _slice(rest, about, vector, height, rng)
+            out[chain, step] = vector
+    return out
+
+
+def _slice(
+    rest: Callable[[FloatArray], float], about: _Gaussian, vector: FloatArray, height: float, rng: np.random.Generator
+) -> tuple[FloatArray, float]:
+    """Return the next state, on an ellipse through this one and a draw of the Gaussian, and what `rest` gives there."""
+    away, other = vector - about.centre, about.root @ rng.standard_normal(vector.size)
+    least = height + math.log(1.0 - rng.uniform())
+    angle = rng.uniform(0.0, 2.0 * math.pi)
+    low, high = angle - 2.0 * math.pi, angle
+    while high - low > NARROWEST_RAD:
+        new = about.centre + away * math.cos(angle) + other * math.sin(angle)
+        found = rest(new)
+        if found > least:
+            return new, found
+        low, high = (angle, high) if angle < 0.0 else (low, angle)
+        angle = rng.uniform(low, high)
+    return vector, height
+
+
+def effective_draws(values: FloatArray) -> float:
+    """Return how many independent draws the values (c, s) of c chains are worth; nil where they hold a NaN.
+
+    The variance between the chains counts (Gelman and others 2013, section 11.5): chains that stay apart are worth few.
+    """
+    chains, steps = values.shape
+    within = float(np.mean(np.var(values, axis=1, ddof=1)))
+    whole = (steps - 1) / steps * within + float(np.var(values.mean(axis=1), ddof=1))
+    if not whole > 0.0:
+        return 0.0
+    total = 0.0
+    for lag in range(1, steps - 1, 2):
+        pair = sum(1.0 - float(np.mean((values[:, t:] - values[:, :-t]) ** 2)) / (2.0 * whole) for t in (lag, lag + 1))
+        if pair < 0.0:
             break
-        power = 0.5 * (low + high)
-    weights = np.exp(low * (log_weight - log_weight.max()))
-    return np.asarray(weights / weights.sum())
+        total += pair
+    return float(chains * steps / (1.0 + 2.0 * total))
 
 
 @dataclass(frozen=True, slots=True)

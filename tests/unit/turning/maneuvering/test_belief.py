@@ -17,6 +17,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
+from fieldsid.turning.believed_rows import believed_rows
 from fieldsid.turning.maneuvering.belief import believe
 from fieldsid.turning.maneuvering.posterior import weighted_quantile
 from fieldsid.turning.radius import turn_radius
@@ -24,9 +25,9 @@ from fieldsid.turning.radius import turn_radius
 SEED = 5
 
 
-def runs_of(number, which, *, sway=True):
-    hull = draw_hull(number, SEED)
-    logs = training(hull, which, np.random.default_rng([SEED, number]), sway=sway)
+def runs_of(number, which, *, sway=True, seed=SEED):
+    hull = draw_hull(number, seed)
+    logs = training(hull, which, np.random.default_rng([seed, number]), sway=sway)
     return hull, [Run(log.name, log.time, log.columns) for log in logs]
 
 
@@ -44,6 +45,56 @@ def test_zigzags_tell_the_circle_of_both_sides(number, sway):
             assert turn.radius == pytest.approx(truth, rel=0.05)
             assert turn.interval95[0] <= truth <= turn.interval95[1]
             assert turn.interval95[1] - turn.interval95[0] < 0.35 * truth
+
+
+@pytest.mark.parametrize("number", [7, 9, 11, 13])
+def test_bands_of_pulses_without_sway_hold_the_circle(number):
+    hull, runs = runs_of(number, "pulses", sway=False)
+    belief = believed(runs)
+    for side in (-1.0, 1.0):
+        turn, truth = belief.turn(hull.speeds[2], hull.rudder_limit, side), true_turn(hull, hull.speeds[2], side)[0]
+        assert turn.interval95[0] <= truth <= turn.interval95[1]
+        assert turn.interval95[1] - turn.interval95[0] < 0.8 * truth
+
+
+def test_an_unstable_hull_is_not_left_in_a_wrong_minimum():
+    """Fitted to 6 s at once its radius was 70 % off: it ended at a vector that no vehicle has."""
+    hull, runs = runs_of(41, "pulses+zigzag", sway=False, seed=31)
+    belief = believed(runs)
+    assert belief.fitted.is_usual
+    truth = true_turn(hull, hull.speeds[2], 1.0)[0]
+    assert belief.turn(hull.speeds[2], hull.rudder_limit, 1.0).radius == pytest.approx(truth, rel=0.15)
+
+
+def test_few_effective_draws_and_a_fit_like_no_vehicle_are_not_identified(monkeypatch):
+    hull, runs = runs_of(0, "pulses+zigzag")
+    fitted = identify(runs[:1], Axis.YAW, effects=("quadratic_damping",))
+    source, belief = source_of_models([f.model for f in fitted], ["m0"]), believed(runs)
+
+    def only_row():
+        return believed_rows(source, belief, hull.speeds[:1], hull.rudder_limit, None)[0]
+
+    assert only_row().trust == "identified"
+    with monkeypatch.context() as patched:
+        patched.setattr("fieldsid.turning.maneuvering.belief.effective_draws", lambda _: 4.0)
+        few = only_row()
+    monkeypatch.setattr("fieldsid.turning.maneuvering.fit.FARTHEST_PRIOR_COST", 0.0)
+    far = only_row()
+    assert few.trust == far.trust == "extrapolated"
+    assert "independent" in " ".join(few.because)
+    assert "no vehicle" in " ".join(far.because)
+
+
+def test_draws_worth_less_widen_the_band(monkeypatch):
+    hull, runs = runs_of(0, "pulses")
+    belief = believed(runs)
+
+    def width(worth):
+        monkeypatch.setattr("fieldsid.turning.maneuvering.belief.effective_draws", lambda _: worth)
+        low, high = belief.turn(hull.speeds[2], hull.rudder_limit, 1.0).interval95
+        return high - low
+
+    assert width(2.0) > 1.02 * width(200.0)
 
 
 def test_a_circle_at_one_speed_helps_the_others():
