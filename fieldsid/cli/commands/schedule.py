@@ -9,22 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.commands._schedule_tables import render_design, render_export, render_verify
+from fieldsid.cli.console import emit, say
 from fieldsid.cli.headlines.gains import of_design, of_export, of_verification
 from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
-from fieldsid.cli.voice import shown_in
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.schedule.record import Schedule
-    from fieldsid.schedule.verify import Check, Verification
-
-SLOWED_SHARE = 0.995
-"""Below it a row's share is not printed as 1.00."""
+    from fieldsid.schedule.verify import Verification
 
 command = typer.Typer(help="Gains per speed: design them, verify them, write them for the vehicle's software.")
 
@@ -155,7 +150,7 @@ def design(
         inputs = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
     headline = of_design(body, models)
-    return emit(body, as_json=as_json, render=lambda to: _render_design(to, schedule, source, body), headline=headline)
+    return emit(body, as_json=as_json, render=lambda to: render_design(to, schedule, source, body), headline=headline)
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")
@@ -214,7 +209,7 @@ def verify(
         "figure": None if output is None else _draw(known, checked, output, context, force=force),
     }
     headline = of_verification(body, schedule, models or source.paths)
-    result = emit(body, as_json=as_json, render=lambda to: _render_verify(to, checked, body), headline=headline)
+    result = emit(body, as_json=as_json, render=lambda to: render_verify(to, checked, body), headline=headline)
     if not body["passed"]:
         raise typer.Exit(1)
     return result
@@ -259,7 +254,7 @@ def export(
 
         body["file"] = str(write_text(output, text, force=force))
     headline = of_export(body, schedule) if body["file"] else None  # without a file the text is all there is
-    return emit(body, as_json=as_json, render=lambda out: _render_export(out, body), headline=headline)
+    return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline)
 
 
 def _export_into(schedule: Schedule, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
@@ -291,114 +286,3 @@ def _draw(schedule: Schedule, checked: Verification, path: Path, context: typer.
     from fieldsid.figures.schedule import figure
 
     return str(save(figure(schedule, checked), path, force=force, tasks=tasks_of(context)))
-
-
-def _render_design(to: Console, schedule: Schedule, source: ParameterSource, body: Mapping[str, Any]) -> None:
-    from math import degrees, isfinite
-
-    from fieldsid.rounding import number
-    from fieldsid.schedule.verdict import fin_of, lost
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
-
-    (times, angle), extra = shown_in("rad"), ("kz",) if schedule.depth else ()
-    rows = [
-        (
-            number(r.speed, 3),
-            number(r.gains.kp),
-            number(r.gains.ki, 3),
-            number(r.gains.kd, 3),
-            number(times * r.feed_forward, 3),
-            number(times * r.fin_limit, 3),
-            *((number(r.depth_gain, 3),) if schedule.depth else ()),
-            f"{r.phase_margin_deg:.0f}",
-            f"{r.slowed:.2f}",
-            f"{r.settling:.1f}" if isfinite(r.settling) else "never",
-            f"{100 * r.draws_held:.0f}%",
-            "yes" if r.supported else "no",
-        )
-        for r in schedule.rows
-    ]
-    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "settle s", "held", "data")
-    to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angle}", columns, rows, left=0))
-    to.print(f"signs: {schedule.provenance['sign_convention']}")
-    counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
-    to.print(f"counted with: {'; '.join(counted)}")
-    to.print(
-        f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of the models' errors; held: those that come "
-        f"to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
-    )
-    if rejected := schedule.provenance["draws_rejected"]:
-        to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")
-    slowed = [r for r in schedule.rows if r.slowed < SLOWED_SHARE]
-    if slowed:
-        to.print(
-            f"{len(slowed)} of {len(schedule.rows)} rows were slowed for lag, delay, margin or the draws (1 is the formula's)"
-        )
-    if body["file"]:
-        to.print(f"schedule: {body['file']}", soft_wrap=True)
-
-
-def _render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) -> None:
-    from math import degrees
-
-    small, usual, large = (degrees(step.size) for step in checked.scheduled[0].steps)
-    columns = (
-        "m/s", "phase", "least", "dB", "delay", "over", "most", f"{small:.0f}", f"{usual:.0f}", "most", f"{large:.0f}", "const",
-        "knot",
-    )  # fmt: skip
-    rows = [_verify_row(a, b) for a, b in zip(checked.scheduled, checked.constant, strict=True)]
-    to.print(table("deg, dB, s of margin; overshoot %; s to settle by step in deg", columns, rows, left=0))
-    to.print(body["against_constant"], soft_wrap=True)
-    bent = max(abs(c.bent_error) for c in checked.scheduled)
-    unknown = max(abs(c.bent_error_unknown) for c in checked.scheduled)
-    to.print(f"a fin 3 deg off: steady error {degrees(bent):.2f} deg with the feed-forward, {degrees(unknown):.2f} deg without")
-    if checked.spread:
-        off = max(c.steps[1].off for c in checked.scheduled)
-        to.print(f"the trim is known so far that a straight course is held to {degrees(off):.2f} deg by 95 % of the draws")
-    if checked.disturbance > 0:
-        rms, fin = max(c.leg_rms for c in checked.scheduled), max(c.leg_fin_rms for c in checked.scheduled)
-        to.print(f"a straight leg in that disturbance: {degrees(rms):.2f} deg rms with {degrees(fin):.2f} deg rms of fin")
-    slowest = min(checked.scheduled, key=lambda c: c.speed_least / c.speed)
-    if slowest.speed_least < 0.99 * slowest.speed:
-        to.print(f"in the {large:.0f} deg step the speed falls from {slowest.speed:.2f} to {slowest.speed_least:.2f} m/s at most")
-    depth = [c for c in checked.scheduled if c.depth_settling == c.depth_settling]
-    if depth:
-        over, settle = max(100 * c.depth_overshoot for c in depth), max(c.depth_settling for c in depth)
-        to.print(f"depth step of 2 m: overshoot up to {over:.0f} %, settled within {settle:.0f} s")
-    for gate in body["gates"] if not body["passed"] else ():
-        if gate["passed"]:
-            to.print(f"passed: {gate['gate']} {gate['found']:.3g}, wanted {gate['wanted']:.3g}")
-    if body["figure"]:
-        to.print(f"figure: {body['figure']}", soft_wrap=True)
-
-
-def _verify_row(check: Check, constant: Check) -> tuple[str, ...]:
-    from fieldsid.rounding import number
-
-    gain = "none" if check.gain_least_db == float("inf") else f"{check.gain_least_db:.1f}"
-    return (
-        number(check.speed, 3),
-        f"{check.phase_deg:.0f}",
-        f"{check.phase_least_deg:.0f}",
-        gain,
-        f"{check.delay_least_s:.2f}",
-        f"{100 * check.overshoot:.0f}",
-        f"{100 * check.overshoot_most:.0f}",
-        _settles(check.steps[0].settling),
-        _settles(check.settling),
-        _settles(check.settling_most),
-        _settles(check.steps[2].settling),
-        _settles(constant.settling),
-        "knot" if check.knot else "",
-    )
-
-
-def _settles(seconds: float) -> str:
-    return f"{seconds:.1f}" if seconds != float("inf") else "never"
-
-
-def _render_export(to: Console, body: Mapping[str, Any]) -> None:
-    if body["file"]:
-        to.print(f"exported: {body['file']}", soft_wrap=True)
-    else:
-        to.out(body["text"], end="", highlight=False)
