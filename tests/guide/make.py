@@ -26,7 +26,7 @@ FIGURES: dict[str, tuple[str, float, tuple[float, float, float, float]]] = {
     "history": ("demo/models/history.png", 0.75, WHOLE),
     "law": ("demo/final/law_yaw.png", 0.7, WHOLE),
     "turn_radius": ("demo/turning/turn_radius.png", 0.7, WHOLE),
-    "schedule": ("demo/turning/gains.png", 0.6, WHOLE),
+    "schedule": ("demo/turning/gains.png", 0.5, WHOLE),
 }
 """Figures of the page on figures: the file a command drew, the scale, and the part of it that is shown."""
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
-from truth.gain_table import AT_LEAST_S, WITHIN, evaluate, identified
+from truth.gain_table import AT_LEAST_S, WITHIN, Outcome, evaluate, identified, table
 from truth.maneuvering.hulls import KINDS, Hull, draw_hull
 
 from fieldsid.errors import ModelError
@@ -16,6 +19,18 @@ SEED = 7
 def at_one_speed(number: int) -> Hull:
     hull = draw_hull(number, SEED)
     return Hull(hull.kind, hull.of, hull.rudder_limit, hull.speeds[2:3])
+
+
+def test_the_table_counts_what_was_said_never_to_settle_and_what_was_refused():
+    one = Outcome(0, "flat", 2.0, True, 1.0, 20.0, 10.0, 12.0, 11.0, 0.0, 0.1, 50.0)
+    never = replace(one, step_deg=90.0, said=np.inf, said_most=np.inf)
+    nothing = replace(one, draw=1, kind="tall", said=np.nan, flown=np.nan, refused="no gain")
+    assert one.as_said
+    assert not never.as_said
+    assert not replace(one, flown=13.0).as_said
+    lines = table([one, never, nothing])
+    assert lines[1].split()[:6] == ["all", "2", "1", "55", "100", "50"]
+    assert any("none designed: no gain" in line for line in lines)
 
 
 @pytest.mark.parametrize("number", range(len(KINDS)), ids=list(KINDS))

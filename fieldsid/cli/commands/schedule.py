@@ -113,9 +113,9 @@ def design(
 ) -> Mapping[str, Any]:
     """Design gains per speed: PD or P with feed-forward, PI, PID, LQR; heading or pitch, by the models' axis.
 
-    Gains are slowed until damping and phase margin hold with the fin's lag and delay for 95 % of the draws of the models' errors,
-    and a step flown by them comes to rest: with the fin's limits and the speed lost in the turn. What no such gain holds is
-    refused. The feed-forward cancels the trim.
+    Damping and phase margin hold with the fin's lag and delay, half of the margin for 95 % of the draws of the models' errors,
+    and a step flown by them comes to rest: with the fin's limits and the speed lost in the turn. P and PI are slowed until they
+    do; with a rate the gains are those that settle soonest. What none holds is refused. The feed-forward cancels the trim.
 
     Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
     """
