@@ -45,7 +45,7 @@ def test_each_run_is_diagnosed(run_cli, tmp_path):
     log = trial.flown(tmp_path)
     answer = run_cli("batch", log, "--axis", "yaw", "-o", tmp_path / "out", "--workers", "1")
     assert answer.code == 0, answer.err
-    assert answer.out.startswith("1 runs identified, 0 not; 1 ")
+    assert answer.out.startswith("1 run identified, 0 not; 1 ")
     row = pd.read_parquet(tmp_path / "out" / "batch_yaw.parquet").iloc[0]
     assert row.verdict in {"sufficient", "undecided", "disturbed", "unexplained", "effect"}
     assert row.says

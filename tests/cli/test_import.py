@@ -47,7 +47,7 @@ def test_init_makes_a_trial_folder_and_never_touches_one(run_cli, tmp_path):
     folder = tmp_path / "pandan"
     answer = run_cli("init", folder, "--json").json
     files = ["vehicle.yaml", "mapping.yaml", "notes.md", "journal.jsonl"]
-    assert sorted(p.name for p in folder.iterdir()) == sorted([*files, "models", "runs"])
+    assert sorted(p.name for p in folder.iterdir()) == sorted([*files, "logs", "models", "runs"])
     assert answer["files"] == [str(folder / n) for n in files]
     assert "name: 'pandan'" in (folder / "vehicle.yaml").read_text()
     before = sha256_of(folder)

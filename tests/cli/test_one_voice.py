@@ -171,7 +171,13 @@ def test_many_files_are_pasted_as_the_pattern_that_stands_for_just_them(tmp_path
     assert pasted("identify", tmp_path / "runs" / "a b.csv") == "sysid identify 'runs/a b.csv'"
 
 
-def test_the_line_under_way_goes_on_with_more_words():
+def test_the_line_under_way_goes_on_with_more_words(tmp_path, monkeypatch):
+    remember(["batch", *(f"runs/{i}.csv" for i in range(9)), "--axis", "yaw"])
+    monkeypatch.chdir(tmp_path)
+    Path("runs").mkdir()
+    for i in range(9):
+        Path(f"runs/{i}.csv").touch()
+    assert typed_with("--trend") == "sysid batch runs/*.csv --axis yaw --trend"
     remember(["identify", "my log.csv", "--axis", "yaw", "--json"])
     assert typed_with("-o", "models/") == "sysid identify 'my log.csv' --axis yaw -o models/"
 

@@ -57,7 +57,7 @@ def command(
     Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
     """
     from fieldsid.artifacts import check_output
-    from fieldsid.cli.console import emit, tracked
+    from fieldsid.cli.console import emit, tracked, warn
     from fieldsid.cli.inputs import between, mapping_of
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.logs.importing import Importer
@@ -84,6 +84,8 @@ def command(
 
     notes = [Note(n.code, f"{item.run.name}: {n.message}", n.data) for item in done for n in item.warnings]
     result = emit(body, as_json=as_json, render=lambda c: _render(done, c), headline=of_import(body), notes=notes)
+    if as_json:  # a run is used for long: what is odd about it is said however it is asked for
+        warn(notes)
     skips.end(len(done))
     return result
 

@@ -74,7 +74,7 @@ def of_batch(body: Body, *, trend: bool) -> Headline:
     known = f", {body['known_logs']} of them known" if body["known_logs"] else ""
     return Headline(
         f"{counted(body['runs'], 'run')} identified, {len(bad)} not; {found}",
-        f"{counted(body['logs'], 'log')}{known}, {body['seconds']:.1f} s on {body['where']}",
+        f"{counted(body['logs'], 'log')}{known}, took {body['seconds']:.1f} s on {body['where']}",
         typed_with("--trend") if not trend else pasted("inspect", bad[0]["file"]) if bad else "",
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from glob import escape
+from itertools import groupby
 from os.path import commonprefix
 from pathlib import Path
 
@@ -20,7 +21,10 @@ def remember(words: Sequence[str]) -> None:
 
 def typed_with(*more: str) -> str:
     """Return the command line under way with more words behind it; `--json` is left out."""
-    return pasted(*(w for w in _WORDS[0] if w != "--json"), *more)
+    words = [w for w in _WORDS[0] if w != "--json"]
+    groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and Path(w).is_file())]
+    parts = [part for g in groups for part in ([g] if len(g) > FEW and Path(g[0]).is_file() else g)]
+    return pasted(*parts, *more)
 
 
 def pasted(*words: str | Path | Sequence[str | Path]) -> str:

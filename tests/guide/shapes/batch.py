@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from guide.shapes.common import AxisName, Number, Shape, Skipped, schema_field
+from guide.shapes.common import AxisName, Number, Result, Shape, Skipped, schema_field
 
 
 class NotUsed(Skipped):
@@ -46,7 +46,7 @@ class ParameterTrend(Shape):
     """Where it changed."""
 
 
-class Batch(Shape):
+class Batch(Result):
     """An archive of logs."""
 
     schema_: Literal["fieldsid/batch/1"] = schema_field("fieldsid/batch/1")
@@ -76,5 +76,3 @@ class Batch(Shape):
     """With `--trend`, each parameter over the runs' dates."""
     figure: str | None
     """The figure of that."""
-    next: str
-    """The command that comes next."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from guide.shapes.common import AxisName, Interval, Number, Remark, Shape, Side, Skipped, schema_field
+from guide.shapes.common import AxisName, Interval, Number, Remark, Result, Shape, Side, Skipped, schema_field
 from guide.shapes.fits import ComparedRun
 
 
@@ -125,7 +125,7 @@ class AxisChange(Shape):
     """What to do next; null where nothing is."""
 
 
-class CompareModels(Shape):
+class CompareModels(Result):
     """Two states of a vehicle."""
 
     schema_: Literal["fieldsid/compare-models/1"] = schema_field("fieldsid/compare-models/1")
@@ -150,7 +150,7 @@ class OneOfSeveral(Shape):
     """One for each run."""
 
 
-class CompareSeveral(Shape):
+class CompareSeveral(Result):
     """Several models over the same runs."""
 
     schema_: Literal["fieldsid/compare-several/1"] = schema_field("fieldsid/compare-several/1")

@@ -25,6 +25,24 @@ def schema_field(name: str) -> Any:
     return Field(alias="schema", description=f"Always `{name}`: the name and version of this object.")
 
 
+class Headline(Shape):
+    """The first lines that a reader gets."""
+
+    says: str
+    """The verdict with its number."""
+    rests_on: str
+    """What it rests on."""
+    next: str
+    """The command that comes next, ready to paste; empty where nothing is left to do."""
+
+
+class Result(Shape):
+    """What a command came to."""
+
+    headline: Headline
+    """The first lines of the same result as text."""
+
+
 class Remark(Shape):
     """A finding: what is wrong or worth knowing, with its code."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from guide.shapes.common import AxisName, NoiseFloor, Number, Pair, Remark, Shape, Skipped, Where, schema_field
+from guide.shapes.common import AxisName, NoiseFloor, Number, Pair, Remark, Result, Shape, Skipped, Where, schema_field
 from pydantic import Field
 
 
@@ -69,7 +69,7 @@ class NextManeuver(Shape):
     """Other maneuvers, with what they are expected to give."""
 
 
-class Diagnose(Shape):
+class Diagnose(Result):
     """Which physical effect the model lacks."""
 
     schema_: Literal["fieldsid/diagnose/1"] = schema_field("fieldsid/diagnose/1")

@@ -13,6 +13,7 @@ from guide.shapes.common import (
     Pair,
     Remark,
     RemarkWithData,
+    Result,
     Shape,
     Skipped,
     Where,
@@ -86,7 +87,7 @@ class Fit(Merit):
     """By parameter, when the recursive estimate settled; null for other methods."""
 
 
-class Identify(Shape):
+class Identify(Result):
     """The models that `sysid identify` found."""
 
     schema_: Literal["fieldsid/identify/1"] = schema_field("fieldsid/identify/1")
@@ -180,6 +181,8 @@ class ComparedRun(Merit):
 
     run: str
     """Its name."""
+    fitted_to: bool
+    """Whether the model was fitted to it, which makes it no fair judge."""
     speed_m_s: Number
     """Median speed through the water."""
     noise_floor: NoiseFloor
@@ -210,7 +213,7 @@ class ComparedRun(Merit):
     """The figure that was drawn."""
 
 
-class Compare(Shape):
+class Compare(Result):
     """A model against measurement."""
 
     schema_: Literal["fieldsid/compare/1"] = schema_field("fieldsid/compare/1")
@@ -328,7 +331,7 @@ class UndoneParent(Parent):
     """Whether it is as it was when its child was made."""
 
 
-class Undone(Shape):
+class Undone(Result):
     """An extension taken back with `--undo`."""
 
     schema_: Literal["fieldsid/extend/1"] = schema_field("fieldsid/extend/1")
@@ -391,7 +394,7 @@ class Generation(Shape):
     """Data files that have changed since."""
 
 
-class History(Shape):
+class History(Result):
     """How a model came about."""
 
     schema_: Literal["fieldsid/history/1"] = schema_field("fieldsid/history/1")

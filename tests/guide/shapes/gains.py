@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from guide.shapes.common import AxisName, Number, Shape, schema_field
+from guide.shapes.common import AxisName, Headline, Number, Result, Shape, schema_field
 
 
 class Row(Shape):
@@ -55,7 +55,7 @@ class Actuator(Shape):
     """The autopilot's own."""
 
 
-class Schedule(Shape):
+class Schedule(Result):
     """Gains per speed."""
 
     schema_: Literal["fieldsid/schedule/1"] = schema_field("fieldsid/schedule/1")
@@ -179,7 +179,7 @@ class Gate(Shape):
     """Whether it holds."""
 
 
-class Verification(Shape):
+class Verification(Result):
     """A schedule checked over the identified set."""
 
     schema_: Literal["fieldsid/verification/1"] = schema_field("fieldsid/verification/1")
@@ -214,6 +214,8 @@ class Verification(Shape):
 class Export(Shape):
     """The gains in the vehicle's own format."""
 
+    headline: Headline | None = None
+    """The first lines of the same result as text, where a file was written."""
     schema_: Literal["fieldsid/export/1"] = schema_field("fieldsid/export/1")
     target: str
     """The format."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from guide.shapes.common import Number, RemarkWithData, Shape, Skipped, schema_field
+from guide.shapes.common import Number, RemarkWithData, Result, Shape, Skipped, schema_field
 
 
-class Init(Shape):
+class Init(Result):
     """The trial folder that `sysid init` made."""
 
     schema_: Literal["fieldsid/init/1"] = schema_field("fieldsid/init/1")
@@ -67,7 +67,7 @@ class NextStep(Shape):
     """The command; empty where nothing is left to do."""
 
 
-class Status(Shape):
+class Status(Result):
     """What a trial folder holds."""
 
     schema_: Literal["fieldsid/status/1"] = schema_field("fieldsid/status/1")
@@ -96,7 +96,7 @@ class ReportVerdict(Shape):
     """What it says."""
 
 
-class Report(Shape):
+class Report(Result):
     """The report that was written."""
 
     schema_: Literal["fieldsid/report/1"] = schema_field("fieldsid/report/1")
@@ -159,7 +159,7 @@ class Shown(Shape):
     """Its range, or its first fields."""
 
 
-class Inspection(Shape):
+class Inspection(Result):
     """What is in a log, the mapping proposed for it, and the import doctor's findings."""
 
     schema_: Literal["fieldsid/inspection/1"] = schema_field("fieldsid/inspection/1")
@@ -214,7 +214,7 @@ class ImportedRun(Shape):
     """What was done and what was found."""
 
 
-class Import(Shape):
+class Import(Result):
     """The runs that `sysid import` wrote."""
 
     schema_: Literal["fieldsid/import/1"] = schema_field("fieldsid/import/1")
@@ -235,7 +235,7 @@ class SignalRange(Shape):
     """Last value."""
 
 
-class Simulation(Shape):
+class Simulation(Result):
     """A model's own prediction, kept as a run."""
 
     schema_: Literal["fieldsid/simulation/1"] = schema_field("fieldsid/simulation/1")

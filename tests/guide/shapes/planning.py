@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from guide.shapes.common import AxisName, Number, Shape, schema_field
+from guide.shapes.common import AxisName, Number, Result, Shape, schema_field
 from pydantic import Field
 
 
@@ -172,7 +172,7 @@ class Separation(Shape):
     """Other maneuvers, with what they are expected to give."""
 
 
-class Plan(Shape):
+class Plan(Result):
     """What to fly."""
 
     schema_: Literal["fieldsid/plan/1"] = schema_field("fieldsid/plan/1")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from guide.shapes.common import AxisName, Shape, schema_field
+from guide.shapes.common import AxisName, Result, Shape, schema_field
 
 
 class Coefficient(Shape):
@@ -72,13 +72,13 @@ class Effect(Shape):
     """`built in`, or the file of a user's own."""
 
 
-class ShownEffect(Effect):
+class ShownEffect(Result, Effect):
     """One physical effect, as `sysid effects show` gives it."""
 
     schema_: Literal["fieldsid/effect/1"] = schema_field("fieldsid/effect/1")
 
 
-class Effects(Shape):
+class Effects(Result):
     """The catalogue of effects."""
 
     schema_: Literal["fieldsid/effects/1"] = schema_field("fieldsid/effects/1")
@@ -88,7 +88,7 @@ class Effects(Shape):
     """Every effect."""
 
 
-class NewEffect(Shape):
+class NewEffect(Result):
     """The file of an effect of one's own."""
 
     schema_: Literal["fieldsid/new-effect/1"] = schema_field("fieldsid/new-effect/1")
@@ -124,7 +124,7 @@ class Step(Shape):
     """The command's own JSON object."""
 
 
-class Demo(Shape):
+class Demo(Result):
     """The tour."""
 
     schema_: Literal["fieldsid/demo/1"] = schema_field("fieldsid/demo/1")

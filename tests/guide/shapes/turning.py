@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from guide.shapes.common import AxisName, Interval, Number, Remark, Shape, Side, Skipped, schema_field
+from guide.shapes.common import AxisName, Interval, Number, Remark, Result, Shape, Side, Skipped, schema_field
 
 
 class Point(Shape):
@@ -98,7 +98,7 @@ class Law(Shape):
     """Each point against the law of the others."""
 
 
-class Laws(Shape):
+class Laws(Result):
     """Parameters against speed."""
 
     schema_: Literal["fieldsid/fit/1"] = schema_field("fieldsid/fit/1")
@@ -234,7 +234,7 @@ class Surge(Shape):
     """Root mean square of what the fit to the surge leaves."""
 
 
-class TurnRadius(Shape):
+class TurnRadius(Result):
     """The turning radius over speed."""
 
     schema_: Literal["fieldsid/turn-radius/1"] = schema_field("fieldsid/turn-radius/1")
