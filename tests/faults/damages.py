@@ -244,9 +244,10 @@ def table(logs: int, folder: Path, first_seed: int = 0) -> tuple[dict[str, float
         false += bool(found)
         for code in found:
             good[code] = good.get(code, 0.0) + 1.0 / logs
-    for damage in DAMAGES:
-        for seed in range(first_seed, first_seed + max(logs // 5, 1)):
-            log = good_log(1000 + seed)
+    for seed in range(first_seed, first_seed + max(logs // 5, 1)):
+        whole = good_log(1000 + seed)
+        for damage in (d for d in DAMAGES if d.told_by):
+            log = {name: values.copy() for name, values in whole.items()}
             damage.spoil(log, np.random.default_rng(seed))
             told[damage.name] += is_told(damage, findings(log, folder)) / max(logs // 5, 1)
     return told, {"any": false / logs} | good
