@@ -17,6 +17,7 @@ from fieldsid.fitting.covariance.kenward_roger import (
 from fieldsid.fitting.covariance.noise_selection import chosen_noise
 from fieldsid.fitting.covariance.output_error_covariance import white_weight_covariance
 from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood
+from fieldsid.fitting.initial.effect_screen import backtrack, linearise_at, screen_effect, transfer_parameters
 from fieldsid.fitting.initial.forward_build import forward_build
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations
 from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, squares_of
@@ -24,6 +25,7 @@ from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.predict.predict import refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution, shared_covariance
 from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
 from fieldsid.noise.whiten import noise_vector
@@ -94,7 +96,22 @@ def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimu
         found, weights = other, new
         if before - cost < MIN_RESCAN_GAIN:
             break
+    for effect in (e for e in problem.layout.effects if any(c.scan for c in e.nuisance)):
+        other, new = minimise(problem, _screened_again(problem, found.x, effect, weights), weights)
+        if negative_log_likelihood(problem, other.x) < negative_log_likelihood(problem, found.x):
+            found, weights = other, new
     return found, weights
+
+
+def _screened_again(problem: Problem, x: FloatArray, effect: Effect, weights: Noise) -> FloatArray:
+    """Return a start with one effect screened beside the other parameters of a solution: times and sizes of its events together.
+
+    The first screen stood on a model that lacked the effect, whose parameters it had biased.
+    """
+    rest = problem.with_effects([e for e in problem.layout.effects if e is not effect])
+    linearisation = linearise_at(rest, transfer_parameters(problem.layout, x, rest.layout), weights)
+    screened = backtrack(linearisation, screen_effect(linearisation, effect))
+    return transfer_parameters(screened.problem.layout, screened.start, problem.layout)
 
 
 def found_minimum(problem: Problem) -> tuple[Minimum, Noise]:
