@@ -16,15 +16,14 @@ from fieldsid.models.effect import Coefficient, Core, Values, Variant
 def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
     """Return the two numbers of a cross state, `cross` its name and builds_up what drives it and where to, in words.
 
-    The bounds hold from a large ship, whose sway dies out in minutes, to a small aircraft; a fit narrows them to what its runs
-    can show (fitting/problem/parameters.py).
+    A state slower than ten seconds cannot be distinguished from a drift in runs of a minute.
     """
     return (
         Coefficient(
             "cross_damping",
             "1/s",
-            0.005,
-            50.0,
+            0.1,
+            10.0,
             0.8,
             scan=(0.25, 0.7, 2.0),
             step=1e-3,
@@ -34,8 +33,8 @@ def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
         Coefficient(
             "cross_rate",
             "1/s^2",
-            -500.0,
-            500.0,
+            -20.0,
+            20.0,
             0.1,
             scan=(-0.2, 0.2),
             rate_exponent=2,

@@ -57,8 +57,7 @@ class Coefficient:
     `scan` gives start values tried before the descent; `step` is the half width of the central difference. `per_run` marks a
     nuisance (a phase, an event time) that every run has of its own and that is refitted on validation runs; its bounds are
     fractions of the run's length when `unit` is "run". `rate_exponent` is the power of the hull's characteristic rate (1/s) that
-    scales the points of the grid: the coefficients of a slow hull are small. A fit takes such a coefficient within what its runs
-    can show.
+    scales the points of the grid: the coefficients of a slow hull are small.
     """
 
     name: str

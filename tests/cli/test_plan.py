@@ -30,7 +30,8 @@ def test_a_plan_is_printed_with_errors_minutes_metres_and_risk(run_cli):
     assert answer.code == 0, answer.err
     for word in ("a22", "b2", "C0", "minutes", "risk", "m;", "pulses need"):
         assert word in answer.out
-    assert "-o DIR" in answer.err
+    assert "next: sysid plan" in answer.out
+    assert "-o " in answer.out
 
 
 def test_the_error_of_a_trim_that_may_be_zero_is_no_share_of_it(run_cli, written):

@@ -29,14 +29,14 @@ def flown(speed: float, seed: int, fins: Fins = FINS) -> Run:
     return Run(f"pulses_{speed:.1f}", log.pop("time_s"), log)
 
 
-def schedule_from(folder, fins: Fins, kind: str = "pd"):
+def schedule_from(folder, fins: Fins, kind: str = "pd", bandwidth: float | None = 1.0):
     paths = []
     for i, speed in enumerate(KNOTS):
         (fit,) = identify([flown(speed, 20 + i, fins)], Axis.YAW, method="output_error")
         paths.append(save_model(fit.model, folder / f"m{i}.yaml"))
     limits = FinLimits(lag=fins.lag, rate=fins.rate)
     source = load_parameter_source(paths)
-    return design_schedule(source, fins.limit, wish=Wish(kind=kind, bandwidth=1.0), limits=limits), source
+    return design_schedule(source, fins.limit, wish=Wish(kind=kind, bandwidth=bandwidth), limits=limits), source
 
 
 def steered(row, speed: float, *, fins: Fins = FINS, step: float = STEP, forward: bool = True, seed: int = 50):
@@ -65,8 +65,8 @@ def schedule(tmp_path_factory):
     return schedule_from(tmp_path_factory.mktemp("models"), FINS)
 
 
-def test_steps_are_damped_and_quick_at_every_speed_and_none_slower_than_the_constant_gain(schedule):
-    schedule, source = schedule
+def test_steps_are_damped_and_quick_at_every_speed_and_none_slower_than_the_constant_gain(tmp_path):
+    schedule, source = schedule_from(tmp_path, FINS, bandwidth=None)
     constant = verify_schedule(schedule, source).constant_row
     rows = []
     for speed, knot in checked_speeds(schedule):

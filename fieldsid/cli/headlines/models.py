@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
-from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
+from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import MANY, MOST_NAMED, Body, counted, is_noise, named, over_noise, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
 from fieldsid.rounding import number
@@ -94,7 +94,7 @@ def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inpu
 
     if not fails:
         return used(axis, model)
-    fitted = [p for p in inputs if p.exists()]
+    fitted = [p for p in inputs if is_there(p)]
     unseen = [p for p in runs if p.resolve() not in {f.resolve() for f in fitted}]
     known = ("--model", model) if load_model(Path(model)).effects else ()
     judged = repeated("--validate", unseen) if fitted else []
@@ -150,7 +150,7 @@ def of_history(body: Body, inputs: Sequence[Path]) -> Headline:
     """Return how the error fell along a model's line; inputs: what it was fitted to."""
     steps = [g for g in body["generations"] if g.get("over_floor")]
     axis, model = str(body["axis"]), str(body["model"])
-    logs = [p for p in inputs if p.exists()]
+    logs = [p for p in inputs if is_there(p)]
     if not steps:
         next_ = pasted("diagnose", logs, "--axis", axis) if logs else pasted("status")
         return Headline("nothing was added yet", f"{model}, whose line begins with itself", next_)

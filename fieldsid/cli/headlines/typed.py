@@ -22,8 +22,8 @@ def remember(words: Sequence[str]) -> None:
 def typed_with(*more: str) -> str:
     """Return the command line under way with more words behind it; `--json` is left out."""
     words = [w for w in _WORDS[0] if w != "--json"]
-    groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and Path(w).is_file())]
-    parts = [part for g in groups for part in ([g] if len(g) > FEW and Path(g[0]).is_file() else g)]
+    groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and _is_file(w))]
+    parts = [part for g in groups for part in ([g] if len(g) > FEW and _is_file(g[0]) else g)]
     return pasted(*parts, *more)
 
 
@@ -33,6 +33,18 @@ def pasted(*words: str | Path | Sequence[str | Path]) -> str:
     for word in words:
         parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else _files([Path(_near(p)) for p in word])
     return " ".join(parts)
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is a file or folder at a path; what cannot be reached is not."""
+    try:
+        return path.exists()
+    except PermissionError:
+        return False
+
+
+def _is_file(word: str) -> bool:
+    return is_there(Path(word)) and Path(word).is_file()
 
 
 def repeated(option: str, files: Sequence[str | Path]) -> list[str]:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Coefficient, Effect
+from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw, with_speed
 from fieldsid.numerics.arrays import BoolArray, FloatArray
@@ -24,9 +24,6 @@ GROUP_WIDTH_TRAINED = 0.12
 """A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
 BOUND_SHARE = 1e-6
 """Share of a parameter's range from its bound within which it lies on it."""
-FEWEST_TIME_CONSTANTS, FEWEST_STEPS = 6.0, 2.0
-"""A state of the hull can be told from a drift where the longest run is so many of its time constants, and from an instant answer
-where its time constant is so many samples: 0.1 to 10 1/s in runs of a minute at 20 Hz."""
 BASE_BOUNDS = {"damping": (-10.0, 100.0), "stiffness": (-20.0, 100.0), "authority": (-500.0, 500.0), "trim": (-50.0, 50.0)}
 
 
@@ -172,24 +169,12 @@ def layout_of(
     slots.append(Parameter(names.trim, "rad/s^2", *BASE_BOUNDS["trim"], 0.0))
     if len(groups.speeds) > 1:
         slots.append(Parameter("damping_exponent", "1", -1.0, 3.0, 1.0))
-    slots += [_as_shown(c, records) for e in effects for c in e.shared]
+    slots += [Parameter(c.name, c.unit, c.low, c.high, c.start) for e in effects for c in e.shared]
     shared = len(slots)
     before = _fastest_before(records)
     for i, record in enumerate(records):
         slots += _run_nuisances(i, record, effects, before)
     return ParameterLayout(axis, tuple(effects), groups, tuple(slots), shared)
-
-
-def _as_shown(c: Coefficient, records: Sequence[Record]) -> Parameter:
-    """Return a shared coefficient as a parameter; one that goes with the hull's rate within the bounds that the runs can show."""
-    if not c.rate_exponent:
-        return Parameter(c.name, c.unit, c.low, c.high, c.start)
-    longest = max(float(r.time[-1] - r.time[0]) for r in records)
-    step = min(float(np.median(r.steps)) for r in records)
-    high = min(c.high, (1.0 / (FEWEST_STEPS * step)) ** c.rate_exponent)
-    low = max(c.low, (FEWEST_TIME_CONSTANTS / longest) ** c.rate_exponent if c.low > 0.0 else -high)
-    low = min(low, high)
-    return Parameter(c.name, c.unit, low, high, float(np.clip(c.start, low, high)))
 
 
 def _run_nuisances(run: int, record: Record, effects: Sequence[Effect], before: float) -> list[Parameter]:

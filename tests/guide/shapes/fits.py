@@ -7,6 +7,7 @@ from typing import Any, Literal
 from guide.shapes.common import (
     AxisName,
     Errors,
+    Headline,
     Interval,
     NoiseFloor,
     Number,
@@ -322,6 +323,8 @@ class Extension(Gain):
     """The command that goes on from there."""
     skipped_runs: list[Skipped]
     """Logs that could not be used, and why; where there are any, the exit code is 1."""
+    headline: Headline
+    """The first lines of the same result as text."""
 
 
 class UndoneParent(Parent):

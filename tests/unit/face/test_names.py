@@ -47,8 +47,9 @@ def function_of(command: str, under: str | None):
 
 
 def in_si(default):
-    """What a command takes as text such as `0.26rad`, as the number that a function takes."""
-    return float(default.removesuffix("rad")) if isinstance(default, str) and default.endswith("rad") else default
+    """What a command takes as text such as `0.26rad`, as the number that a function takes: margins are in deg there."""
+    unit = next((u for u in ("rad", "deg") if isinstance(default, str) and default.endswith(u)), None)
+    return float(default.removesuffix(unit)) if unit else default
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -39,5 +39,5 @@ def test_without_unseen_runs_the_fitted_ones_are_the_bars():
 
 def test_a_bar_says_error_share_explained_and_probability():
     assert words_of(NAMED, NAMED.unseen) == "1.10 x, 98 % explained, probability 0.970"
-    assert words_of(WORSE, WORSE.unseen) == "95.00 x, worse, probability below 0.01"
+    assert words_of(WORSE, WORSE.unseen) == "95.00 x, worse, probability 0.001"
     assert words_of(BASE, BASE.unseen) == "3.20 x"

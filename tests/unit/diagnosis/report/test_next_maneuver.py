@@ -24,8 +24,8 @@ def test_a_maneuver_that_is_not_expected_to_decide_is_not_advised_as_if_it_did(m
     fly = next_maneuver.next_maneuver(WORK, Verdict("undecided", ("servo_lag",), (RIVALS[1],)), RIVALS[0], {}, FLOOR)
     assert fly["expected_log_odds"] == odds
     assert fly["command"] == "sysid plan --separate servo_lag,delay"
-    assert ("no maneuver inside the fin angles flown" in fly.get("note", "")) == (odds < next_maneuver.MIN_LOG_ODDS)
-    assert (fly["maneuver"] == "prbs") == (odds >= next_maneuver.MIN_LOG_ODDS)
+    assert ("no maneuver inside the fin angles flown" in fly.get("note", "")) == (odds < next_maneuver.RIVAL_LOG_ODDS)
+    assert (fly["maneuver"] == "prbs") == (odds >= next_maneuver.RIVAL_LOG_ODDS)
 
 
 LACKS = {"roll_coupling": "needs roll, which the log lacks"}
