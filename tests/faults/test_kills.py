@@ -60,9 +60,10 @@ def is_alive(process):
 
 
 WRITER = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from fieldsid.artifacts import replacing
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets what it starts in the background ignore it
 with replacing(Path(sys.argv[1]), force=True) as temporary:
     temporary.write_text("half")
     print("writing", flush=True)
