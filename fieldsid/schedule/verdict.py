@@ -27,6 +27,10 @@ from fieldsid.schedule.verify import (
 MOST_NAMED = 3
 
 
+UNSTABLE = "the hull alone is unstable: it may take up to twice as long to settle"
+"""Flown on the hulls of `tests/truth/gain_table.py`: 9.7 s said and 19.3 s flown at worst."""
+
+
 @dataclass(frozen=True, slots=True)
 class Gate:
     """One number that was asked for: its name with unit, the limit, what was found and at which speed (m/s)."""
@@ -156,6 +160,7 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             f"fin {limit} rad, {fin_of(actuator_of(source, stated_limits(schedule)))}",
             checked.speed_lost,
             heard,
+            *([UNSTABLE] if checked.unstable else []),
             *lost(source),
         )
     )

@@ -185,6 +185,8 @@ class Verification(Plotted):
     speed_lost: str
     disturbance: float
     """Where the speed lost in the turn comes from; the rms of the models' disturbance moment, rad/s^2, zero for none."""
+    unstable: bool
+    """Whether the hull alone is unstable at one of the speeds: how it settles hangs on what a model leaves out."""
 
     @property
     def worst(self) -> dict[str, float]:
@@ -234,7 +236,8 @@ def verify_schedule(
     scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
     kept, heard = speed_kept_said(schedule.axis, surge), max((m.noise.disturbance for m in source.models), default=0.0)
-    return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard)
+    unstable = any(float(p.growth[0]) > 0.0 for p in plants)
+    return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable)
 
 
 def _noise_at(source: ParameterSource, speed: float) -> Noise | None:

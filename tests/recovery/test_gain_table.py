@@ -46,7 +46,8 @@ def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
         assert row.overshoot < 0.25
         if row.step_deg == pytest.approx(20.0):
             most = max(row.said, row.said_most)
-            assert row.flown <= most + max(WITHIN * most, AT_LEAST_S)
+            # of an unstable hull `verify` says that it may take twice as long
+            assert row.flown <= most + max((WITHIN if row.stable else 1.0) * most, AT_LEAST_S)
 
 
 def test_an_unstable_hull_gets_no_proportional_gain_and_is_told_what_holds_it():
