@@ -35,7 +35,7 @@ def believed(runs, models=(), length=None):
     return believe(runs, models, length, np.random.default_rng(1))
 
 
-@pytest.mark.parametrize(("number", "sway"), [(0, True), (3, False), (6, True)])
+@pytest.mark.parametrize(("number", "sway"), [pytest.param(0, True, marks=pytest.mark.slow), (3, False), (6, True)])
 def test_zigzags_tell_the_circle_of_both_sides(number, sway):
     hull, runs = runs_of(number, "pulses+zigzag", sway=sway)
     belief = believed(runs)
@@ -47,7 +47,7 @@ def test_zigzags_tell_the_circle_of_both_sides(number, sway):
             assert turn.interval95[1] - turn.interval95[0] < 0.35 * truth
 
 
-@pytest.mark.parametrize("number", [7, 9, 11, 13])
+@pytest.mark.parametrize("number", [7, 9, *(pytest.param(n, marks=pytest.mark.slow) for n in (11, 13))])
 def test_bands_of_pulses_without_sway_hold_the_circle(number):
     hull, runs = runs_of(number, "pulses", sway=False)
     belief = believed(runs)
