@@ -22,7 +22,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.registry import near
 from fieldsid.schedule.controller import KINDS, Gains
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, margins, worst_of
+from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
 from fieldsid.schedule.optimum import (
     DRAWS_MARGIN_SHARE,
     LACK_ROUNDING,
@@ -90,8 +90,8 @@ def check_wish(wish: Wish) -> None:
 def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
     """Return the gains of one speed that serve most of a plant's draws; raises ModelError where the estimate is not served.
 
-    P and PI that serve fewer than half of the draws are refused as well; with a rate, where no gains serve as many, they are the
-    estimate's, and `held` says of how few draws.
+    P and PI that serve fewer than half of the draws are refused as well; with a rate, where no gains serve as many draws as they
+    have to, they are the estimate's, and `held` says of how few: half-way between serves neither.
     """
     one, family = plant.one(), plant.distinct()
     if wish.kind in PROPORTIONAL and one.slow_damping[0] <= 0:
@@ -100,7 +100,7 @@ def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
     if found is None:
         raise _refusal(family, wish, fin_limit)
     did = flown(family, found.gains, demand)
-    if did.held < LEAST_HELD and (alone := _found(one, wish, fin_limit)) is not None:
+    if did.held < HELD_SHARE and (alone := _found(one, wish, fin_limit)) is not None:
         found, did = alone, flown(family, alone.gains, demand)
     crossover = float(np.nan_to_num(margins(one, found.gains).crossover[0]))
     depth_gain = _depth_gain(family, found.gains) if plant.axis is Axis.PITCH else 0.0

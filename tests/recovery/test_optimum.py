@@ -15,7 +15,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning", 
 SEED, CHUNK, CHUNKS = 501, 25, 3
 SHORT = (("own", 1, 77), ("own", 24, 501), ("own", 7, 501), ("hard", 3, 501))
 """A delay of 0.6 s and a drag along the hull that a fit with too few weightings missed, and two that came at random."""
-SHORT_OF_SECOND = (("second", 7, 501), ("second", 44, 501), ("second-hard", 44, 501))
+SHORT_OF_SECOND = (("second", 7, 501), ("second-hard", 44, 501))
 """A fin that is lost within a pulse, anew in each run: its times lie between the grid's."""
 
 needs_second_bank = pytest.mark.skipif(not SECOND_BANK.is_dir(), reason=f"the second bank is absent here: {SECOND_BANK}")
