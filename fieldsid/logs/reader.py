@@ -138,6 +138,11 @@ class ReadOptions:
         return f"{words}: {self.with_option('--salvage')}" if left >= WORTH_SALVAGING else ""
 
 
+def never_canonical(path: Path, options: ReadOptions) -> ChannelMap | None:
+    """Return None: the names of these logs are their own, and which output moves which fin is the vehicle's."""
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class Reader:
     """One kind of log. `own_map` gives the mapping of a file whose names are canonical, or None when they are not."""
@@ -148,7 +153,7 @@ class Reader:
     sniff: Callable[[Path], bool]
     inventory: Callable[[Path, ReadOptions, TableForm], Inventory]
     read: Callable[[Path, ChannelMap, ReadOptions], RawLog]
-    own_map: Callable[[Path, ReadOptions], ChannelMap | None]
+    own_map: Callable[[Path, ReadOptions], ChannelMap | None] = never_canonical
 
 
 def reader_of(path: Path) -> Reader:

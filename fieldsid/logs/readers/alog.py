@@ -80,11 +80,6 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     return raw_log_of(path, topics, mapping, notes)
 
 
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: which fin is which is the vehicle's."""
-    return None
-
-
 READER = Reader(
     name="alog",
     says="MOOS log: .alog",
@@ -92,5 +87,4 @@ READER = Reader(
     sniff=sniff,
     inventory=inventory,
     read=read,
-    own_map=own_map,
 )

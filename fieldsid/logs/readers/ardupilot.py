@@ -126,11 +126,6 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     return raw_log_of(path, _topics(path), mapping, _cut(path))
 
 
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: which output is which fin is the vehicle's."""
-    return None
-
-
 READER = Reader(
     name="ardupilot",
     says="ArduPilot log: .bin, .tlog, with the extra `ardupilot`",
@@ -138,5 +133,4 @@ READER = Reader(
     sniff=sniff,
     inventory=inventory,
     read=read,
-    own_map=own_map,
 )

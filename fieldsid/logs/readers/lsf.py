@@ -203,11 +203,6 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     return raw_log_of(path, topics, mapping, notes)
 
 
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: which servo is which fin is the vehicle's."""
-    return None
-
-
 READER = Reader(
     name="lsf",
     says="DUNE log (LSTS): .lsf, .lsf.gz, with its IMC.xml beside it",
@@ -215,5 +210,4 @@ READER = Reader(
     sniff=sniff,
     inventory=inventory,
     read=read,
-    own_map=own_map,
 )

@@ -27,11 +27,6 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     return read_signals(path, mapping, options)
 
 
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: a bag's topics have no canonical names."""
-    return None
-
-
 READER = Reader(
     name="rosbag",
     says="ROS 1 bag, ROS 2 mcap or db3, a file or a folder",
@@ -39,5 +34,4 @@ READER = Reader(
     sniff=is_bag,
     inventory=inventory,
     read=read,
-    own_map=own_map,
 )

@@ -139,11 +139,6 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     return raw_log_of(path, topics if wanted <= topics.keys() else _topics(path), mapping, _cut(path))
 
 
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: its sensors have the glider's names."""
-    return None
-
-
 READER = Reader(
     name="slocum",
     says="Slocum glider log: .dbd, .ebd and their kin, with the extra `slocum`",
@@ -151,5 +146,4 @@ READER = Reader(
     sniff=sniff,
     inventory=inventory,
     read=read,
-    own_map=own_map,
 )

@@ -81,11 +81,6 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     return raw_log_of(path, _topics(path), mapping, _cut(path))
 
 
-def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
-    """Return None: which output is which fin is the vehicle's."""
-    return None
-
-
 READER = Reader(
     name="ulog",
     says="PX4 log: .ulg, with the extra `ulog`",
@@ -93,5 +88,4 @@ READER = Reader(
     sniff=sniff,
     inventory=inventory,
     read=read,
-    own_map=own_map,
 )
