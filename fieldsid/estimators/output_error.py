@@ -82,7 +82,8 @@ def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimu
     While the fin rests an event's time changes nothing, and no descent leaves such a stretch. With the shared parameters found,
     the grids show each run's best.
     """
-    if not any(c.scan for effect in problem.layout.effects for c in effect.nuisance):
+    timed = [e for e in problem.layout.effects if any(c.scan for c in e.nuisance)]
+    if not timed:
         return found, weights
     cost = negative_log_likelihood(problem, found.x)
     for _ in range(MAX_RESCANS):
@@ -96,7 +97,7 @@ def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimu
         found, weights = other, new
         if before - cost < MIN_RESCAN_GAIN:
             break
-    for effect in (e for e in problem.layout.effects if any(c.scan for c in e.nuisance)):
+    for effect in timed:
         other, new = minimise(problem, _screened_again(problem, found.x, effect, weights), weights)
         if negative_log_likelihood(problem, other.x) < negative_log_likelihood(problem, found.x):
             found, weights = other, new

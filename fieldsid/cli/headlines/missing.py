@@ -37,7 +37,7 @@ def of_diagnosis(body: Body, searched: Searched) -> Headline:
     judged = named(body["validation_runs"]) if body["validation_runs"] else "a part of them held back"
     rests = (
         f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
-        f"{counted(len(body['candidates']), 'hypothesis').replace('hypothesiss', 'hypotheses')} compared"
+        f"{counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
     )
     return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
 

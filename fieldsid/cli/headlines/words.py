@@ -17,9 +17,9 @@ MANY = 100.0
 """Times the noise from which on a log has none to speak of, as one of a towing tank or a simulation."""
 
 
-def counted(count: int, word: str) -> str:
-    """Return `1 run`, `2 runs`."""
-    return f"{count} {word}{'s' * (count != 1)}"
+def counted(count: int, word: str, many: str = "") -> str:
+    """Return `1 run`, `2 runs`; `many` is a plural that is no `s` more."""
+    return f"{count} {word if count == 1 else many or f'{word}s'}"
 
 
 def named(names: Sequence[str]) -> str:
