@@ -62,11 +62,11 @@ def _short(body: Body) -> str:
 def _after(body: Body, of: Searched) -> str:
     axis = str(body["axis"])
     judged = repeated("--validate", of.unseen)
+    if body["verdict"] == "undecided":  # it names effects too: the likeliest of the rivals
+        return _deciding(body, axis)
     if body["effects"]:
         adds = repeated("--add", body["effects"])
         return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged, *of.reading))
-    if body["verdict"] == "undecided":
-        return _deciding(body, axis)
     if body["verdict"] == "unexplained":
         longer = ("--thorough", *(("--force",) if body["file"] or body["figure"] else ()))
         return pasted("effects", "new", "unexplained", "--axis", axis) if of.thorough else typed_with(*longer)

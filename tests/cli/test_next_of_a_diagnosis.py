@@ -1,0 +1,40 @@
+"""What a diagnosis sends its reader to: rivals are told apart before one of them is added."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fieldsid.cli.headlines.missing import Searched, of_diagnosis
+
+SEARCHED = Searched((Path("a.csv"), Path("b.csv")), (Path("c.csv"),), Path("m.yaml"), None, thorough=False)
+
+
+def body(verdict: str, *, file: str = "") -> dict[str, object]:
+    """A diagnosis as `--json` has it, as far as its headline reads it."""
+    return {
+        "verdict": verdict,
+        "axis": "yaw",
+        "says": "servo_lag or delay",
+        "effects": ["servo_lag"],
+        "candidates": [{"probability": 0.6}, {"probability": 0.4}],
+        "runs": ["a", "b"],
+        "validation_runs": ["c"],
+        "next_maneuver": {"command": "sysid plan --separate servo_lag,delay"},
+        "file": file,
+        "known": [],
+        "figure": None,
+    }
+
+
+@pytest.mark.parametrize(
+    ("file", "says"),
+    [("", "sysid plan --separate servo_lag,delay --axis yaw -o plan"), ("d.yaml", "sysid plan --from d.yaml -o plan")],
+)
+def test_rivals_are_told_apart_first(file, says):
+    assert of_diagnosis(body("undecided", file=file), SEARCHED).next == says
+
+
+def test_an_effect_that_is_named_is_added():
+    assert of_diagnosis(body("effect"), SEARCHED).next == "sysid extend m.yaml a.csv b.csv --add servo_lag --validate c.csv"
