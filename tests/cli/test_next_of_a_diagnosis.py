@@ -1,4 +1,4 @@
-"""What a diagnosis sends its reader to: rivals are told apart before one of them is added."""
+"""What a diagnosis says it rests on, and where it sends its reader: rivals are told apart before one of them is added."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ def body(verdict: str, *, file: str = "") -> dict[str, object]:
         "file": file,
         "known": [],
         "figure": None,
+        "notes": [],
     }
 
 
@@ -38,3 +39,11 @@ def test_rivals_are_told_apart_first(file, says):
 
 def test_an_effect_that_is_named_is_added():
     assert of_diagnosis(body("effect"), SEARCHED).next == "sysid extend m.yaml a.csv b.csv --add servo_lag --validate c.csv"
+
+
+@pytest.mark.parametrize(
+    ("codes", "says"), [([], "a part of them held back"), (["nothing_held_back"], "the same: too short to hold a part back")]
+)
+def test_it_says_what_judged_where_no_run_was_given_for_it(codes, says):
+    alone = body("effect") | {"validation_runs": [], "notes": [{"code": code} for code in codes]}
+    assert f"judged by {says};" in of_diagnosis(alone, SEARCHED).rests_on

@@ -34,12 +34,18 @@ class Searched:
 def of_diagnosis(body: Body, searched: Searched) -> Headline:
     """Return the verdict with its numbers and probability."""
     sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
-    judged = named(body["validation_runs"]) if body["validation_runs"] else "a part of them held back"
+    judged = named(body["validation_runs"]) if body["validation_runs"] else _held_back(body)
     rests = (
         f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
         f"{counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
     )
     return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
+
+
+def _held_back(body: Body) -> str:
+    """Return what judged where no run was given for it: short runs have no part to hold back."""
+    kept = not any(note["code"] == "nothing_held_back" for note in body["notes"])
+    return "a part of them held back" if kept else "the same: too short to hold a part back"
 
 
 def _sure(body: Body) -> str:
