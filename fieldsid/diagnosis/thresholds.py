@@ -29,8 +29,6 @@ parameters are fitted too, so that a gain there alone proves nothing. An effect 
 MAX_ERROR_RATIO = 0.92
 """Error ratio that an addition must reach: a significant effect need not be important. Speed, trim and clock of a real vehicle
 always differ a little from the model's, which leaves a few percent of the noise."""
-EXTRA_ERROR_RATIO_PER_EFFECT = 0.02
-"""By how much MAX_ERROR_RATIO is lowered for the third and each further effect: large sets of effects fit more by chance."""
 MAX_VARIANT_ERROR_RATIO = 0.97
 """Error ratio that another variant of an effect that has been accepted must reach."""
 MAX_FREE_RUN_ERROR_RATIO = 0.95

@@ -22,7 +22,6 @@ WORDS = " ".join(PAGE.split())
 NUMBERS = {
     "prior log odds against an effect": thresholds.ALTERNATIVE_LOG_ODDS,
     "share the free-run error must fall to": thresholds.MAX_ERROR_RATIO,
-    "less of it for a third and each further effect": thresholds.EXTRA_ERROR_RATIO_PER_EFFECT,
     "log evidence is divided by, for a probability": thresholds.EVIDENCE_TEMPERATURE,
     "log evidence within which hypotheses are rivals": thresholds.RIVAL_LOG_ODDS,
     "factor of error within which hypotheses predict alike": thresholds.EQUAL_ERROR_RATIO,

@@ -9,7 +9,6 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     EXPLAINED_ERROR_RATIO,
-    EXTRA_ERROR_RATIO_PER_EFFECT,
     MAX_ERROR_RATIO,
     MAX_VARIANT_ERROR_RATIO,
     MIN_TRAINING_GAIN,
@@ -28,12 +27,11 @@ def lowers_error(without: ScoredModel, with_: ScoredModel) -> bool:
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
     a model without the effect is low where its other parameters are biased towards those runs.
     """
-    share = MAX_ERROR_RATIO - EXTRA_ERROR_RATIO_PER_EFFECT * max(0, len(with_.names) - 2)
     unseen = with_.selection_errors.mean / without.selection_errors.mean
     if not unseen < EQUAL_ERROR_RATIO:
         return False
     fitted = with_.train.mean / without.train.mean
-    return bool(min(unseen, fitted) < share and unseen * fitted < 1.0)
+    return bool(min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0)
 
 
 def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

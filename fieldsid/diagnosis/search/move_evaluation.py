@@ -27,7 +27,7 @@ from fieldsid.diagnosis.search.add_effect import (
 )
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
@@ -93,8 +93,8 @@ class MoveEvaluation(SearchState):
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.
 
-        A wrong speed law may hide the last on the validation runs. Only the first where it reaches the noise floor, or where the
-        parent has effects and the child is near the floor or has a pair.
+        A wrong speed law may hide the last on the validation runs. Only the first and its rivals where it reaches the noise floor,
+        or where the parent has effects and the child is near the floor or has a pair.
         """
         children = self._children(key)
         best = sorted(children, key=lambda h: h.complexity_penalty - h.log_likelihood_by_run.sum())[:1]
@@ -102,7 +102,9 @@ class MoveEvaluation(SearchState):
         early = key == self.root or (
             len(key) < len(self.known) + TESTED_SUBSET_SIZE and any(self.error_ratio(h) > FAR_ERROR_RATIO for h in children[:1])
         )
-        return names if early and any(leaves_error(h, self.floor) for h in children[:1]) else names[:1]
+        if early and any(leaves_error(h, self.floor) for h in children[:1]):
+            return names
+        return [frozenset(h.names) for h in children if children[0].log_evidence - h.log_evidence < RIVAL_LOG_ODDS]
 
     def _fit_from_output_error(self, parent: ScoredModel) -> None:
         """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""
