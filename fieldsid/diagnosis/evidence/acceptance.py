@@ -10,7 +10,6 @@ from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     EXPLAINED_ERROR_RATIO,
     MAX_ERROR_RATIO,
-    MAX_VARIANT_ERROR_RATIO,
     MIN_TRAINING_GAIN,
 )
 from fieldsid.models.model import Noise
@@ -45,16 +44,6 @@ def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
 def leaves_error(h: ScoredModel, floor: Noise) -> bool:
     """Whether the error of a model exceeds the noise floor, from whatever cause."""
     return max(h.selection_errors.over(floor), h.train.over(floor)) > EXPLAINED_ERROR_RATIO
-
-
-def variant_improves(plain: ScoredModel, formed: ScoredModel) -> bool:
-    """Whether another variant of the same effects gains evidence and lowers an error, and does not raise the validation error.
-
-    Of training and validation error one must fall clearly: on the other, an effect that is still missing may hide the
-    improvement.
-    """
-    unseen, fitted = formed.selection_errors.mean / plain.selection_errors.mean, formed.train.mean / plain.train.mean
-    return gains_evidence(plain, formed) and unseen < 1.0 and min(unseen, fitted) < MAX_VARIANT_ERROR_RATIO
 
 
 def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

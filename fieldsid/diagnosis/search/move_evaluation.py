@@ -211,7 +211,7 @@ class MoveEvaluation(SearchState):
 
         helping = [n for n in names if lost or gains_any_evidence(parent, self.tried[n])]
         self._try_other_speed_law([n for n in names if gains_training_evidence(parent, self.tried[n])])
-        self._try_variants([VariantRequest(self.tried[n], parent, None if n in foremost else n - key) for n in helping])
+        self._try_variants([VariantRequest(self.tried[n], None if n in foremost else n - key) for n in helping])
 
 
 LEADING_CHILDREN = 3

@@ -93,7 +93,7 @@ class Search(MoveEvaluation):
             without = self.tried.get(frozenset(best.names) - {gone.name})
             alike = {e.name for e in best.effects if e is not gone and e.stage is gone.stage and e.variants}
             if gone.name not in self.known and without is not None and alike:
-                asked.append(VariantRequest(without, None, alike))
+                asked.append(VariantRequest(without, alike))
         self._try_variants(asked)
 
     def _front(self, best: ScoredModel) -> list[ScoredModel]:

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import gains_evidence, leaves_error, validation_error_ratio, variant_improves
+from fieldsid.diagnosis.evidence.acceptance import gains_evidence, leaves_error, validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
@@ -33,23 +33,15 @@ and coefficients near zero change nothing on the validation runs."""
 
 @dataclass(frozen=True, slots=True)
 class VariantRequest:
-    """A request to try the effects of a model, by default all, in other variants; `without` is the model less its last effect.
-
-    Where the model gains no evidence over the one without, a variant need not lower its error.
-    """
+    """A request to try the effects of a model, by default all, in other variants."""
 
     model: ScoredModel
-    without: ScoredModel | None = None
     effects: Collection[str] | None = None
 
     @property
     def key(self) -> tuple[frozenset[str], frozenset[str]]:
         """The names of the model's effects, and of those to be tried in other variants."""
         return frozenset(self.model.names), frozenset(self.model.names if self.effects is None else self.effects)
-
-    def accepts(self, formed: ScoredModel) -> bool:
-        """Whether a variant that gains evidence is accepted."""
-        return variant_improves(self.model, formed) or not (self.without is None or gains_evidence(self.without, self.model))
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +54,7 @@ class FormSearch:
     parallel: ParallelMap
 
     def try_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel]:
-        """Return the models with their effects in the best variants, changed one by one as long as a change is accepted.
+        """Return the models with their effects in the best variants, changed one by one as long as a change gains evidence.
 
         The variants of all models are fitted in one parallel map, because their numbers differ.
         """
@@ -71,7 +63,7 @@ class FormSearch:
             best = zip(left, self._best_variants([asked[i] for i in left]), strict=True)
             likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
             formed = self.parallel.map(lambda of: prefer_output_error(of[1], self.floor).evaluate_errors(fitted=True), likely)
-            taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if asked[i].accepts(variant)}
+            taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True)}
             for i, variant in taken.items():
                 asked[i] = replace(asked[i], model=variant)
             left = [i for i, variant in taken.items() if leaves_error(variant, self.floor)]

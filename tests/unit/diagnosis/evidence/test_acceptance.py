@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis.evidence.acceptance import gains_evidence, is_accepted, leaves_error, lowers_error, variant_improves
+from fieldsid.diagnosis.evidence.acceptance import gains_evidence, is_accepted, leaves_error, lowers_error
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
 from fieldsid.models.effect import effect_named
@@ -34,18 +34,9 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0):
 BASE = hypothesis(over=1.2)
 
 
-@pytest.mark.parametrize(("over", "named", "refined"), [(1.19, False, False), (1.14, False, True), (1.09, True, True)])
-def test_a_name_asks_for_a_twelfth_of_the_error_and_a_form_for_less(over, named, refined):
-    found = hypothesis("servo_lag", gain=50.0, over=over)
-    assert (is_accepted(BASE, found), variant_improves(BASE, found)) == (named, refined)
-
-
-@pytest.mark.parametrize(
-    ("over", "train", "refined"), [(1.19, 1.0, True), (1.19, 1.24, False), (1.21, 1.0, False), (1.16, 1.3, True)]
-)
-def test_a_form_may_show_on_the_runs_fitted_to_where_it_raises_no_error_on_the_others(over, train, refined):
-    plain = hypothesis("stall", over=1.2, train=1.25)
-    assert variant_improves(plain, hypothesis("stall", gain=50.0, over=over, train=train)) == refined
+@pytest.mark.parametrize(("over", "named"), [(1.19, False), (1.12, False), (1.09, True)])
+def test_a_name_asks_for_a_twelfth_of_the_error(over, named):
+    assert is_accepted(BASE, hypothesis("servo_lag", gain=50.0, over=over)) == named
 
 
 @pytest.mark.parametrize(("gain", "paid"), [(-1.0, False), (1.0, True)])
@@ -69,10 +60,10 @@ def test_numbers_of_every_runs_own_must_be_learned_on_the_runs_fitted_to():
     assert is_accepted(BASE, hypothesis("wave", gain=20.0, over=1.0))
 
 
-def test_a_third_effect_must_bring_more():
+def test_a_third_effect_must_bring_what_a_first_must():
     two = hypothesis("servo_lag", "gyro_bias", gain=50.0, over=1.2)
-    assert not is_accepted(two, hypothesis("servo_lag", "gyro_bias", "stall", gain=99.0, over=1.09))
-    assert is_accepted(two, hypothesis("servo_lag", "gyro_bias", "stall", gain=99.0, over=1.06))
+    assert not is_accepted(two, hypothesis("servo_lag", "gyro_bias", "stall", gain=99.0, over=1.12))
+    assert is_accepted(two, hypothesis("servo_lag", "gyro_bias", "stall", gain=99.0, over=1.09))
 
 
 @pytest.mark.parametrize(("over", "train", "more"), [(1.01, 1.01, False), (1.03, 1.0, True), (1.0, 1.03, True)])
