@@ -28,7 +28,7 @@ from fieldsid.diagnosis.search.add_effect import (
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
-from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import equivalent_solution, overlay_parameters, transfer_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
@@ -56,8 +56,8 @@ class MoveEvaluation(SearchState):
             self._fit_from_output_error(parent)
             self.tried.free_runs.screened.add(key)
             later = self._evaluate_moves(parent, by_effect(found))
-            if (textbook := self.tried.before_variants(key)) is not None:
-                self._fit_from_textbook(parent, textbook, left)
+            for other in self._other_solutions(parent):
+                self._fit_from_other(parent, other, left)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
             self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
             if self.budget.remaining():
@@ -67,14 +67,31 @@ class MoveEvaluation(SearchState):
                 self._try_laws_and_variants(key, self._leading(key))
         return self._children(key)
 
-    def _fit_from_textbook(self, parent: ScoredModel, textbook: ScoredModel, left: Sequence[Effect]) -> None:
-        """Fit both with each effect that the textbook variant lacks, from the textbook variant's solution with that.
+    def _other_solutions(self, parent: ScoredModel) -> list[ScoredModel]:
+        """Return what the same effects are in the textbook's variants, and with the smaller of two equivalent coefficients.
 
-        A variant may have taken up the motion of an effect that is missing; from its own solution that effect explains little,
-        and with it the textbook variant may be enough.
+        A variant may have taken up the motion of an effect that is missing. So may the larger of two equivalent coefficients:
+        what looks like a servo slower than the hull is a fast one where the hull drifts too.
+        """
+        textbook = self.tried.before_variants(frozenset(parent.names))
+        ml_fit, found = parent.likelihood_fit, [] if textbook is None else [textbook]
+        for effect in parent.effects:
+            x = equivalent_solution(ml_fit.fitted.problem, ml_fit.fitted.x, effect)
+            if x is None:
+                continue
+            place = ml_fit.fitted.problem.layout.names.index(effect.coefficients[0].name)
+            if x[place] < ml_fit.fitted.x[place]:
+                again = fit_maximum_likelihood(ml_fit.fitted.problem, x, ml_fit.noise, self.resolution_floor, self.noise_kind)
+                found.append(score_model(again, self.validation))
+        return found
+
+    def _fit_from_other(self, parent: ScoredModel, other: ScoredModel, left: Sequence[Effect]) -> None:
+        """Fit both with each effect that the other solution lacks, from that solution with the effect.
+
+        From the parent's own solution that effect may explain little, and with it the other solution may be enough.
         """
         fitted = parent.likelihood_fit.fitted
-        moves = add_effect(textbook, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=False)
+        moves = add_effect(other, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=False)
 
         def fit_all(group: Sequence[SearchMove]) -> ScoredModel:
             effect = group[0].screened.effect
@@ -84,8 +101,9 @@ class MoveEvaluation(SearchState):
                 plain, x = move.screened.problem, move.screened.start
                 if move.by_output_error:
                     x = fit_output_error(plain, x, fitted.weights).x
-                    self._fit_child(parent, problem, overlay_parameters(plain.layout, x, problem.layout, own), effect)
-                self._fit_child(textbook, plain, x, effect)
+                    if plain.layout.names != problem.layout.names:
+                        self._fit_child(parent, problem, overlay_parameters(plain.layout, x, problem.layout, own), effect)
+                self._fit_child(other, plain, x, effect)
             return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()
 
         self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit_all, by_effect(moves))})
@@ -93,7 +111,7 @@ class MoveEvaluation(SearchState):
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.
 
-        A wrong speed law may hide the last on the validation runs. Only the first and its rivals where it reaches the noise floor,
+        A wrong speed law may hide the last on the validation runs. Only the first and its rivals where it reaches the floor,
         or where the parent has effects and the child is near the floor or has a pair.
         """
         children = self._children(key)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from fieldsid.diagnosis.evidence.acceptance import leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
@@ -118,9 +120,9 @@ class Search(MoveEvaluation):
         return next((h for h in leading if self._is_expandable(h)), None)
 
     def _is_expandable(self, h: ScoredModel) -> bool:
-        """Whether a model is not expanded yet, is below the largest size, and leaves an error above the noise floor."""
+        """Whether a model is new, does not diverge, is below the largest size, and leaves an error above the noise floor."""
         is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
-        return is_new and leaves_error(h, self.floor)
+        return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
 
     def _drop_each(self) -> None:
         """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.

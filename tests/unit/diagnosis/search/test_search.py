@@ -6,11 +6,15 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import hidden_lag
+import numpy as np
 import pytest
 
+from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
+from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
+from fieldsid.fitting.initial.effect_screen import equivalent_solution
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 
@@ -46,6 +50,26 @@ def other_ends(monkeypatch):
         )
 
     return by
+
+
+def test_a_servo_slower_than_the_hull_is_tried_as_a_faster_one(base):
+    lag = base.catalogue[0]
+    base._evaluate_moves(base.base(), by_effect(add_effect(base.base(), [lag], None, base.parallel, anew=True, flown=False)))
+    fast = base.tried[frozenset(["servo_lag"])]
+    assert not base._other_solutions(fast)
+    fitted = fast.likelihood_fit.fitted
+    slow = replace(fitted, x=equivalent_solution(fitted.problem, fitted.x, lag))
+    slow = score_model(replace(fast.likelihood_fit, fitted=slow), base.validation)
+    assert slow.model.values["lag"] > fast.model.values["lag"]
+    (other,) = base._other_solutions(slow)
+    assert other.model.values["lag"] == pytest.approx(fast.model.values["lag"], rel=0.2)
+
+
+def test_a_model_that_diverges_is_not_expanded(base):
+    h = base.base()
+    base.tried.progress.expanded.discard(base.root)
+    assert base._is_expandable(h)
+    assert not base._is_expandable(replace(h, validation_log_density=np.full(1, -np.inf)))
 
 
 @pytest.mark.parametrize(("unseen", "kept"), [(-300.0, False), (1.0, True)])
