@@ -26,11 +26,13 @@ def lowers_error(without: ScoredModel, with_: ScoredModel) -> bool:
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
     a model without the effect is low where its other parameters are biased towards those runs.
     """
-    unseen = with_.selection_errors.mean / without.selection_errors.mean
-    if not unseen < EQUAL_ERROR_RATIO:
-        return False
-    fitted = with_.train.mean / without.train.mean
-    return bool(min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0)
+    unseen, fitted = with_.selection_errors.mean / without.selection_errors.mean, with_.train.mean / without.train.mean
+    return keeps_error(without, with_) and bool(min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0)
+
+
+def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition does not raise the validation error."""
+    return bool(with_.selection_errors.mean < EQUAL_ERROR_RATIO * without.selection_errors.mean)
 
 
 def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

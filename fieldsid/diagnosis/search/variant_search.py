@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import gains_evidence, leaves_error, validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import gains_evidence, keeps_error, leaves_error, validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
@@ -54,7 +54,8 @@ class FormSearch:
     parallel: ParallelMap
 
     def try_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel]:
-        """Return the models with their effects in the best variants, changed one by one as long as a change gains evidence.
+        """Return the models with their effects in the best variants, changed one by one as long as a change is accepted: it gains
+        evidence and does not raise the validation error.
 
         The variants of all models are fitted in one parallel map, because their numbers differ.
         """
@@ -63,7 +64,7 @@ class FormSearch:
             best = zip(left, self._best_variants([asked[i] for i in left]), strict=True)
             likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
             formed = self.parallel.map(lambda of: prefer_output_error(of[1], self.floor).evaluate_errors(fitted=True), likely)
-            taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True)}
+            taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if keeps_error(asked[i].model, variant)}
             for i, variant in taken.items():
                 asked[i] = replace(asked[i], model=variant)
             left = [i for i, variant in taken.items() if leaves_error(variant, self.floor)]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis.evidence.acceptance import gains_evidence, is_accepted, leaves_error, lowers_error
+from fieldsid.diagnosis.evidence.acceptance import gains_evidence, is_accepted, keeps_error, leaves_error, lowers_error
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
 from fieldsid.models.effect import effect_named
@@ -37,6 +37,11 @@ BASE = hypothesis(over=1.2)
 @pytest.mark.parametrize(("over", "named"), [(1.19, False), (1.12, False), (1.09, True)])
 def test_a_name_asks_for_a_twelfth_of_the_error(over, named):
     assert is_accepted(BASE, hypothesis("servo_lag", gain=50.0, over=over)) == named
+
+
+@pytest.mark.parametrize(("over", "kept"), [(1.1, True), (1.22, True), (1.3, False)])
+def test_another_variant_may_not_raise_the_error_on_unseen_runs(over, kept):
+    assert keeps_error(BASE, hypothesis("servo_lag", gain=50.0, over=over)) == kept
 
 
 @pytest.mark.parametrize(("gain", "paid"), [(-1.0, False), (1.0, True)])
