@@ -54,10 +54,10 @@ class FormSearch:
     parallel: ParallelMap
 
     def try_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel]:
-        """Return the models with their effects in the best variants, changed one by one as long as a change is accepted: it gains
-        evidence and does not raise the validation error.
+        """Return the models with their effects in the best variants, changed one by one as long as a change is accepted.
 
-        The variants of all models are fitted in one parallel map, because their numbers differ.
+        It is accepted where it gains evidence and does not raise the validation error. All are fitted in one parallel map, as
+        the models have different numbers of variants.
         """
         asked, left = list(asked), [i for i, request in enumerate(asked) if leaves_error(request.model, self.floor)]
         while left:
