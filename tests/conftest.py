@@ -17,8 +17,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
 
 from fieldsid.cli.app import main
+from fieldsid.runtime.worker_pool import can_fork
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -40,6 +42,51 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba" / 
 # The same examples on every machine, and no verdict that depends on how busy it is.
 settings.register_profile("steady", derandomize=True, deadline=None)
 settings.load_profile("steady")
+
+MOST_WORKERS = 4
+"""Largest number of processes that share the whole suite: each holds half a GiB and makes what files share again."""
+FORKS = pytest.StashKey[list[str]]()
+"""The files of the tests that fork, which a worker of the suite leaves to a process of their own."""
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Return how many processes share the whole suite, one for each core; 0 for a part of it, which this process runs."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    return min(cores, MOST_WORKERS) if whole and cores > 1 else 0
+
+
+class FilesTogether(LoadScopeScheduling):
+    """Gives out a file at a time, for its fixtures; those that compare with what the guide's command lines gave are one."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return "guide" if file.startswith("tests/guide/") or file == "tests/contract/test_schemas.py" else file
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> FilesTogether:
+    return FilesTogether(config, log)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the tests that fork to test_forks.py in a worker of the suite, which has threads, and to nobody where none can."""
+    forking = [item for item in items if item.get_closest_marker("forks")]
+    if hasattr(config, "workerinput"):
+        config.stash[FORKS] = sorted({str(item.path) for item in forking})
+        left_out = forking
+    else:
+        left_out = [item for item in items if item.path.name == "test_forks.py"]
+        for item in forking if not can_fork() else ():
+            item.add_marker(pytest.mark.skip(reason="needs Linux, a second core and no other threads"))
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
+@pytest.fixture
+def files_that_fork(pytestconfig: pytest.Config) -> list[str]:
+    """Return the files whose tests that fork are left out of this worker."""
+    return pytestconfig.stash[FORKS]
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,18 +40,22 @@ def emit(
     render: Callable[[Console], None],
     headline: Headline | None = None,
     notes: Iterable[Note] = (),
+    is_file: bool = False,
 ) -> Mapping[str, Any]:
     """Print a result and return its body: as one JSON object, or for a reader.
 
     A reader gets the headline, then the notes as warnings, then what `render` prints. Only what is no result, as a page of the
-    guide, has no headline.
+    guide, has no headline. Where what `render` prints `is_file`, to be redirected to one, the headline goes to stderr.
     """
     whole = body if headline is None else {**body, "headline": headline.record()}
     if as_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
         return whole
     to = out()
-    if headline is not None:
+    if headline is not None and is_file:
+        for line in headline.lines:
+            say(line)
+    elif headline is not None:
         print_headline(to, headline)
         warn(notes)
         to.print()

@@ -55,18 +55,25 @@ def draw(view: TrackView, ax: Axes, index: int) -> None:
     ax.set_ylim(*_scale(value, band))
 
 
-def panels(view: TrackView, title: str) -> Figure:
-    """Return a sheet with one panel per parameter."""
+def panels(view: TrackView, of: str) -> Figure:
+    """Return a sheet with one panel per parameter; its title says when each settled, and what the estimates are of."""
     count = len(view.names)
     figure = canvas.sheet(9.0, 1.2 + 1.9 * count)
     axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+    figure.suptitle(f"{of}: {settling(view)}", x=0.01, ha="left", fontsize=11)
     for i, ax in enumerate(axes):
         draw(view, ax, i)
     canvas.legend_above(axes[0])
     axes[-1].set_xlabel("time, s")
     figure.align_ylabels(list(axes))
     return figure
+
+
+def settling(view: TrackView) -> str:
+    """Return in words when each parameter settled."""
+    ends = {name: view.settled.get(name, float("nan")) for name in view.names}
+    settled = [f"{name} settled after {at:.1f} s" for name, at in ends.items() if np.isfinite(at)]
+    return ", ".join([*settled, *(f"{name} did not" for name, at in ends.items() if not np.isfinite(at))])
 
 
 def _scale(value: FloatArray, band: FloatArray) -> tuple[float, float]:

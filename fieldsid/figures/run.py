@@ -30,12 +30,17 @@ def figure(run: Run) -> Figure:
         raise DataError(f"run {run.name!r} has nothing to draw", found=", ".join(run.signals) or "no signals")
     sheet = canvas.sheet(9.0, 1.0 + 1.7 * len(shown))
     axes = sheet.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    sheet.suptitle(run.name, x=0.01, ha="left", fontsize=11, parse_math=False)
+    sheet.suptitle(_title(run), x=0.01, ha="left", fontsize=11, parse_math=False)
     for (y, names), ax in zip(shown, axes, strict=True):
         draw(run, names, y, ax)
     axes[-1].set_xlabel("time, s")
     sheet.align_ylabels(list(axes))
     return sheet
+
+
+def _title(run: Run) -> str:
+    speed = f", {np.nanmedian(run['surge_m_s']):.2f} m/s" if run.has("surge_m_s") else ""
+    return f"{run.name}: {run.time[-1] - run.time[0]:.1f} s, {len(run)} samples{speed}"
 
 
 def draw(run: Run, names: list[str], y: str, ax: Axes) -> None:

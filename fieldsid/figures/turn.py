@@ -94,13 +94,13 @@ def draw_track(turn: MeasuredTurn, ax: Axes) -> None:
     )
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     north, east = circle.centre
+    speed = float(np.hypot(*circle.current))
     ax.plot(
         east + circle.radius * np.sin(angle), north + circle.radius * np.cos(angle), color=canvas.SIMULATED, linewidth=1.6,
-        label=f"circle R = {circle.radius:.3f} ± {circle.radius_std_error:.3f} m",
+        label=f"circle R = {circle.radius:.3f} ± {circle.radius_std_error:.3f} m\nin a current of {speed:.3f} m/s",
     )  # fmt: skip
     ax.plot([east], [north], "+", color=canvas.SIMULATED, markersize=10)
-    speed = float(np.hypot(*circle.current))
-    canvas.dress(ax, x="east y, m", y="north x, m", title=f"{turn.run}: {turn.side}, current {speed:.3f} m/s")
+    canvas.dress(ax, x="east y, m", y="north x, m", title=f"{turn.run}: {turn.side}, radius {circle.radius:.2f} m")
     ax.set_aspect("equal", adjustable="box")
     reach = 2.2 * circle.radius
     ax.set_xlim(east - reach, east + reach)

@@ -9,9 +9,6 @@ from matplotlib.axes import Axes
 
 from fieldsid.figures import canvas
 
-WORSE = 1.2
-"""Rms ratio from which on a condition stands out."""
-
 
 @dataclass(frozen=True, slots=True)
 class Bar:
@@ -23,10 +20,10 @@ class Bar:
 
 
 def draw(bars: Sequence[Bar], ax: Axes) -> None:
-    """Draw one bar per condition, the largest share at the top; bars worse than the run as a whole stand out."""
+    """Draw one bar per condition, the largest share at the top; the first of them, where the model fails most, stands out."""
     canvas.dress(ax, x="share of the squared error, %")
     ordered = sorted(bars, key=lambda b: b.share)
-    colours = [canvas.SIMULATED if b.ratio > WORSE else canvas.QUIET for b in ordered]
+    colours = [canvas.SIMULATED if b is bars[0] else canvas.QUIET for b in ordered]
     ax.barh(range(len(ordered)), [100 * b.share for b in ordered], color=colours, height=0.66)
     ax.set_yticks(range(len(ordered)), [b.condition for b in ordered], fontsize=9)
     for i, b in enumerate(ordered):

@@ -62,6 +62,10 @@ class Note(Brief):
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
+SIMULATED = "simulated"
+"""Code of the note of a run that a model made."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Run(Plotted):
     """One log: time (n,) in s strictly increasing, and signals (n,) by canonical name, NaN where missing."""

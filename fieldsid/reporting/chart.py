@@ -19,6 +19,8 @@ WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 480, 48, 10, 18, 36, 22
 MOST_POINTS = 700
 """Points of one line: as many as a wide screen tells apart."""
 TICKS_X, TICKS_Y = 6, 4
+SAME = 2e-4
+"""Values closer than this, relative to the largest, are drawn level: the tables print four digits, and they are one there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +130,8 @@ def _range(values: Sequence[FloatArray], pad: float, *, from_zero: bool = False)
     low, high = float(every.min()), float(every.max())
     if from_zero:
         low, high = min(low, 0.0), max(high, 0.0)
-    room = pad * (high - low) if high > low else 0.5 * abs(high) or 1.0
+    size = max(abs(low), abs(high))
+    room = pad * (high - low) if high - low > SAME * size else 0.5 * size or 1.0
     return low - room, high + room
 
 

@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from math import exp, log
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from fieldsid.comparison.compare import DOWN_TO_NOISE
 from fieldsid.reporting import figures
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
 from fieldsid.rounding import in_unit, interval, number, probability, with_error
-from fieldsid.trial_folder.journal import Entry, made_by
-from fieldsid.trial_folder.state import FolderState, Item
+from fieldsid.trial_folder.journal import Entry, made_by, relative_to
+from fieldsid.trial_folder.state import FolderState, Item, Source
 
 DONE = (0, 1)
 MOST_CANDIDATES = 12
@@ -269,10 +270,15 @@ def _file(item: Item, state: FolderState) -> dict[str, str]:
     return {
         "path": item.path,
         "kind": item.kind,
-        "made_from": ", ".join(f"{s.named} ({s.sha256[:8]})" if s.sha256 else s.named for s in item.sources),
+        "made_from": "\n".join(_source(s, state.folder) for s in item.sources),
         "by": "" if maker is None else " ".join(maker.command[:3]),
         "state": f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else "",
     }
+
+
+def _source(source: Source, folder: Path) -> str:
+    name = source.named if source.path is None else relative_to(source.path, folder)
+    return f"{name} ({source.sha256[:8]})" if source.sha256 else name
 
 
 def _commands(state: FolderState) -> list[dict[str, str]]:

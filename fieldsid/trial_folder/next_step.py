@@ -80,6 +80,8 @@ def _model(state: FolderState) -> tuple[str, str] | None:
         if not (words := run_words(state)):
             return None
         return "no diagnosis yet", shlex.join(["sysid", "diagnose", *_left_out(state, *words), "--axis", axis])
+    if (unsettled := _unsettled(state, diagnosis)) is not None:
+        return unsettled
     best = state.models[0]
     have = set((best.body or {}).get("effects", ()))
     named = diagnosis.named if diagnosis is not None else _named(max(kept, key=lambda i: state.place(i).stat().st_mtime_ns))
@@ -90,6 +92,27 @@ def _model(state: FolderState) -> tuple[str, str] | None:
         add = [w for e in lacking for w in ("--add", e)]
         return f"the diagnosis names {', '.join(lacking)}", shlex.join(
             ["sysid", "extend", *_left_out(state, best.path, *trained_runs(state, best)), *add]
+        )
+    return None
+
+
+def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
+    """Return how to go on after a diagnosis that named nothing for sure; None where it did, or that has been done.
+
+    Gains on a model known to be wrong come after what a longer search finds, and after the flight that tells rivals apart.
+    """
+    if diagnosis is None:
+        return None
+    verdict, words = diagnosis.verdict.partition(":")[0], [w for w in diagnosis.command if w != "--json"]
+    written = {"-o", "--output", "--figure"} & set(words)
+    if verdict == "unexplained" and "--thorough" not in words:
+        longer = shlex.join([*words, "--thorough", *(["--force"] if written and "--force" not in words else [])])
+        return "the diagnosis explains not all, and a longer search may", longer
+    planned = any(e.command[1:2] == ("plan",) and e.time >= diagnosis.time and e.exit in DONE for e in state.entries)
+    kept = [s.path for s in diagnosis.outputs if s.path.endswith((".yaml", ".yml"))]
+    if verdict == "undecided" and kept and not planned:
+        return "the diagnosis is undecided, and a maneuver would tell", shlex.join(
+            ["sysid", "plan", "--from", kept[0], "-o", "plan"]
         )
     return None
 
@@ -109,7 +132,8 @@ def _use(state: FolderState) -> tuple[str, str] | None:
             else None
         )
     if not any(e.command[1:3] == ("schedule", "verify") and e.exit in DONE for e in state.entries):
-        return "the gains are not verified", shlex.join(["sysid", "schedule", "verify", *_left_out(state, schedules[-1].path)])
+        known = "the gains are not verified" if is_trial(state.folder) else "no journal says that the gains are verified"
+        return known, shlex.join(["sysid", "schedule", "verify", *_left_out(state, schedules[-1].path)])
     if is_trial(state.folder) and not any(e.command[1:2] == ("report",) and e.exit in DONE for e in state.entries):
         return "there is no report yet", "sysid report"
     return None

@@ -13,8 +13,9 @@ from fieldsid.artifacts import read_yaml
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
+from fieldsid.logs.run import SIMULATED
 from fieldsid.logs.unknown_file import own_kind
-from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, read, relative_to
+from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
 from fieldsid.trial_folder.make import RUNS
 
 METADATA_KEY = b"fieldsid"
@@ -77,11 +78,18 @@ def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
     entries, broken = read(folder)
     hashes = Hashes(folder, entries)
     wanted = None if files is None else {p.resolve() for p in files}
-    items = {i.path: i for i in _items(folder) if wanted is None or (folder / i.path).resolve() in wanted}
+    found = (i for i in _items(folder) if wanted is None or (folder / i.path).resolve() in wanted)
+    items = {i.path: replace(i, kind=SIMULATED) if _is_simulated(i, entries) else i for i in found}
     done: dict[str, Item] = {}
     for path in items:
         _judge(path, items, done, hashes, folder)
     return FolderState(folder, tuple(done[p] for p in items), entries, broken)
+
+
+def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
+    """Whether `sysid simulate` wrote a table: one of text does not say so itself, but the journal does."""
+    maker = made_by(entries, item.path) if item.kind in (LOG, RUN) else None
+    return maker is not None and maker.command[1:2] == ("simulate",)
 
 
 def _items(folder: Path) -> Iterator[Item]:
@@ -96,7 +104,8 @@ def _items(folder: Path) -> Iterator[Item]:
 
 def _item(path: Path, name: str, folder: Path) -> Item | None:
     if path.name.endswith(".parquet") and (head := _run_head(path)) is not None:
-        return Item(name, RUN, _sources(head.get("inputs"), folder))
+        made = any(note.get("code") == SIMULATED for note in head.get("notes") or ())
+        return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs"), folder))
     kind = own_kind(path) if path.suffix in (".yaml", ".yml") else None
     if kind is not None:
         return _own(path, name, kind, folder)

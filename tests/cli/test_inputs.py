@@ -13,9 +13,6 @@ from fieldsid.cli import inputs
 from fieldsid.cli.inputs import STDIN, read_runs
 from fieldsid.errors import DataError, LogError, UsageError
 from fieldsid.logs import load_run, save_run
-from fieldsid.runtime.worker_pool import can_fork
-
-needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +27,7 @@ def nothing_read(monkeypatch):
     monkeypatch.setattr(inputs, "READING", ())
 
 
-@needs_copies
+@pytest.mark.forks
 def test_runs_read_beside_other_work_are_those_read_alone(files, nothing_read):
     done: list[int] = []
     beside = read_runs(files, meanwhile=lambda: done.append(os.getpid()))
@@ -43,7 +40,7 @@ def test_runs_read_beside_other_work_are_those_read_alone(files, nothing_read):
             assert not run[name].flags.writeable
 
 
-@needs_copies
+@pytest.mark.forks
 def test_the_files_are_read_in_the_copy(files, nothing_read, monkeypatch):
     here = os.getpid()
     read = inputs._read
@@ -125,7 +122,7 @@ def test_the_same_data_are_refused_in_any_file(files, tmp_path):
         assert caught.value.hint == f"leave `{copy}` out"
 
 
-@needs_copies
+@pytest.mark.forks
 @pytest.mark.parametrize("beside", [False, True])
 def test_of_several_files_those_that_can_be_read_are(files, nothing_read, tmp_path, beside):
     (tmp_path / "cut.csv").write_text("time_s,yaw_rad\n")

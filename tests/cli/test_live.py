@@ -7,7 +7,9 @@ import json
 
 import pytest
 from cli import trial
+from rich.console import Console
 
+from fieldsid.cli.live.screen import screen
 from fieldsid.logs import load_run
 
 
@@ -124,3 +126,22 @@ def test_a_program_that_was_killed_and_goes_on_still_knows_that_the_numbers_have
     assert "enough data, come up" in first
     assert again.splitlines()[-7:] == first.splitlines()[-7:]
     assert again.splitlines()[0].split()[2] == "enough"
+
+
+@pytest.mark.parametrize(("width", "has_band"), [(60, False), (90, True)])
+def test_a_narrow_terminal_shows_every_name_and_goal(width, has_band):
+    known = {"value": -1.19, "std_error": 0.04, "interval95": [-1.27, -1.11], "unit": "1/s^2"}
+    known |= {"goal_std_error": 0.2, "settled": True}
+    body = {
+        "said": "enough data, come up", "verdict": "enough", "axis": "yaw", "samples": 644, "speed_m_s": 1.8,
+        "goals_from": "`--want`", "parameters": {"a22": known, "b2": known}, "share": 1.0,
+        "excitation": {"fin_rms_rad": 0.1, "rate_rms_rad_s": 0.1},
+        "counts": {},
+    }  # fmt: skip
+    to = Console(width=width, file=io.StringIO())
+    to.print(screen(body))
+    text = to.file.getvalue()
+    assert "a22" in text
+    assert "wanted" in text
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text
+    assert ("95 % band" in text) is has_band

@@ -104,7 +104,11 @@ def test_verify_says_when_the_models_are_gone(run_cli, gains, tmp_path):
 
 
 def test_export_prints_or_writes_and_refuses_an_unknown_target(run_cli, gains, tmp_path):
-    assert "ros__parameters:" in run_cli("schedule", "export", gains, "--to", "ros2").out
+    printed = run_cli("schedule", "export", gains, "--to", "ros2")
+    assert "ros__parameters:" in printed.out
+    assert "next: " not in printed.out  # what is redirected to a file is the file
+    assert printed.err.splitlines()[0] == f"{gains} as ros2, on standard output"
+    assert printed.err.splitlines()[2].endswith(f"--to ros2 -o {gains.stem}_ros2.yaml")
     assert run_cli("schedule", "export", gains, "--to", "dune", "-o", tmp_path / "g.ini").code == 0
     assert "[Control." in (tmp_path / "g.ini").read_text()
     answer = run_cli("schedule", "export", gains, "--to", "ross")
@@ -118,7 +122,8 @@ def test_export_into_shows_first_and_writes_only_when_told(run_cli, gains, tmp_p
     shown = run_cli("schedule", "export", gains, "--into", config, "--key", "control.heading")
     assert shown.code == 0
     assert "+    kp: [" in shown.out
-    assert "nothing was changed" in shown.err
+    assert "nothing was changed" in shown.err.splitlines()[0]
+    assert shown.err.splitlines()[2].endswith(" --write")
     assert config.read_text().endswith("heading: {}\n  other: 1  # stays\n")
     assert run_cli("schedule", "export", gains, "--into", config, "--key", "control.heading", "--write").code == 0
     assert "# stays" in config.read_text()

@@ -9,6 +9,8 @@ from hashlib import sha256
 import pytest
 from cli import trial
 
+from fieldsid.trial_folder.journal import Entry, Stamp, append
+
 
 @pytest.fixture
 def folder(run_cli, tmp_path, monkeypatch):
@@ -89,6 +91,37 @@ def test_status_leads_from_an_empty_folder_to_a_diagnosis(run_cli, folder):
     assert body["next"] == {"why": "no diagnosis yet", "command": "sysid diagnose --axis yaw"}
     assert body["verdict"] == "pandan: 2 runs, 1 model; nothing is stale"
     assert [len(f["made_from"]) for f in body["files"] if f["kind"] == "model"] == [2]
+
+
+@pytest.mark.parametrize("name", ["runs/simulated.parquet", "simulated.parquet", "simulated.csv"])
+def test_what_a_model_made_is_no_measured_run(run_cli, folder, name):
+    trial.model_file(folder)
+    assert run_cli("simulate", "truth.yaml", "--maneuver", "doublet", "-o", name).code == 0
+    kinds = {f["path"]: f["kind"] for f in run_cli("status", "--json").json["files"]}
+    assert kinds[name] == "simulated"
+    answer = run_cli("identify", "--axis", "yaw", "--no-figures", "--json")
+    assert [f["run"] for f in answer.json["fits"]] == ["pulses_1.0", "pulses_1.4"]
+
+
+@pytest.mark.parametrize(
+    ("command", "verdict", "files", "next_"),
+    [
+        (("diagnose", "--axis", "yaw"), "unexplained: 2.3 x", (), "sysid diagnose --axis yaw --thorough"),
+        (
+            ("diagnose", "--axis", "yaw", "-o", "d.yaml"),
+            "unexplained: 2.3 x",
+            ("d.yaml",),
+            "sysid diagnose --axis yaw -o d.yaml --thorough --force",
+        ),
+        (("diagnose", "--axis", "yaw", "--thorough"), "unexplained: 2.3 x", (), "sysid schedule design -o gains.yaml"),
+        (("diagnose", "--axis", "yaw", "-o", "d.yaml"), "undecided: two", ("d.yaml",), "sysid plan --from d.yaml -o plan"),
+    ],
+)
+def test_a_diagnosis_that_named_nothing_for_sure_is_followed_up(run_cli, folder, command, verdict, files, next_):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    outputs = tuple(Stamp(f, "", 0, 0) for f in files)
+    append(folder, Entry("2026-01-01T00:00:00+00:00", ("sysid", *command), 0, 1.0, verdict, (), outputs))
+    assert run_cli("status", "--json").json["next"]["command"] == next_
 
 
 def test_a_changed_run_makes_its_model_stale_and_the_gains_made_of_that(run_cli, folder):

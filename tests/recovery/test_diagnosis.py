@@ -163,6 +163,7 @@ def test_an_unseen_run_is_flown_at_its_own_speed_and_that_is_said() -> None:
     assert "own_speed" in {n.code for n in found.notes}
 
 
+@pytest.mark.forks
 @pytest.mark.parametrize("kind", ["single", "pair"])
 def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     case = visible_case(kind, 40)

@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.commands._schedule_tables import render_design, render_export, render_verify
 from fieldsid.cli.console import emit, say
-from fieldsid.cli.headlines.gains import of_design, of_export, of_verification
+from fieldsid.cli.headlines.gains import of_design, of_export, of_patch, of_verification
 from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_figure
 from fieldsid.cli.session import tasks_of
@@ -245,7 +245,7 @@ def export(
             "`--into` and `--key` go together", found=f"into {into}, key {key}", hint="`--into vehicle.yaml --key a.b.c`"
         )
     if into is not None and key is not None:
-        return _export_into(known, into, key, write=write, as_json=as_json)
+        return _export_into(known, schedule, into, key, write=write, as_json=as_json)
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
     body: dict[str, Any] = {"schema": "fieldsid/export/1", "target": target.name, "text": text, "file": None}
@@ -253,23 +253,19 @@ def export(
         from fieldsid.artifacts import write_text
 
         body["file"] = str(write_text(output, text, force=force))
-    headline = of_export(body, schedule) if body["file"] else None  # without a file the text is all there is
-    return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline)
+    headline, is_file = of_export(body, schedule), body["file"] is None
+    return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline, is_file=is_file)
 
 
-def _export_into(schedule: Schedule, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
+def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
     from fieldsid.exports._patch import patch_yaml, write_patch
     from fieldsid.exports._target import columns_of
 
-    patch = patch_yaml(into, key, columns_of(schedule))
+    patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
     body = {"schema": "fieldsid/export/1", "target": "into", "difference": patch.difference, "file": str(into), "backup": backup}
-    emit(body, as_json=as_json, render=lambda out: out.out(patch.difference, end="", highlight=False))
-    if write:
-        say(f"written: {into}; as it was: {backup}")
-    else:
-        say("nothing was changed: add `--write`")
-    return body
+    shown, headline = (lambda out: out.out(patch.difference, end="", highlight=False)), of_patch(body, schedule, key)
+    return emit(body, as_json=as_json, render=shown, headline=headline, is_file=True)
 
 
 def _limits(

@@ -73,8 +73,10 @@ def command(
         from dataclasses import replace
 
         from fieldsid.logs import save_run
+        from fieldsid.logs.run import SIMULATED, Note
 
-        made = replace(made, name=Path(output.name.removesuffix(".gz")).stem)
+        note = Note(SIMULATED, f"made by the model {model}, not measured", {"model": str(model)})
+        made = replace(made, name=Path(output.name.removesuffix(".gz")).stem, notes=(*made.notes, note))
         save_run(made, output, force=force)
     body = {
         "schema": "fieldsid/simulation/1",

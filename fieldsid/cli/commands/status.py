@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 NAMES = {
     "log": "log", "run": "run", "model": "model", "fit": "laws", "schedule": "gains", "turn-radius": "turning radius",
-    "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping",
+    "plan": "plan", "diagnosis": "diagnosis", "vehicle": "vehicle", "mapping": "mapping", "simulated": "simulated run",
 }  # fmt: skip
-ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule")
+ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit", "turn-radius", "schedule", "simulated")
 MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
 """Files that hold several of what they are named after, and words whose plural is their own."""
 MOST_SOURCES = 2

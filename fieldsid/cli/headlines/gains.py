@@ -87,8 +87,29 @@ def of_verification(body: Body, schedule: Path, models: Sequence[Path]) -> Headl
 
 
 def of_export(body: Body, schedule: Path) -> Headline:
-    """Return what was written for the vehicle."""
+    """Return what was written for the vehicle, to a file or to standard output."""
+    rests = "the gains as they were designed, not verified again"
+    if body["file"] is None:
+        return Headline(
+            f"{schedule} as {body['target']}, on standard output", rests, typed_with("-o", _named_after(schedule, body))
+        )
     report = pasted("report", *(("--force",) if Path("report.html").exists() else ()))
-    return Headline(
-        f"{schedule} written as {body['target']}: {body['file']}", "the gains as they were designed, not verified again", report
-    )
+    return Headline(f"{schedule} written as {body['target']}: {body['file']}", rests, report)
+
+
+def of_patch(body: Body, schedule: Path, key: str) -> Headline:
+    """Return what the gains change, or have changed, in a file that exists."""
+    changes = [line for line in str(body["difference"]).splitlines() if line[:1] == "+" and line[:3] != "+++"]
+    rests = f"{schedule}, its gains as they were designed, not verified again"
+    if not changes:
+        return Headline(f"{body['file']} holds these gains at {key} already", rests, pasted("status"))
+    lines = counted(len(changes), "line")
+    if body["backup"] is None:
+        return Headline(f"{lines} of {body['file']} would change at {key}; nothing was changed", rests, typed_with("--write"))
+    return Headline(f"{lines} of {body['file']} changed at {key}; as it was: {body['backup']}", rests, pasted("status"))
+
+
+def _named_after(schedule: Path, body: Body) -> str:
+    from fieldsid.exports import pick_target
+
+    return f"{schedule.stem}_{body['target']}{pick_target(str(body['target'])).suffix}"

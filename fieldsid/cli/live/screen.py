@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import isfinite, nan, pi
 from typing import Any
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.measure import Measurement
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
@@ -17,13 +19,15 @@ from fieldsid.cli.voice import shown_estimate, shown_in
 
 STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
 BAR = 20
+FAR = 1000
+"""Columns of a terminal in which any table fits."""
 
 
 def screen(body: Mapping[str, Any]) -> RenderableType:
     """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
     head = Text(body["said"], style=STYLE[body["verdict"]])
     return Group(
-        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), _parameters(body), Text(), _meters(body), _met(body)
+        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), _Parameters(body), Text(), _meters(body), _met(body)
     )
 
 
@@ -47,23 +51,36 @@ def final(to: Console, body: Mapping[str, Any]) -> None:
     """Print the last look: verdict, what it rests on, the next command, the table."""
     print_headline(to, Headline(body["said"], rests_on(body), body["next"]))
     to.print()
-    to.print(_parameters(body))
+    to.print(_Parameters(body))
 
 
-def _parameters(body: Mapping[str, Any]) -> Table:
+@dataclass(frozen=True, slots=True)
+class _Parameters:
+    """The table of the parameters; where a terminal is too narrow, without the band, which the value's error says as well."""
+
+    body: Mapping[str, Any]
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        whole = _parameters(self.body, with_band=True)
+        wide = Measurement.get(console, options.update(max_width=FAR), whole).maximum
+        yield whole if wide <= options.max_width else _parameters(self.body, with_band=False)
+
+
+def _parameters(body: Mapping[str, Any], *, with_band: bool) -> Table:
     made = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for name in ("", "value", "unit", "95 % band", "error", "wanted", ""):
+    for name in ("", "value", "unit", *(("95 % band",) if with_band else ()), "error", "wanted", ""):
         made.add_column(name, justify="right" if name else "left", header_style="dim", no_wrap=True)
     for name, p in body["parameters"].items():
         (factor, unit), wanted = shown_in(p["unit"]), p["goal_std_error"]
         value = None if p["value"] is None else factor * p["value"]
         wanted = _error(None if wanted is None else abs(factor) * wanted, value)
         if p["std_error"] is None:
-            made.add_row(name, "-", unit, "-", "-", wanted, "")
+            made.add_row(name, "-", unit, *(("-",) if with_band else ()), "-", wanted, "")
             continue
         shown, _, band = shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])
         state = Text("settled", style="green") if p["settled"] else Text("moving", style="yellow")
-        made.add_row(name, shown, unit, band, _error(factor * p["std_error"], value), wanted, state)
+        bands = (band,) if with_band else ()
+        made.add_row(name, shown, unit, *bands, _error(factor * p["std_error"], value), wanted, state)
     return made
 
 

@@ -102,6 +102,7 @@ class Belief:
 
     def _transient(self, entry: float, fin: float, side: float) -> Transient:
         time = np.arange(0.0, MAX_TRACK_S, TRACK_STEP_S)
+        time.setflags(write=False)  # as that of a run is: what is compiled for one serves the other
         path = np.full((time.size - 1, 2), fin)
         path[0, 0] = 0.0
         best = coefficients(self.fitted.vector)

@@ -215,7 +215,7 @@ class Export(Shape):
     """The gains in the vehicle's own format."""
 
     headline: Headline | None = None
-    """The first lines of the same result as text, where a file was written."""
+    """The first lines of the same result as text."""
     schema_: Literal["fieldsid/export/1"] = schema_field("fieldsid/export/1")
     target: str
     """The format."""
@@ -228,6 +228,8 @@ class Export(Shape):
 class Patch(Shape):
     """The gains put into a file that exists, with `--into`."""
 
+    headline: Headline | None = None
+    """The first lines of the same result as text."""
     schema_: Literal["fieldsid/export/1"] = schema_field("fieldsid/export/1")
     target: Literal["into"]
     """Always `into`."""

@@ -24,14 +24,12 @@ EFFECTS = all_effects(Axis.YAW)
 RECORD = a_record()
 KNOWN = ParallelMap([RECORD], EFFECTS.values())
 
-needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
-
 
 def test_values_come_back_in_the_order_of_the_items():
     assert KNOWN.map(lambda i: i * i, range(40)) == [i * i for i in range(40)]
 
 
-@needs_copies
+@pytest.mark.forks
 def test_two_processes_take_the_items():
     here = threading.Event()
 
@@ -42,7 +40,7 @@ def test_two_processes_take_the_items():
     assert len(set(KNOWN.map(slowly, range(8)))) == 2
 
 
-@needs_copies
+@pytest.mark.forks
 def test_what_comes_back_refers_to_what_is_known():
     problem = Problem((RECORD,), layout_of((RECORD,), Axis.YAW, (EFFECTS["servo_lag"],)))
     for back in KNOWN.map(lambda _item: problem, range(6)):
@@ -72,7 +70,7 @@ def test_a_record_that_is_not_known_is_copied():
     np.testing.assert_array_equal(back.both, other.both)
 
 
-@needs_copies
+@pytest.mark.forks
 def test_work_within_work_does_not_wait_for_the_copy_that_waits_for_it():
     pause = threading.Event()
 
@@ -84,7 +82,7 @@ def test_work_within_work_does_not_wait_for_the_copy_that_waits_for_it():
     assert [a for a, _ in answers] == [[i, i + 1, i + 2] for i in range(6)]
 
 
-@needs_copies
+@pytest.mark.forks
 @pytest.mark.parametrize("how", ["raises", "dies", "cannot be written"])
 def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
     here = os.getpid()
@@ -103,7 +101,7 @@ def test_where_the_copy_comes_to_nothing_its_items_are_done_here(how):
     assert KNOWN.map(value, range(6)) == list(range(6))
 
 
-@needs_copies
+@pytest.mark.forks
 def test_where_no_copy_is_to_be_had_all_is_done_here_and_nothing_stays_open(monkeypatch):
     def refused():
         raise BlockingIOError(11, "Resource temporarily unavailable")
@@ -124,6 +122,6 @@ def test_an_error_is_raised_as_it_is_and_leaves_no_process_behind():
         os.waitpid(-1, os.WNOHANG)
 
 
-@needs_copies
+@pytest.mark.forks
 def test_a_copy_copies_no_more():
     assert [can_fork(), *KNOWN.map(lambda _item: (threading.Event().wait(0.02), can_fork())[1], range(6))].count(False) >= 1

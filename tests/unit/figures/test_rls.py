@@ -22,6 +22,7 @@ def test_each_parameter_has_a_panel_with_its_unit_and_settle_time():
     assert [t.get_text() for t in first.texts] == ["after 17.5 s"]
     assert [line.get_xdata()[0] for line in first.lines if line.get_label() == "settled"] == [117.5]
     assert [t.get_text() for t in second.texts] == ["not settled"]
+    assert first.figure.get_suptitle() == "run7: a22 settled after 17.5 s, b2 did not"
 
 
 def test_a_wild_start_does_not_set_the_scale():

@@ -14,9 +14,7 @@ import pytest
 from fieldsid.fitting import jit_warmup
 from fieldsid.fitting.jit_warmup import Warmup, WarmupJob
 from fieldsid.numerics.jit import is_loaded, jit, plain_of, warmup_marker
-from fieldsid.runtime.worker_pool import can_fork
 
-needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
 EVERY = """
 from fieldsid.fitting import jit_warmup
 jit_warmup.compile_all()
@@ -93,7 +91,7 @@ def jobs(monkeypatch, tmp_path):
     return made
 
 
-@needs_copies
+@pytest.mark.forks
 def test_a_worker_compiles_only_where_there_is_no_marker_and_ends_with_the_context(jobs, monkeypatch, tmp_path):
     made, said = [], []
     real = jit_warmup.fork_worker
@@ -113,7 +111,7 @@ def test_a_worker_compiles_only_where_there_is_no_marker_and_ends_with_the_conte
     assert len(made) == len(said) == 1
 
 
-@needs_copies
+@pytest.mark.forks
 def test_jobs_are_shared_with_the_worker_until_the_kernels_asked_for_are_there(jobs, tmp_path):
     files = jobs(0.5, 0.0, 0.0)
     with jit_warmup.warming_up() as warmup:
@@ -138,7 +136,7 @@ def test_without_a_worker_all_of_it_is_done_here(jobs, monkeypatch, tmp_path):
     assert (tmp_path / "cache" / "marker").exists()
 
 
-@needs_copies
+@pytest.mark.forks
 def test_what_the_worker_died_of_is_done_here():
     here, done, kernel = os.getpid(), [], plain_of(jit_warmup.first_order_lag)
     warmup = Warmup([WarmupJob(lambda: done.append(1) if os.getpid() == here else os._exit(9), (kernel,))])

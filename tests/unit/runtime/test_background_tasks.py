@@ -9,9 +9,6 @@ import pytest
 
 from fieldsid.runtime import worker_pool
 from fieldsid.runtime.background_tasks import MAX_WORKERS, BackgroundTasks
-from fieldsid.runtime.worker_pool import can_fork
-
-needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
 
 
 def signed(path, seconds=0.0):
@@ -26,7 +23,7 @@ def test_a_task_is_done_at_once_where_this_process_cannot_be_forked(tmp_path, mo
     assert (tmp_path / "a").read_text() == str(os.getpid())
 
 
-@needs_copies
+@pytest.mark.forks
 def test_what_is_put_off_is_done_in_copies_and_waited_for(tmp_path):
     files = [tmp_path / str(i) for i in range(MAX_WORKERS + 1)]
     with BackgroundTasks() as later:
@@ -36,7 +33,7 @@ def test_what_is_put_off_is_done_in_copies_and_waited_for(tmp_path):
     assert len({file.read_text() for file in files}) == len(files)
 
 
-@needs_copies
+@pytest.mark.forks
 def test_what_went_wrong_in_a_copy_is_met_again_here(tmp_path):
     def refused():
         raise PermissionError("no")
@@ -53,7 +50,7 @@ def test_what_went_wrong_in_a_copy_is_met_again_here(tmp_path):
     assert (tmp_path / "again").exists()
 
 
-@needs_copies
+@pytest.mark.forks
 def test_after_an_error_nothing_that_was_put_off_is_done_again():
     done = []
 

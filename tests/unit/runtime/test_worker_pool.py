@@ -15,8 +15,6 @@ import pytest
 from fieldsid.runtime import worker_pool
 from fieldsid.runtime.worker_pool import can_fork, fork_worker, parallel_map
 
-needs_copies = pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
-
 
 def answer_of(work):
     """What a copy's work comes to."""
@@ -24,25 +22,25 @@ def answer_of(work):
         return copy.answer()
 
 
-@needs_copies
+@pytest.mark.forks
 def test_a_copy_answers_with_what_its_work_comes_to():
     assert answer_of(lambda: b"x" * 2**20) == b"x" * 2**20  # more than a pipe holds
     assert int(answer_of(lambda: str(os.getpid()).encode())) != os.getpid()
 
 
-@needs_copies
+@pytest.mark.forks
 def test_what_a_copy_says_is_not_heard(capfd):
     assert answer_of(lambda: str(os.write(1, b"out")).encode() + str(os.write(2, b"err")).encode()) == b"33"
     assert capfd.readouterr() == ("", "")
 
 
-@needs_copies
+@pytest.mark.forks
 @pytest.mark.parametrize("work", [lambda: 1 / 0, lambda: os._exit(9), lambda: "no bytes"], ids=["raises", "dies", "no bytes"])
 def test_a_copy_that_came_to_nothing_has_no_answer(work):
     assert answer_of(work) is None
 
 
-@needs_copies
+@pytest.mark.forks
 def test_an_error_beside_a_copy_ends_it():
     with pytest.raises(ValueError, match="here"), fork_worker(lambda: [threading.Event().wait(60.0), b""][1]) as copy:
         raise ValueError("here")
@@ -50,7 +48,7 @@ def test_an_error_beside_a_copy_ends_it():
         os.waitpid(copy.process, os.WNOHANG)
 
 
-@needs_copies
+@pytest.mark.forks
 def test_a_worker_that_has_answered_is_gone():
     with fork_worker(lambda: b"") as worker:
         worker.answer()
@@ -67,7 +65,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
-@needs_copies
+@pytest.mark.forks
 def test_a_worker_ends_with_a_process_that_is_killed():
     killed = subprocess.run([sys.executable, "-c", KILLED], capture_output=True, text=True, check=False)
     assert killed.returncode == -signal.SIGKILL
@@ -83,7 +81,7 @@ def in_time(is_so, seconds):
     return done
 
 
-@needs_copies
+@pytest.mark.forks
 def test_an_error_of_the_function_is_raised_and_leaves_no_process():
     with pytest.raises(ZeroDivisionError):
         parallel_map(lambda i: 1 // (i - 3), range(8))
@@ -91,7 +89,7 @@ def test_an_error_of_the_function_is_raised_and_leaves_no_process():
         os.waitpid(-1, os.WNOHANG)
 
 
-@needs_copies
+@pytest.mark.forks
 def test_what_a_worker_died_of_is_done_here():
     here = os.getpid()
 
@@ -104,7 +102,7 @@ def test_what_a_worker_died_of_is_done_here():
     assert parallel_map(dies_elsewhere, range(12)) == list(range(12))
 
 
-@needs_copies
+@pytest.mark.forks
 def test_where_no_copy_is_to_be_had_nothing_stays_open(monkeypatch):
     def refused():
         raise BlockingIOError(11, "Resource temporarily unavailable")
@@ -115,7 +113,7 @@ def test_where_no_copy_is_to_be_had_nothing_stays_open(monkeypatch):
     assert len(list(Path("/proc/self/fd").iterdir())) == ends
 
 
-@needs_copies
+@pytest.mark.forks
 def test_a_copy_copies_no_more():
     assert can_fork()
     assert answer_of(lambda: str(can_fork()).encode()) == b"False"

@@ -20,7 +20,6 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
-from fieldsid.runtime.worker_pool import can_fork
 
 
 def patch(monkeypatch, name, value):
@@ -51,7 +50,7 @@ def test_what_a_copy_has_worked_out_counts():
     assert counter.count == 18
 
 
-@pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
+@pytest.mark.forks
 def test_a_problem_from_a_worker_counts_on_the_counter_of_the_search():
     record = record_of(UNSEEN, Axis.YAW)
     shared = ParallelMap([record], [])
@@ -89,7 +88,7 @@ def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, thorough):
     assert [n.code for n in found.notes].count("search_ended") == (not thorough)
 
 
-@pytest.mark.skipif(not can_fork(), reason="needs Linux, a second core and no other threads")
+@pytest.mark.forks
 def test_a_copy_changes_neither_the_count_nor_the_answer(monkeypatch):
     answers, counts = [], []
     for alone in (False, True):
