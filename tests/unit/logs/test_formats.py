@@ -7,6 +7,7 @@ import struct
 
 import numpy as np
 import pytest
+import scipy.io
 from binary_logs import imc_message, write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 
 from fieldsid.errors import LogError
@@ -100,6 +101,16 @@ def _by(topic):
 def test_a_struct_in_a_matlab_file_is_a_table_and_a_canonical_one_needs_no_mapping(tmp_path):
     run = load_run(write_mat(tmp_path / "a.mat", TIME, {"yaw_rad": YAW, "rudder_rad": YAW > 0}))
     np.testing.assert_array_equal(run["yaw_rad"], YAW)
+
+
+def test_rows_that_a_script_made_room_for_and_never_filled_are_no_rows(tmp_path):
+    path, filled, room = tmp_path / "log.mat", TIME.size, 5 * TIME.size
+    columns = {"t": TIME + 0.3, "heading": np.degrees(YAW) + 40.0, "u": np.stack([YAW] * 4, axis=1)}
+    scipy.io.savemat(path, {n: np.concatenate([v, np.zeros((room - filled, *v.shape[1:]))]) for n, v in columns.items()})
+    found = inspect_log(path)
+    assert found.run is not None
+    assert found.run.time.size == filled
+    assert "surge_m_s" not in found.proposal.body["signals"]  # one of four inputs is no speed for being called u
 
 
 def test_a_matlab_file_without_columns_says_what_to_save(tmp_path):
