@@ -58,7 +58,7 @@ class Columns:
             return places[0]
         if places:
             raise MappingError(
-                f"`{self.path}` has {len(places)} columns named `{column}`",
+                f"`{self.path}` has {len(places)} columns named `{column}`, and which is meant for `{signal}` is open",
                 found=f"columns {places}",
                 hint=f"name it by its place in a mapping, as `column: {places[0]}`",
             )
