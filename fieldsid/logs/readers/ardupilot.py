@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -50,13 +52,20 @@ def _topics(path: Path) -> dict[str, Topic]:
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
     try:
-        with closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
+        with _unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
             rows = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
         found = f"{type(error).__name__}: {error}"[:160]
         raise LogError(f"`{path}` is {what} that cannot be read", found=found, hint=COPY_AGAIN) from error
     found_topics = {name: _joined(messages) for name, messages in rows.items()}
     return {name: topic for name, topic in found_topics.items() if topic is not None}
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Keep what the library prints of damage, some of it among the data on stdout: `_cut` says it once, with the place."""
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        yield
 
 
 def _rows(log: Any, *, is_flash: bool) -> dict[str, list[tuple[float, dict[str, float]]]]:
@@ -72,7 +81,9 @@ def _rows(log: Any, *, is_flash: bool) -> dict[str, list[tuple[float, dict[str, 
 
 
 def _flash(path: Path) -> Any:
-    kind = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary
+    its_own = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary
+    # its compiled index writes a line for each damaged byte to the process's own stderr, where nothing keeps it from the user
+    kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})
     log = kind.__new__(kind)
     try:
         kind.__init__(log, str(path))

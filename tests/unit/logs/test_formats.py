@@ -137,6 +137,16 @@ def test_garbage_behind_a_signature_is_an_error_with_its_name(tmp_path, suffix):
     assert str(log) in error.value.what
 
 
+def test_a_damaged_dataflash_log_says_once_where_and_nothing_of_its_librarys_own(tmp_path, capfd):
+    path = tmp_path / "log.bin"
+    write_dataflash(path, TIME, {"yaw_rad": YAW, "rudder_rad": 0.1 * np.sign(YAW)})
+    data = bytearray(path.read_bytes())
+    data[3000:3040] = b"\xff" * 40
+    path.write_bytes(data)
+    assert [n.code for n in inspect_log(path).notes].count("truncated") == 1
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_gliders_log_as_text_is_left_to_the_reader_of_text(tmp_path):
     log = tmp_path / "a.dba"
     log.write_text("dbd_label: DBD_ASC(dinkum_binary_data_ascii)file\nencoding_ver: 2\nnum_ascii_tags: 14\n")
