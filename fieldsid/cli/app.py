@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import gc
-import io
 import os
 import sys
 from typing import TYPE_CHECKING, Any
@@ -54,7 +53,7 @@ def entry() -> Never:
     """Run the command line of this process and end it."""
     gc.set_threshold(GC_THRESHOLD)
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a console without a file's letters shows their codes
+        if hasattr(stream, "reconfigure"):  # a console without a file's letters shows their codes
             stream.reconfigure(errors="backslashreplace")
     codes: list[int] = []
     atexit.register(_end, codes)  # what is registered first is called last

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, redirect_stderr, redirect_stdout
-from io import StringIO
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.convert.time_column import YEARS_S
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
 
@@ -52,20 +50,13 @@ def _topics(path: Path) -> dict[str, Topic]:
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
     try:
-        with _unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
+        with unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
             rows = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
         found = f"{type(error).__name__}: {error}"[:160]
         raise LogError(f"`{path}` is {what} that cannot be read", found=found, hint=COPY_AGAIN) from error
     found_topics = {name: _joined(messages) for name, messages in rows.items()}
     return {name: topic for name, topic in found_topics.items() if topic is not None}
-
-
-@contextmanager
-def _unheard() -> Iterator[None]:
-    """Keep what the library prints of damage, some of it among the data on stdout: `_cut` says it once, with the place."""
-    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-        yield
 
 
 def _rows(log: Any, *, is_flash: bool) -> dict[str, list[tuple[float, dict[str, float]]]]:

@@ -147,6 +147,17 @@ def test_a_damaged_dataflash_log_says_once_where_and_nothing_of_its_librarys_own
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_damaged_ulog_says_so_itself_and_nothing_of_its_librarys_own(tmp_path, capfd):
+    path = tmp_path / "log.ulg"
+    write_ulog(path, TIME, {"yaw_rad": YAW, "rudder_rad": 0.1 * np.sign(YAW)})
+    data = bytearray(path.read_bytes())
+    one = data.rindex(b"D\x07\0", 0, 3000)  # a message of data, given to a topic that there is not
+    data[one + 1 : one + 3] = b"\xff\x7f"
+    path.write_bytes(data)
+    assert "damaged" in {n.code for n in inspect_log(path).notes}
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_gliders_log_as_text_is_left_to_the_reader_of_text(tmp_path):
     log = tmp_path / "a.dba"
     log.write_text("dbd_label: DBD_ASC(dinkum_binary_data_ascii)file\nencoding_ver: 2\nnum_ascii_tags: 14\n")
