@@ -52,6 +52,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def entry() -> Never:
     """Run the command line of this process and end it."""
     gc.set_threshold(GC_THRESHOLD)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a console without a file's letters shows their codes
+            stream.reconfigure(errors="backslashreplace")
     codes: list[int] = []
     atexit.register(_end, codes)  # what is registered first is called last
     codes.append(main())

@@ -121,8 +121,8 @@ def check(records: Sequence[Record], axis: Axis) -> None:
         if measured < FEWEST_SAMPLES:
             raise DataError(
                 f"run {r.name!r} is too short to identify {axis.value}",
-                found=f"{measured} measured samples, at least {FEWEST_SAMPLES} are needed",
-                hint="take a longer run, or part of one: two pulses of 2 s each at least",
+                found=f"{measured} measured samples in {r.time[-1] - r.time[0]:.3g} s, at least {FEWEST_SAMPLES} are needed",
+                hint="take a longer run or part of one, two pulses of 2 s each at least, or one that was sampled more often",
             )
         names = NAMES[axis]
         excursions(r.name, axis.value, names.fin_measured if r.fin_is_measured else names.fin, r.time, r.fin)

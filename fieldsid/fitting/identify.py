@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fieldsid.errors import UsageError
 from fieldsid.fitting.checks.closed_loop import refuse_feedback_alone
 from fieldsid.fitting.checks.run_checks import offset_findings, run_checks, sign_findings
+from fieldsid.fitting.checks.sampling_checks import sampling_findings
 from fieldsid.fitting.fit import AUTO, Fit, check, check_signals, fit
 from fieldsid.fitting.problem.estimator import Options
 from fieldsid.logs import Note, Run, segment
@@ -47,10 +48,15 @@ def identify(
         return _Judged(run, record, run_checks(part, axis, vehicle))
 
     def fitted(group: Sequence[_Judged]) -> Fit:
-        refuse_feedback_alone([j.record for j in group])
-        found = fit([j.record for j in group], axis, method=method, effects=effects, options=options)
+        records = [j.record for j in group]
+        refuse_feedback_alone(records)
+        found = fit(records, axis, method=method, effects=effects, options=options)
         done()
-        of_model = (*sign_findings(found.model, vehicle), *offset_findings(found.model, vehicle))
+        of_model = (
+            *sampling_findings(found.model, records),
+            *sign_findings(found.model, vehicle),
+            *offset_findings(found.model, vehicle),
+        )
         notes = (*of_model, *(note for j in group for note in j.notes))
         return replace(found, notes=(*notes, *found.notes))
 

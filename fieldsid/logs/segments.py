@@ -101,9 +101,11 @@ def _around(run: Run, time: FloatArray, away: BoolArray, signal: str, limit: flo
     begin, end = float(run.time[0]), float(run.time[-1])
     if last - first >= WHOLE * (end - begin):
         return Segment(begin, end, f"the whole run: `{signal}` is away from trim from {first:.2f} to {last:.2f} s")
-    start, stop = max(begin, first - BEFORE_S), min(end, last + AFTER_S)
+    # a log whose samples are further apart keeps at least the one before and the one after
+    step = float(np.median(np.diff(run.time)))
+    start, stop = max(begin, first - max(BEFORE_S, step)), min(end, last + max(AFTER_S, step))
     why = (
-        f"{BEFORE_S:g} s before `{signal}` first leaves its trim by {np.degrees(limit):.1f} deg ({first:.2f} s) "
-        f"to {AFTER_S:g} s after it last did ({last:.2f} s)"
+        f"{first - start:.3g} s before `{signal}` first leaves its trim by {np.degrees(limit):.1f} deg ({first:.2f} s) "
+        f"to {stop - last:.3g} s after it last did ({last:.2f} s)"
     )
     return Segment(start, stop, why)

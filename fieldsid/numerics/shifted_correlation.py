@@ -45,9 +45,10 @@ def _products(a: FloatArray, b: FloatArray, reach: int) -> FloatArray:
     """Return the sum of a[i + k] b[i] for each shift k."""
     total = np.zeros(2 * reach + 1)
     padded = np.concatenate([np.zeros(reach), a, np.zeros(reach)])
-    size = BLOCK_SAMPLES + 2 * reach
-    for start in range(0, b.size, BLOCK_SAMPLES):
-        block = b[start : start + BLOCK_SAMPLES]
+    length = min(BLOCK_SAMPLES, b.size)
+    size = length + 2 * reach
+    for start in range(0, b.size, length):
+        block = b[start : start + length]
         spectrum = np.fft.rfft(padded[start : start + block.size + 2 * reach], size) * np.conj(np.fft.rfft(block, size))
         total += np.fft.irfft(spectrum, size)[: 2 * reach + 1]
     return total

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -158,3 +161,32 @@ def test_a_log_that_cannot_be_used_says_why(run_cli, tmp_path, rows, make, says)
     assert (answer.code, answer.out) == (2, "")
     assert says in answer.err
     assert "\nhint: " in answer.err
+
+
+def test_a_file_without_an_end_of_line_is_refused_before_it_is_taken_apart(run_cli, tmp_path):
+    for name, text in {"one.csv": "1," * 400_000, "wide.csv": ",".join(f"c{i}" for i in range(100_000)) + "\n1\n"}.items():
+        (tmp_path / name).write_text(text)
+        for words in (["inspect", tmp_path / name], ["import", tmp_path / name, "-o", tmp_path / "runs"]):
+            answer = run_cli(*words)
+            assert answer.code == 2
+            assert "its first line has no end" in answer.err
+            assert len(answer.err) < 1000
+
+
+@pytest.mark.parametrize("step", [-0.1, 0.0])
+def test_a_time_that_never_rises_is_said_by_inspect_too(run_cli, tmp_path, step):
+    rows = "".join(f"{10 + step * i},{0.1 * i},0.{i % 3}\n" for i in range(100))
+    (tmp_path / "log.csv").write_text("time_s,yaw_rad,rudder_rad\n" + rows)
+    answer = run_cli("inspect", tmp_path / "log.csv")
+    assert answer.code == 2
+    assert "99 of 100 samples were left out, time repeats or goes back there" in answer.err
+
+
+def test_a_console_without_a_files_letters_shows_their_codes(tmp_path):
+    log = tmp_path / "l\u00f6g \u2693.csv"
+    log.write_text("time_s,yaw_rad,rudder_rad\n" + "".join(f"{0.1 * i:.1f},{0.1 * i},0.{i % 3}\n" for i in range(100)))
+    said = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "PYTHONUTF8": "0"}
+    done = subprocess.run([sys.executable, "-m", "fieldsid", "inspect", log], env=said, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert b"holds 2 signals" in done.stdout
+    assert b"\\" in done.stdout.split(b"holds")[0]

@@ -31,12 +31,15 @@ from fieldsid.cli.failure import CLOSED
 from fieldsid.errors import FieldsidError
 
 LONGEST_S = 20
+"""Processor time of one file, whatever else the machine does."""
+STUCK_S = 300
+"""Wall time after which a file is one that hangs, waiting for something."""
 MEMORY = 6 << 30
 """Address space in bytes: a length that a file invents must not be believed."""
 
 
 class TooLongError(Exception):
-    """A file that is still being worked on after LONGEST_S."""
+    """A file that is still being worked on after LONGEST_S of processor time, or after STUCK_S."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,12 @@ class Crash:
 
 
 def _ring(*_given) -> None:
-    raise TooLongError(f"not done after {LONGEST_S} s")
+    raise TooLongError(f"not done after {LONGEST_S} s of processor time or {STUCK_S} s in all")
+
+
+def _set(processor_s: int, wall_s: int) -> None:
+    signal.setitimer(signal.ITIMER_PROF, processor_s)
+    signal.alarm(wall_s)
 
 
 def fuzz(kind: Kind, seeds, folder: Path, keep: Path | None = None) -> list[Crash]:
@@ -59,14 +67,15 @@ def fuzz(kind: Kind, seeds, folder: Path, keep: Path | None = None) -> list[Cras
     source.mkdir()
     made = kind.make(source)
     crashes = []
-    before = signal.signal(signal.SIGALRM, _ring)
+    before = {s: signal.signal(s, _ring) for s in (signal.SIGALRM, signal.SIGPROF)}
     try:
         for seed in seeds:
             crash = _attempt(kind, made, seed, folder, keep)
             crashes += [crash] if crash else []
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        _set(0, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return crashes
 
 
@@ -82,15 +91,15 @@ def _attempt(kind: Kind, made: Path, seed: int, folder: Path, keep: Path | None)
     part.write_bytes(spoil(part.read_bytes(), random))
     for door in kind.doors:
         try:
-            signal.alarm(LONGEST_S)
+            _set(LONGEST_S, STUCK_S)
             with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 door(path)
-            signal.alarm(0)
+            _set(0, 0)
         except (FieldsidError, typer.Exit):
-            signal.alarm(0)
+            _set(0, 0)
         except Exception as error:  # noqa: BLE001 - any other error is what is looked for
-            signal.alarm(0)
+            _set(0, 0)
             if isinstance(error, OSError) and error.errno in CLOSED:  # told as what it is, see cli/failure.py
                 continue
             if keep is not None:

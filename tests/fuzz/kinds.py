@@ -109,7 +109,9 @@ def good_files() -> Path:
         save_model(model, folder / f"m{speed}.yaml")
     trial.flown(folder, name="flown")
     quietly(["fit", folder / "m1.0.yaml", folder / "m1.8.yaml", "-o", folder / "law.yaml", "--no-figures"])
-    quietly(["schedule", "design", folder / "law.yaml", "--fin-limit", "0.26", "-o", folder / "gains.yaml"])
+    quietly(
+        ["schedule", "design", folder / "law.yaml", "--speeds", "1.0,1.8", "--fin-limit", "0.26", "-o", folder / "gains.yaml"]
+    )
     (folder / "prior.yaml").write_text(template_path("plan/priors/torpedo_yaw.yaml").read_text())
     return folder
 
@@ -231,8 +233,8 @@ def model_read(path):
 
 def law_read(path):
     with contextlib.suppress(FieldsidError):
-        command(["schedule", "design", str(path), "--fin-limit", "0.26", "--json"])
-    command(["turn-radius", str(path), "--speeds", "1.0,1.4", "--rudder-max", "0.2", "--json"])
+        command(["schedule", "design", str(path), "--speeds", "1.4", "--fin-limit", "0.26", "--json"])
+    command(["turn-radius", str(path), "--speeds", "1.4", "--rudder-max", "0.2", "--json"])
 
 
 def schedule_read(path):

@@ -299,6 +299,11 @@ def test_a_law_with_more_powers_than_coefficients_is_refused(tmp_path):
         load_laws(changed(tmp_path, "law.yaml", "laws", "b2", "candidates", kind, "powers", to=[0.0, 1.0, 2.0, 3.0]))
 
 
+def test_a_law_of_no_points_at_all_is_refused(tmp_path):
+    with pytest.raises(ArtifactError, match="not a complete fit file"):
+        load_laws(changed(tmp_path, "law.yaml", "points", to=[]))
+
+
 def test_standard_errors_without_bounds_draw_no_law(tmp_path):
     path = as_radius_table(tmp_path)
     path.write_text(path.read_text().replace(",0.02\n", ",1e308\n").replace("1.4,", "1e-320,").replace("1.8,", "1e308,"))

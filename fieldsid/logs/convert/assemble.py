@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -62,13 +62,20 @@ def assemble(
         notes += found
     time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
     if time.size < 2:
-        counted = f"{time.size} sample{'s' * (time.size != 1)} with a time, at least 2 are needed"
+        counted = _counted(time, [*notes, *clock_notes])
         raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
     signals = {s: signals[s] for s in SIGNALS if s in signals}
     run = Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
     run = run if part == WHOLE else run.between(*part)
     refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
     return run
+
+
+def _counted(time: FloatArray, notes: Sequence[Note]) -> str:
+    """Return how many samples are left, and what became of the others."""
+    left_out = "; ".join(n.message for n in notes if n.code == "time_order")
+    counted = f"{time.size} sample{'s' * (time.size != 1)} with a time, at least 2 are needed"
+    return f"{counted}; {left_out}" if left_out else counted
 
 
 def _inspect(path: Path | None) -> str:

@@ -1,17 +1,24 @@
 """A sensor that falls to one and the same number, time and again: zeros of a lost lock, -999 and 9999 of a logger.
 
 What moves with noise comes back to one number to the last bit by chance only where its digits are few. A number to which a signal
-jumps, from beyond what its noise explains, and from which it jumps back is no measurement.
+jumps, from beyond what its noise explains, and from which it jumps back is no measurement, where it does so oftener than chance:
+how many numbers there are to land on is told by how often the other jumps land on the same one, and a number at which the signal
+rests is one that many jumps end at.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.logs.doctor.spikes import DIGITS, OF_MEDIAN, SPREADS, last_digit
 from fieldsid.logs.run import GOALS, SIGNALS, Note
 from fieldsid.numerics.arrays import FloatArray
 
+MOST_CHANCE = 1e-3
+"""Chance, of any number at all, that jumps land on it as often, above which it is one of few digits."""
 FEWEST = 3
 """Jumps to one number from which on it is a drop-out; a spike may stand alone."""
 SENSED = (
@@ -21,6 +28,23 @@ SENSED = (
     - {n for n in SIGNALS if n.startswith(("rudder", "elevator"))}
 )
 """A fin jumps, and to the same angles."""
+
+
+def _chance(count: int, others: npt.NDArray[np.intp]) -> float:
+    """Return the chance that some number is landed on `count` times, where others are by `others` (k,) times each.
+
+    Of N jumps to V equally likely numbers, N (N - 1) / V ordered pairs land on the same: that gives V.
+    """
+    jumps, pairs = int(others.sum()), int((others * (others - 1)).sum())
+    if pairs == 0:
+        return 0.0
+    numbers = jumps * (jumps - 1) / pairs
+    return numbers * _as_many(count, (jumps + count) / numbers)
+
+
+def _as_many(count: int, usual: float) -> float:
+    """Return the chance of `count` events or more where `usual` are expected (Poisson)."""
+    return max(1.0 - sum(math.exp(-usual + i * math.log(usual) - math.lgamma(i + 1)) for i in range(count)), 0.0)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -34,13 +58,14 @@ def dropout_findings(name: str, values: FloatArray) -> list[Note]:
     far = np.flatnonzero(np.abs(steps) > limit)
     if far.size < 2 * FEWEST:
         return []
-    numbers, counts = np.unique(values[far + 1], return_counts=True)
+    numbers, counts = np.unique(values[far + 1] + 0.0, return_counts=True)  # a zero has no sign
     k = int(np.argmax(counts))
     number, count = float(numbers[k]), int(counts[k])
     left = int(np.count_nonzero(values[far] == number))
-    if count < FEWEST or left < FEWEST - 1:
-        return []
     samples = int(np.count_nonzero(values == number))
+    chance = max(_chance(count, np.delete(counts, k)), _as_many(count, far.size * samples / values.size))
+    if count < FEWEST or left < FEWEST - 1 or chance > MOST_CHANCE:
+        return []
     message = (
         f"{name} jumps to exactly {number:.6g} and back {count} times, {samples} samples in all (limit {FEWEST}): what its "
         "sensor or logger writes where it has nothing; leave those cells empty"

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from fieldsid.logs.channels import ATTITUDE
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, stated_unit, unit_in_name
 from fieldsid.logs.mapping.word_meaning import COMMANDED, LATITUDE, LONGITUDE, meaning_of, words_of
 from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo
+from fieldsid.numerics.arrays import FloatArray
 
 _VECTORS = {
     "angular_velocity": ("roll_rate_rad_s", "pitch_rate_rad_s", "yaw_rate_rad_s"),
@@ -18,9 +22,16 @@ _VECTORS = {
     "position": ("x_m", "y_m", "depth_m"),
 }
 _EULER = {"rpy", "euler", "attitude", "orientation", "angles"}
+_TILTS = {"pitch_rad", "roll_rad", "pitch_goal_rad"}
 _COUNTERS = {"seq", "sec", "nanosec", "secs", "nsecs"}
-_PLANAR = {"theta": "yaw_rad", "angular_velocity": "yaw_rate_rad_s", "linear_velocity": "surge_m_s"}
+_PLANAR = {
+    "theta": "yaw_rad", "angular_velocity": "yaw_rate_rad_s", "linear_velocity": "surge_m_s", "x": "x_m", "y": "y_m",
+}  # fmt: skip
 """Fields of a pose in the plane, which has an x, a y and one angle."""
+_FRAMED = {"ned", "enu", "local"}
+"""Words of a pose whose x and y are metres: others are in degrees of latitude and longitude."""
+STEEPEST_DEG = 360.0
+"""A pitch or roll is less in any unit: a larger number is none, as the port or the error code that a constant may be."""
 NOTHING = 0.1
 """What a column that never changes is as sure as, beside one that does."""
 
@@ -37,11 +48,13 @@ class Guess:
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
     """Yield what a column may be; one of words is no signal."""
-    found = meaning_of(channel.name)
+    found = _of_message_path(channel.name) or meaning_of(channel.name)
     if found is None or channel.count == 0 or channel.kind != "number" or found[0] == TIME:
         return
     signal, sure = found
     span = channel.fields[0].span
+    if _is_no_angle(signal, span or ()):
+        return
     if signal in (LATITUDE, LONGITUDE):
         if span is None or max(map(abs, span)) <= (90.0 if signal == LATITUDE else 360.0):
             yield Guess(signal, _weighed(sure, span), {"column": place}, channel.count)
@@ -54,6 +67,44 @@ def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
     if unit not in (None, "1"):
         item["unit"] = unit
     yield Guess(signal, _weighed(sure, span), item, channel.count)
+
+
+def _of_message_path(name: str) -> tuple[str, float] | None:
+    """Return what the path of a standard message's vector says that is a column's name, as in `field.twist.twist.angular.z`."""
+    parent, _, last = name.rpartition(".")
+    vector = parent.rpartition(".")[2]
+    if last not in ("x", "y", "z") or vector not in _VECTORS or COMMANDED & set(words_of(name)):
+        return None
+    return _VECTORS[vector]["xyz".index(last)], 8.0
+
+
+_PARTS_OF_QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>[xyzw])(?P<end>_?\d*)$", re.IGNORECASE)
+UNIT_LENGTH = 0.02
+"""How far the length of a quaternion's four numbers may be from one."""
+
+
+def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> tuple[str, ...] | None:
+    """Return the four columns x, y, z, w of an attitude: alike in name but for the part, together of length one; or None."""
+    stems: dict[tuple[str, str], dict[str, str]] = {}
+    for name in names:
+        found = _PARTS_OF_QUATERNION.match(name.strip())
+        if found and name in columns and not COMMANDED & set(words_of(name)):
+            stems.setdefault((found["stem"], found["end"]), {})[found["part"].lower()] = name
+    for parts in stems.values():
+        if parts.keys() != set("xyzw"):
+            continue
+        picked = tuple(parts[p] for p in "xyzw")
+        lengths = np.linalg.norm(np.stack([columns[c] for c in picked]), axis=0)
+        seen = lengths[np.isfinite(lengths)]
+        if seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
+            return picked
+    return None
+
+
+def _is_no_angle(signal: str, seen: tuple[Any, ...]) -> bool:
+    """Whether numbers that were seen are too large for the pitch or roll they are named."""
+    numbers = [abs(v) for v in seen if isinstance(v, (int, float))]
+    return signal in _TILTS and max(numbers, default=0.0) > STEEPEST_DEG
 
 
 def _weighed(sure: float, span: tuple[float, float] | None) -> float:
@@ -73,8 +124,8 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             continue
         if channel.kind == DEFINED or last in _COUNTERS or "covariance" in info.path or "[" in parent:
             continue
-        if planar and info.path in _PLANAR and not commanded:
-            yield Guess(_PLANAR[info.path], 5.0, {"topic": channel.name, "field": info.path}, channel.count)
+        if planar and info.path in _PLANAR:
+            yield from _of_plane(channel, info.path, commanded=commanded)
             continue
         signal, sure = _of_vector(channel, parent, last, commanded=commanded)
         if signal is None:
@@ -82,6 +133,14 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
         elif not (signal == ATTITUDE and _is_nothing(channel, parent)):
             path = parent if signal == ATTITUDE else info.path
             yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count)
+
+
+def _of_plane(channel: ChannelInfo, path: str, *, commanded: bool) -> Iterator[Guess]:
+    """Yield what a field of a pose in the plane is; of a commanded one the angle alone is a signal, the heading wanted."""
+    if commanded and path != "theta":
+        return
+    sure = 5.0 + bool(_FRAMED & set(words_of(channel.name)))
+    yield Guess("yaw_goal_rad" if commanded else _PLANAR[path], sure, {"topic": channel.name, "field": path}, channel.count)
 
 
 def _of_format(channel: ChannelInfo, info: FieldInfo, signal: str, how: Mapping[str, Any]) -> Guess:
@@ -118,7 +177,7 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
         return
     name = info.path if info.path not in ("data", "vector", "position[0]") else ""
     found = meaning_of(f"{channel.name} {name}".strip())
-    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE):
+    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE) or _is_no_angle(found[0], info.first):
         return
     unit = unit_in_name(info.path.rpartition(".")[2], found[0])
     unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit

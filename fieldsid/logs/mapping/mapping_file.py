@@ -134,7 +134,11 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
     frame = frame_of(file.frame, place)
     sources = {signal: _source(signal, item, place) for signal, item in file.signals.items()}
     if not sources:
-        raise MappingError(f"{place} maps no signal", found="an empty `signals`", hint=_write_hint(origin))
+        raise MappingError(
+            f"{place} maps no signal",
+            found="an empty `signals`",
+            hint="write a line for each under `signals`, as `yaw_rad: {column: NAME, unit: deg}`",
+        )
     if file.clock is not None and file.clock not in sources:
         raise MappingError(
             f"{place}: `clock` names a signal that is not mapped", found=file.clock, hint=near(file.clock, list(sources))
@@ -162,10 +166,6 @@ def _time(time: _Time, place: str) -> Source:
                 f"{place}: time cannot be in {time.unit!r}", found=time.unit, hint=f"use one of: {', '.join(known)}"
             )
     return Source(column=time.column, unit=time.unit, date=time.date, week=time.week)
-
-
-def _write_hint(origin: Path | None) -> str:
-    return f"let a first one be written: `sysid inspect LOG --write-mapping {origin or 'mapping.yaml'} --force`"
 
 
 def _source(signal: str, item: _Source | str | int, place: str) -> Source:
@@ -228,7 +228,7 @@ def _check_columns(signal: str, item: _Source, place: str) -> None:
         raise MappingError(
             f"{place}: `columns` is for the four numbers of a quaternion",
             found=f"{len(item.columns)} columns at `{signal}`",
-            hint="use `column`",
+            hint="write `columns: [qx, qy, qz, qw]`" if signal in (ATTITUDE, *ANGLES) else "use `column`",
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import FieldsidError, LogError
-from fieldsid.logs.channels import ATTITUDE, POSITION, ChannelMap
+from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
-from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic
+from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
@@ -27,6 +28,8 @@ _DEGREES = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s":
 """Angles and rates larger than this are taken for degrees."""
 GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
 """The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
+_MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borientation\.[xyzw]$")
+"""What columns are called that were written from messages, which are in the frames of REP 103."""
 TRIES = 6
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -98,15 +101,27 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         body["time"] = {k: v for k, v in keys.items() if v is not None}
     elif inventory.table is not None and not inventory.table.header:
         body["time"] = {"column": 0, "unit": "s"}
-    position = [best.pop(s, None) for s in (LATITUDE, LONGITUDE)]
-    signals = {signal: guess.item for signal, guess in best.items()}
-    if all(position) and not {"x_m", "y_m"} & signals.keys():
-        signals[POSITION] = {"columns": [g.item["column"] for g in position if g is not None]}
+    signals = _combined(best, names, samples)
+    if any(_MESSAGE_PATH.search(name) for name in names):
+        body["frame"] = REP103
     if samples is not None:
         notes += _by_numbers(samples, signals, inventory)
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
     return body, notes
+
+
+def _combined(best: dict[str, Guess], names: list[str], samples: Samples | None) -> dict[str, Any]:
+    """Return the columns of signals, with those that give several together: latitude and longitude, a quaternion."""
+    position = [best.pop(s, None) for s in (LATITUDE, LONGITUDE)]
+    signals = {signal: guess.item for signal, guess in best.items()}
+    if all(position) and not {"x_m", "y_m"} & signals.keys():
+        signals[POSITION] = {"columns": [g.item["column"] for g in position if g is not None]}
+    attitude = None if samples is None else quaternion_of(names, samples.columns)
+    if attitude is not None:
+        signals = {s: item for s, item in signals.items() if s not in ANGLES}
+        signals[ATTITUDE] = {"columns": list(attitude)}
+    return signals
 
 
 def _place(inventory: Inventory, column: str | int | None) -> str | int | None:
@@ -117,7 +132,7 @@ def _place(inventory: Inventory, column: str | int | None) -> str | int | None:
 def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
     best, notes = _best(g for c in inventory.channels for g in of_topic(c))
     if ATTITUDE in best:
-        for angle in ("yaw_rad", "pitch_rad", "roll_rad"):
+        for angle in ANGLES:
             best.pop(angle, None)
     named = " ".join(c.name + c.kind for c in inventory.channels).lower()
     frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)

@@ -18,7 +18,8 @@ LATITUDE, LONGITUDE = "latitude", "longitude"
 """Not signals: together they give x and y."""
 OF_ANOTHER = frozenset({
     "error", "err", "cov", "covariance", "std", "sigma", "variance", "var", "bias", "limit", "lim", "max", "min", "quality",
-    "valid", "flag", "temp", "temperature", "sound", "wind", "air", "variation", "status", "mode", "enabled", "count",
+    "valid", "flag", "gain", "gains", "temp", "temperature", "sound", "wind", "air", "variation", "status", "mode", "enabled",
+    "count",
 })  # fmt: skip
 """Words that make a name one of something else than the signal it also names."""
 OF_ANOTHER_THERE: Mapping[str, frozenset[str]] = MappingProxyType(
@@ -84,8 +85,12 @@ LETTERS: Mapping[str, str] = MappingProxyType(
      "w": "heave_m_s", "x": "x_m", "y": "y_m", "z": "depth_m", "n": "propeller_rpm", "the": "pitch_rad", "delta": "rudder_rad"}
 )  # fmt: skip
 """The field's symbols, taken only when a name has no other meaning."""
+GREEK = frozenset({"phi", "theta", "psi"})
+MOST_BESIDE_GREEK = 2
+"""Words beside a Greek letter up to which it is the symbol; with more it is an abbreviation, as in `PHI_HOST_PORT_DB`."""
 
-_UNIT = re.compile(r"[\[(][^\])]*[\])]")
+_UNIT = re.compile(r"[\[(](?!\d+[\])])[^\])]*[\])]")
+"""A unit in brackets; digits alone are the place of a part among others, as in `u(2)`."""
 _SUFFIX = re.compile(r"_(rad|deg|rad_s|deg_s|m_s|m|s|ms|us|ns|kn|ft|rpm|km_h|dps)$")
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _OF_GLIDER = re.compile(r"^[mc]_[a-z]")
@@ -114,6 +119,9 @@ def meaning_of(name: str) -> tuple[str, int] | None:
             parts = phrase.split()
             if all(p in words for p in parts) and (best is None or 2 * len(parts) > best[1]):
                 best = (signal, 2 * len(parts))
+    own = words_of(re.split(r"[/ .]", name.strip())[-1])
+    if best is not None and best[1] == 2 and GREEK & set(own) and len(own) > MOST_BESIDE_GREEK + 1:
+        return None
     if best is None or OF_ANOTHER & set(words) or OF_ANOTHER_THERE.get(best[0], frozenset()) & set(words):
         return None
     return _of_use(best[0], best[1], set(words))

@@ -26,6 +26,8 @@ from fieldsid.registry import near
 LOOKED_AT = 200
 FEW_WORDS = 0.05
 """Share of words among the first cells of a column, and among all, up to which it is one of numbers."""
+SHOWN = 100
+"""Names of columns that a message tells."""
 SAMPLED = 100_000
 """Rows of a table that are looked at for what its numbers say."""
 
@@ -58,15 +60,20 @@ class Columns:
             return places[0]
         if places:
             raise MappingError(
-                f"`{self.path}` has {len(places)} columns named `{column}`",
+                f"`{self.path}` has {len(places)} columns named `{column}`, and which is meant for `{signal}` is open",
                 found=f"columns {places}",
                 hint=f"name it by its place in a mapping, as `column: {places[0]}`",
             )
         raise MappingError(
             f"`{self.path}` has no column `{column}` for `{signal}`",
-            found=", ".join(self.names) or f"{self.width} columns without names",
+            found=self.shown(),
             hint=near(column, self.names) if self.names else f"use an index from 0 to {self.width - 1}",
         )
+
+    def shown(self) -> str:
+        """Return the names of the columns for a message, the first ones where there are many."""
+        more = f", ... {self.width - SHOWN} more" if self.width > SHOWN else ""
+        return ", ".join(self.names[:SHOWN]) + more if self.names else f"{self.width} columns without names"
 
     def name(self, index: int) -> str:
         """Return a column's name, or its index as text."""
@@ -160,14 +167,13 @@ def _check_source(path: Path, signal: str, source: Source) -> None:
 
 def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
     if mapping.time is None or mapping.time.column is None:
-        shown = ", ".join(columns.names) or f"{columns.width} columns without names"
         guessed = [name for name in columns.names if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
         likely = guessed[0] if guessed else "COLUMN" if columns.names else "0"
         # Without a file the mapping came from `--channel`.
         way = f"add `time: {{column: {likely}, unit: s}}` to {mapping.place}" if mapping.origin else ""
         raise MappingError(
             f"`{columns.path}` has no time column: `{TIME}` is missing",
-            found=shown,
+            found=columns.shown(),
             hint=way or f"add `--channel {quote(f'time={likely}:s')}`",
         )
     index = columns.index(mapping.time.column, TIME)

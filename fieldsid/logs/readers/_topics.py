@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -48,6 +50,13 @@ def library(module: str, path: Path, what: str, extra: str) -> Any:
             found=str(error),
             hint=f"install it: `pip install 'fieldsid[{extra}]'`",
         ) from error
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Keep what a library prints of a damaged log, some of it among the data on stdout: a note says it once."""
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        yield
 
 
 def inventory_of(

@@ -12,7 +12,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.convert.time_column import YEARS_S
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
 
@@ -50,7 +50,7 @@ def _topics(path: Path) -> dict[str, Topic]:
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
     try:
-        with closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
+        with unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
             rows = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
         found = f"{type(error).__name__}: {error}"[:160]
@@ -72,7 +72,9 @@ def _rows(log: Any, *, is_flash: bool) -> dict[str, list[tuple[float, dict[str, 
 
 
 def _flash(path: Path) -> Any:
-    kind = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary
+    its_own = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary
+    # its compiled index writes a line for each damaged byte to the process's own stderr, where nothing keeps it from the user
+    kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})
     log = kind.__new__(kind)
     try:
         kind.__init__(log, str(path))

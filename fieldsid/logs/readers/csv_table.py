@@ -65,8 +65,20 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
     """Return the mapping of a table with canonical names, or None."""
     with plain_text(path, limit=HEAD) as text:
-        head = text.head()
+        head = _head_of(path, text)
         return own_map_of(form_of(head, TableForm(), path).names) if head.strip() else None
+
+
+def _head_of(path: Path, text: PlainText) -> str:
+    """Return the start of a text, by which it is known how it is written; raises LogError where not even a line ends in it."""
+    head = text.head()
+    if "\n" not in head and text.size >= HEAD:
+        raise LogError(
+            f"`{path}` is no table that can be read: its first line has no end",
+            found=f"none in the first {HEAD} bytes of {text.size}, which begin {head[:40]!r}",
+            hint="write a line for each sample, with the columns that are needed",
+        )
+    return head
 
 
 @contextmanager
@@ -85,7 +97,7 @@ class _Table:
         self.notes: list[Note] = []
         if text.is_blank():
             raise LogError(f"`{path}` is empty", found="no text inside", hint=COPY_AGAIN)
-        self.form: Form = form_of(text.head(), asked, path)
+        self.form: Form = form_of(_head_of(path, text), asked, path)
         self.begin = text.offset_of_line(self.form.start)
         self.end = text.size
         if text.is_cut:
@@ -108,6 +120,8 @@ class _Table:
     def _drop_half_a_line(self) -> None:
         """A plain file that was cut off ends in a line with too few cells."""
         begin, line = self.text.last_line()
+        if len(line) > HEAD:  # no row that was cut: what it is the parser says
+            return
         last = line.decode(self.text.encoding, errors="replace")
         if begin > self.begin and last.strip() and len(cells(last, self.form.separator)) < self.form.width:
             self.end = begin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
@@ -49,15 +50,24 @@ def _columns(path: Path) -> Columns:
         )
     longest = max(lengths, key=lambda size: (lengths[size], size))
     kept = {name: v for name, v in found.items() if v.size == longest}
-    names = tuple(kept)
-    return Columns(path, names, len(names), lambda i: kept[names[i]])
+    names, filled = tuple(kept), _filled(list(kept.values()))
+    return Columns(path, names, len(names), lambda i: kept[names[i]][:filled])
+
+
+def _filled(columns: list[FloatArray]) -> int:
+    """Return the rows up to the last that holds anything but zeros: a script that makes room first leaves the rest empty."""
+    held = np.flatnonzero(np.logical_or.reduce([v != 0.0 for v in columns]))
+    return int(held[-1]) + 1 if held.size else columns[0].size
 
 
 def _of_mat(path: Path) -> Iterator[tuple[str, FloatArray]]:
     scipy_io = import_module("scipy.io")
     refuse_damaged(path)
     try:
-        variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
+        with warnings.catch_warnings():
+            # of objects without a name, which hold no columns
+            warnings.simplefilter("ignore", scipy_io.matlab.MatReadWarning)
+            variables = scipy_io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except _FAILURES as error:
         raise _damaged(path, error) from error
     except Exception as error:  # scipy raises its own kind, and zlib another

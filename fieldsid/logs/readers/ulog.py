@@ -9,7 +9,7 @@ import numpy as np
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of
+from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, ULOG, ULOG_HEADER
 
@@ -37,14 +37,15 @@ def sniff(path: Path) -> bool:
         return stream.read(len(ULOG)) == ULOG
 
 
-def _topics(path: Path) -> dict[str, Topic]:
+def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+    """Return the topics by name, and the notes on a log that is damaged, or cut off inside a message."""
     size = path.stat().st_size
     if size <= ULOG_HEADER:
         what = f"`{path}` is a ULog file (PX4) without data"
         raise LogError(what, found=f"{size} bytes: its header", hint="take another log")
     pyulog = library("pyulog", path, "a ULog file (PX4)", "ulog")
     try:
-        with path.open("rb") as stream:
+        with path.open("rb") as stream, unheard():
             log = pyulog.ULog(stream)
     except Exception as error:  # pyulog has no error of its own for what it cannot parse
         found = f"{type(error).__name__}: {error}"[:160]
@@ -58,7 +59,8 @@ def _topics(path: Path) -> dict[str, Topic]:
         topic = topic_of(stamps, fields)
         if topic is not None:
             topics[f"{part.name}[{part.multi_id}]" if part.multi_id else part.name] = topic
-    return topics
+    damaged = (Note("damaged", "the log is damaged: what is no message of its definitions was left out", {}),)
+    return topics, _cut(path) + (damaged if log.file_corruption else ())
 
 
 def _cut(path: Path) -> tuple[Note, ...]:
@@ -73,12 +75,14 @@ def _cut(path: Path) -> tuple[Note, ...]:
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the topics with count, rate and first values; raises LogError for a damaged file, or without pyulog."""
-    return inventory_of(path, "ULog", _topics(path), MEANS, _cut(path))
+    topics, notes = _topics(path)
+    return inventory_of(path, "ULog", topics, MEANS, notes)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    return raw_log_of(path, _topics(path), mapping, _cut(path))
+    topics, notes = _topics(path)
+    return raw_log_of(path, topics, mapping, notes)
 
 
 READER = Reader(

@@ -162,15 +162,7 @@ def load_laws(path: Path) -> Laws:
     """Read laws back; raises ArtifactError naming the key that is missing or wrong."""
     body = load_record(path, KIND)
     try:
-        points = tuple(
-            Point(
-                str(p["name"]),
-                finite_number(p["speed_m_s"], "speed_m_s"),
-                MappingProxyType({k: finite_number(v, k) for k, v in p["values"].items()}),
-                MappingProxyType({k: finite_number(v, k) for k, v in p["std_errors"].items()}),
-            )
-            for p in body["points"]
-        )
+        points = _points_of(body["points"])
         laws = {n: _law_of(n, r, points) for n, r in body["laws"].items()}
         return Laws(Axis(body["axis"]), points, MappingProxyType(laws))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -179,6 +171,21 @@ def load_laws(path: Path) -> Laws:
             found=f"{type(error).__name__}: {error}",
             hint="make it again: `sysid fit MODEL...`",
         ) from error
+
+
+def _points_of(records: Sequence[Mapping[str, Any]]) -> tuple[Point, ...]:
+    points = tuple(
+        Point(
+            str(p["name"]),
+            finite_number(p["speed_m_s"], "speed_m_s"),
+            MappingProxyType({k: finite_number(v, k) for k, v in p["values"].items()}),
+            MappingProxyType({k: finite_number(v, k) for k, v in p["std_errors"].items()}),
+        )
+        for p in records
+    )
+    if not points:
+        raise ValueError("`points` is empty: no law comes from none")
+    return points
 
 
 def _law_record(law: ParameterLaw) -> dict[str, Any]:

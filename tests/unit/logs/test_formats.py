@@ -7,6 +7,7 @@ import struct
 
 import numpy as np
 import pytest
+import scipy.io
 from binary_logs import imc_message, write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 
 from fieldsid.errors import LogError
@@ -102,6 +103,16 @@ def test_a_struct_in_a_matlab_file_is_a_table_and_a_canonical_one_needs_no_mappi
     np.testing.assert_array_equal(run["yaw_rad"], YAW)
 
 
+def test_rows_that_a_script_made_room_for_and_never_filled_are_no_rows(tmp_path):
+    path, filled, room = tmp_path / "log.mat", TIME.size, 5 * TIME.size
+    columns = {"t": TIME + 0.3, "heading": np.degrees(YAW) + 40.0, "u": np.stack([YAW] * 4, axis=1)}
+    scipy.io.savemat(path, {n: np.concatenate([v, np.zeros((room - filled, *v.shape[1:]))]) for n, v in columns.items()})
+    found = inspect_log(path)
+    assert found.run is not None
+    assert found.run.time.size == filled
+    assert "surge_m_s" not in found.proposal.body["signals"]  # one of four inputs is no speed for being called u
+
+
 def test_a_matlab_file_without_columns_says_what_to_save(tmp_path):
     import scipy.io
 
@@ -124,6 +135,27 @@ def test_garbage_behind_a_signature_is_an_error_with_its_name(tmp_path, suffix):
     with pytest.raises(LogError) as error:
         load_run(log, _by("m_heading"))
     assert str(log) in error.value.what
+
+
+def test_a_damaged_dataflash_log_says_once_where_and_nothing_of_its_librarys_own(tmp_path, capfd):
+    path = tmp_path / "log.bin"
+    write_dataflash(path, TIME, {"yaw_rad": YAW, "rudder_rad": 0.1 * np.sign(YAW)})
+    data = bytearray(path.read_bytes())
+    data[3000:3040] = b"\xff" * 40
+    path.write_bytes(data)
+    assert [n.code for n in inspect_log(path).notes].count("truncated") == 1
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_damaged_ulog_says_so_itself_and_nothing_of_its_librarys_own(tmp_path, capfd):
+    path = tmp_path / "log.ulg"
+    write_ulog(path, TIME, {"yaw_rad": YAW, "rudder_rad": 0.1 * np.sign(YAW)})
+    data = bytearray(path.read_bytes())
+    one = data.rindex(b"D\x07\0", 0, 3000)  # a message of data, given to a topic that there is not
+    data[one + 1 : one + 3] = b"\xff\x7f"
+    path.write_bytes(data)
+    assert "damaged" in {n.code for n in inspect_log(path).notes}
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_gliders_log_as_text_is_left_to_the_reader_of_text(tmp_path):

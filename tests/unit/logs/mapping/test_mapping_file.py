@@ -58,7 +58,7 @@ signals:
         ({"signals": {"yaw_rad": {"column": "a", "field": "b"}}}, "`field` without a `topic`", "topic"),
         ({"signals": {"surge_m_s": {"columns": ["a", "b", "c", "d"]}}}, "four numbers of a quaternion", "`column`"),
         ({"signals": {"attitude": {"topic": "/a", "sign": -1}}}, "a quaternion has no sign", "frame"),
-        ({"signals": {}}, "maps no signal", "inspect"),
+        ({"signals": {}}, "maps no signal", "yaw_rad: {column"),
         ({"signals": [1, 2]}, "`signals` is not valid", "correct"),
         ({}, "lacks `signals`", "signals"),
         ({"signals": {"yaw_rad": 1}, "clock": "yaw_rate_rad_s"}, "`clock` names a signal that is not mapped", "yaw_rad"),

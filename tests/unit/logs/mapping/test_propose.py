@@ -7,6 +7,9 @@ from bags import KINDS, write_bag
 from fieldsid.errors import ArtifactError
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log, write_proposal
+from fieldsid.logs.mapping.guesses import of_topic
+from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.reader import ChannelInfo, FieldInfo
 
 TIME = 0.05 * np.arange(400)
 TRUTH = {
@@ -96,3 +99,63 @@ def test_of_a_gliders_table_only_what_is_measured_or_commanded_is_proposed(tmp_p
     body = inspect_log(tmp_path / "a.dat").proposal.body
     assert {s: i["column"] for s, i in body["signals"].items()} == {"yaw_rad": "m_heading", "rudder_rad": "c_fin"}
     assert body["time"]["unit"] == "s"
+
+
+def test_a_table_written_from_messages_gives_its_quaternion_and_its_vectors(tmp_path):
+    yaw = 0.4 + TRUTH["yaw_rad"]  # of a message's frame: from east, against the clock
+    stem = "field.pose.pose.orientation."
+    columns = {
+        "%time": 1.7e18 + 1e9 * TIME,
+        "field.header.seq": np.arange(TIME.size),
+        "field.pose.pose.position.x": 1.5 * TIME,
+        "field.pose.pose.position.y": 0.3 * TIME,
+        **{f"{stem}{p}": v for p, v in zip("xyzw", (0 * yaw, 0 * yaw, np.sin(yaw / 2), np.cos(yaw / 2)), strict=True)},
+        "field.twist.twist.linear.x": TRUTH["surge_m_s"],
+        "field.twist.twist.angular.z": TRUTH["yaw_rate_rad_s"],
+        "rudder": TRUTH["rudder_rad"],
+    }
+    log = tmp_path / "echo.csv"
+    rows = "\n".join(",".join(f"{v:.9f}" for v in row) for row in zip(*columns.values(), strict=True))
+    log.write_text(",".join(columns) + "\n" + rows + "\n")
+    body = inspect_log(log).proposal.body
+    assert body["frame"] == "ENU/FLU"
+    assert body["signals"]["attitude"] == {"columns": [stem + p for p in "xyzw"]}
+    run = load_run(log, write_proposal(inspect_log(log), tmp_path / "m.yaml"))
+    np.testing.assert_allclose(np.diff(run["yaw_rad"]), -np.diff(yaw), atol=1e-7)
+    np.testing.assert_allclose(run["yaw_rate_rad_s"], -TRUTH["yaw_rate_rad_s"], atol=1e-8)
+
+
+def test_a_vector_of_four_numbers_that_is_no_rotation_is_none(tmp_path):
+    log = tmp_path / "four.csv"
+    rows = "\n".join(f"{0.1 * i},0.1,0.2,{i},4,{0.01 * i}" for i in range(60))
+    log.write_text(f"time,a_x,a_y,a_z,a_w,heading\n{rows}\n")
+    assert "attitude" not in inspect_log(log).proposal.body["signals"]
+
+
+@pytest.mark.parametrize("name", ["PHI_HOST_PORT_DB", "yaw_gain", "u(2)", "x(3)"])
+def test_names_that_hold_a_symbol_of_another_thing_name_no_signal(name):
+    assert meaning_of(name) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "signal"), [("/auv/nav/state phi", "roll_rad"), ("est_psi_rad", "yaw_rad"), ("yaw (deg)", "yaw_rad")]
+)
+def test_symbols_and_units_still_name_theirs(name, signal):
+    assert meaning_of(name)[0] == signal
+
+
+def test_a_roll_of_thousands_of_degrees_is_something_else(tmp_path):
+    log = tmp_path / "port.csv"
+    log.write_text("time,heading,roll\n" + "".join(f"{0.1 * i},{i},9001\n" for i in range(60)))
+    assert "roll_rad" not in inspect_log(log).proposal.body["signals"]
+
+
+def planar(name):
+    fields = tuple(FieldInfo(path, "float64", (0.1, 0.2)) for path in ("x", "y", "theta"))
+    return {g.signal: g for g in of_topic(ChannelInfo(name, "geometry_msgs/msg/Pose2D", 100, 10.0, fields))}
+
+
+def test_a_pose_in_the_plane_gives_x_y_and_heading_and_a_commanded_one_the_goal():
+    assert planar("/NED_pose").keys() == {"x_m", "y_m", "yaw_rad"}
+    assert planar("/ref").keys() == {"yaw_goal_rad"}
+    assert planar("/NED_pose")["x_m"].sure > planar("/ins_pose")["x_m"].sure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,8 @@ Fields = dict[str, list[tuple[str, Any]]]
 _IDL_RULE = "=" * 80 + "\n"
 DEEPEST = 4
 """Folders below the bag's that .msg files are looked for in, as in `workspace/src/package/msg`."""
+MOST_PARSED = 256
+"""Definitions that are kept: more than the topics of any bag seen."""
 MOST_FOLDERS = 2000
 """Folders beside a bag that are looked into: a bag in a home folder must not start a search of it all."""
 
@@ -167,7 +169,9 @@ def _beside(root: Path, connection: Connection, search: DefinitionSearch) -> Fie
     return _of_files(files, connection)
 
 
+@lru_cache(maxsize=MOST_PARSED)
 def _parsed(text: str, name: str, language: str) -> Fields:
+    """Return what a definition says, parsed once: topics share types, and a log is read again for its mapping."""
     try:
         if language == "idl":
             types: dict[str, Any] = {}

@@ -47,7 +47,10 @@ class TopicSeries:
             return self.header
         if source.stamp == "header":
             found = "stamps that are all zero" if self.header is not None else f"{self.connection.type_name} has no header"
-            raise MappingError(f"topic `{self.connection.topic}` has no header stamps", found=found, hint="use `stamp: receive`")
+            signal = next(name for name, known in self.sources.items() if known is source)
+            raise MappingError(
+                f"topic `{self.connection.topic}` has no header stamps", found=found, hint=f"use `stamp: receive` at `{signal}`"
+            )
         return self.received
 
     def series(self, signal: str, stamps: Stamps, origin: int) -> Series:
