@@ -18,7 +18,7 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.yaw_plant import steady_fins
-from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, coefficients, simulate
+from fieldsid.turning.maneuvering.equations import coefficients, simulate
 from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
 from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
 from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
@@ -106,7 +106,7 @@ class Belief:
         path[0, 0] = 0.0
         best = coefficients(self.fitted.vector)
         first = np.array([[entry, 0.0, 0.0]])
-        motion = simulate(best, entry, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), STATIONS, HEIGHTS)
+        motion = simulate(best, entry, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size))
         u, v, heading = motion[SURGE], motion[SWAY], motion[HEADING]
         along, across = u * np.cos(heading) - v * np.sin(heading), u * np.sin(heading) + v * np.cos(heading)
         whole = np.cumsum(np.stack([along, across, np.hypot(u, v)]), axis=1) * TRACK_STEP_S

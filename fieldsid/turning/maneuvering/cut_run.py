@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, simulate
+from fieldsid.turning.maneuvering.equations import simulate
 from fieldsid.turning.maneuvering.flown import HEADING, RATE, SURGE, SWAY, FlownRun
 
 OWN = 3
@@ -41,7 +41,7 @@ class CutRun:
         """Return measured less simulated (4, n) with coefficients p and nuisances `local`, NaN where nothing was measured."""
         run, states = self.run, local[OWN:].reshape(-1, 3)
         straight = max(float(local[0]), LEAST_STRAIGHT_M_S)
-        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust, STATIONS, HEIGHTS)
+        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust)
         out[RATE] += local[1]
         out[HEADING] += local[1]
         out[SWAY] += local[2]
