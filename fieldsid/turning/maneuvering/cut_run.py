@@ -21,8 +21,8 @@ OWN = 3
 """Nuisances of a run before its segments': straight speed, bias of the rate, bias of the sway."""
 SWAY_BIAS_SD = 0.02
 """m/s: what a Doppler log may be off by across the hull."""
-START_SD = 0.3
-"""Prior of a segment's first state and of the straight speed about those measured: m/s, and rad/s."""
+STATE_SD = 0.3
+"""Prior of a segment's first state about that measured: m/s, and rad/s."""
 LEAST_STRAIGHT_M_S = 0.05
 LARGEST_RESIDUAL = 1e6
 """Weighted residuals are clipped here where a simulation has left the water."""
@@ -88,5 +88,5 @@ def cut_run(run: FlownRun, segment_s: float) -> CutRun:
                 states[i, j] = np.mean(values[np.isfinite(values)])
             elif channel == SURGE:
                 states[i, j] = run.speed
-    spread = np.concatenate([[START_SD, run.rate_bias_sd, SWAY_BIAS_SD], np.full(states.size, START_SD)])
+    spread = np.concatenate([[run.speed_sd, run.rate_bias_sd, SWAY_BIAS_SD], np.full(states.size, STATE_SD)])
     return CutRun(run, begins, np.concatenate([[run.speed, 0.0, 0.0], states.ravel()]), 1.0 / spread)
