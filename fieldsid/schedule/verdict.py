@@ -180,4 +180,5 @@ def lost(source: ParameterSource) -> tuple[str, ...]:
     if not source.models:
         return ("a table carries no effects",)
     left = not_counted(source.models)
-    return (f"not counted in full: {', '.join(left)}",) if left else ()
+    unsure = [f"left out, its fin's sign not known: {', '.join(source.left_out)}"] if source.left_out else []
+    return (*([f"not counted in full: {', '.join(left)}"] if left else []), *unsure)
