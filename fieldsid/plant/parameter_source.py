@@ -258,6 +258,8 @@ def _of_known_sign(models: Sequence[Model]) -> list[int]:
     One that cannot be told from zero does not say which way the fin turns; where those that do disagree, all stay, to be refused.
     """
     name = NAMES[models[0].axis].authority
+    if any(m.axis is not models[0].axis for m in models):
+        return list(range(len(models)))
     values, errors = np.array([m.values[name] for m in models]), np.array([m.std_error(name) for m in models])
     known = ~(np.abs(values) < SIGN_STD_ERRORS * errors)
     agree = np.unique(np.sign(values[known])).size == 1
