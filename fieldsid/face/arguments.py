@@ -116,7 +116,7 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     named = logs_of(source.paths)
     runs = [run for run in (attempt(load_run, path) for path in named if path.exists()) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
-        say(f"{len(named) - len(runs)} of {len(named)} runs of the models cannot be read again: they show the speed lost")
+        say(f"{len(named) - len(runs)} of {len(named)} runs of the models cannot be read again: they show how the vehicle turns")
     return runs
 
 

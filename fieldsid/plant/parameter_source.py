@@ -31,6 +31,8 @@ from fieldsid.rounding import nine_digits
 MAX_PROPOSALS = 40
 LEAST_SHARE = 0.05
 """A draw keeps the sign of damping and authority, and this share of the estimate: no plant turns the other way."""
+SIGN_STD_ERRORS = 3.0
+"""Within so many of zero the sign of an authority is not known; `identify` calls it unclear then."""
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 
 
@@ -38,7 +40,8 @@ TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 class ParameterSource(Brief):
     """Points of one axis at rising speeds; the models they came from (none for a table); laws where two speeds allow them.
 
-    A fit file carries its models, and its laws are those of the file.
+    A fit file carries its models, and its laws are those of the file. `left_out` are models of which not even the sign of the
+    authority is known, and that have another than the rest.
     """
 
     axis: Axis
@@ -50,6 +53,7 @@ class ParameterSource(Brief):
     own_laws: tuple[str, ...] = ()
     runs_flown: tuple[float, float] | None = None
     is_fit_file: bool = False
+    left_out: tuple[str, ...] = ()
 
     @property
     def speeds(self) -> FloatArray:
@@ -241,8 +245,27 @@ def source_of_models(
     """Return the source of models with a name each; raises UsageError and DataError as `load_parameter_source` does."""
     if not models:
         raise UsageError("nothing to work on", found="no model", hint="give models, or the files of models")
-    axis, points = points_of(models, names)
-    return _with_laws(axis, points, tuple(models), tuple(names), paths, laws)
+    kept = _of_known_sign(models)
+    axis, points = points_of([models[i] for i in kept], [names[i] for i in kept])
+    left_out = tuple(names[i] for i in range(len(models)) if i not in kept)
+    source = _with_laws(axis, points, tuple(models[i] for i in kept), tuple(names[i] for i in kept), paths, laws)
+    return replace(source, left_out=left_out)
+
+
+def _of_known_sign(models: Sequence[Model]) -> list[int]:
+    """Return the places of the models to take: all, or where their authorities disagree in sign those whose own is known.
+
+    One that cannot be told from zero does not say which way the fin turns; where those that do disagree, all stay, to be refused.
+    """
+    name = NAMES[models[0].axis].authority
+    if any(m.axis is not models[0].axis for m in models):
+        return list(range(len(models)))
+    values, errors = np.array([m.values[name] for m in models]), np.array([m.std_error(name) for m in models])
+    known = ~(np.abs(values) < SIGN_STD_ERRORS * errors)
+    agree = np.unique(np.sign(values[known])).size == 1
+    if np.unique(np.sign(values)).size == 1 or not agree:
+        return list(range(len(models)))
+    return [int(i) for i in np.flatnonzero(known)]
 
 
 def source_of_laws(

@@ -42,6 +42,8 @@ class LinearPlant:
     `quadratic`, `beyond_square`, `crossflow`, `cross_quadratic`, `powers` and `speed_loss` act in time simulations only.
     `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited. `powers` (d, 6)
     are the exponents of the speed, by POWERS; `speed_loss` (d, 3) is drag a_u (1/m), the fin's and the turn's loss over it.
+    Where the draws are those of a vehicle in surge, sway and yaw, `hull` (d, 22) are its coefficients
+    (`turning/maneuvering/equations.py`): flights are of these, and the rest is what they are about a straight run.
     """
 
     axis: Axis
@@ -62,6 +64,7 @@ class LinearPlant:
     fin_rate: FloatArray
     powers: FloatArray
     speed_loss: FloatArray
+    hull: FloatArray | None = None
 
     @property
     def count(self) -> int:
@@ -75,7 +78,7 @@ class LinearPlant:
     def pick(self, index: npt.NDArray[np.int_]) -> LinearPlant:
         """Return some draws."""
         parts: dict[str, Any] = {n: getattr(self, n)[index] for n in PARTS}
-        return replace(self, **parts)
+        return replace(self, **parts, hull=None if self.hull is None else self.hull[index])
 
     def joined(self, other: LinearPlant) -> LinearPlant:
         """Return the draws of both."""
@@ -84,7 +87,7 @@ class LinearPlant:
 
     def distinct(self) -> LinearPlant:
         """Return the estimate alone where all draws are alike, else all of them."""
-        same = all(bool((getattr(self, n) == getattr(self, n)[:1]).all()) for n in PARTS)
+        same = self.hull is None and all(bool((getattr(self, n) == getattr(self, n)[:1]).all()) for n in PARTS)
         return self.one() if same else self
 
     def response(self, omega: FloatArray) -> ComplexArray:

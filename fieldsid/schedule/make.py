@@ -17,11 +17,10 @@ from fieldsid.plant.remedies import in_radians, wider_fin
 from fieldsid.runtime.worker_pool import parallel_map
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import Wish, check_wish, design_gains
-from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.margins import margins
+from fieldsid.schedule.plants import Plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
-from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
 DESIGN_DRAWS = 24
 SEED = 41
@@ -46,8 +45,8 @@ def design_schedule(
 ) -> Schedule:
     """Return the schedule of a source's axis at its speeds (or those given, m/s), fin limited to +/-fin_limit rad.
 
-    runs are those the models came from: the speed lost in a turn is identified from them. Raises UsageError for what cannot be
-    meant and ModelError where no gain holds the loop.
+    runs are those the models came from: the vehicle in surge, sway and yaw is identified from them. Raises UsageError for what
+    cannot be meant and ModelError where no gain holds the loop.
     """
     wish, limits = wish or Wish(), limits or FinLimits()
     check_wish(wish)
@@ -60,10 +59,10 @@ def design_schedule(
         raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
-    surge = fit_surge(runs) if runs and source.axis is Axis.YAW else None
+    plants = plants_of(source, limits, runs)
 
     def made(speed: float) -> Row:
-        return _row(source, speed, fin_limit, wish, limits, surge, depth=depth)
+        return _row(plants, speed, fin_limit, wish, depth=depth)
 
     rows = tuple(parallel_map(made, knots))
     return Schedule(
@@ -74,7 +73,7 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=actuator_of(source, limits),
-        provenance=_provenance(source, wish, surge, knots),
+        provenance=_provenance(source, wish, plants.says, knots),
         stated=limits.record(),
     )
 
@@ -86,18 +85,10 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
     return knots
 
 
-def _row(
-    source: ParameterSource,
-    speed: float,
-    fin_limit: float,
-    wish: Wish,
-    limits: FinLimits,
-    surge: SurgeModel | None,
-    *,
-    depth: bool,
-) -> Row:
-    plants = [(slowing(p, surge, fin_limit, SEED), w) for p, w in plants_at(source, speed, limits, DESIGN_DRAWS, SEED)]
-    made = [(design_gains(plant, wish, fin_limit), plant, share) for plant, share in plants]
+def _row(plants: Plants, speed: float, fin_limit: float, wish: Wish, *, depth: bool) -> Row:
+    near = plants.at(speed, fin_limit, DESIGN_DRAWS, SEED)
+    noise = plants.noise_at(speed)
+    made = [(design_gains(plant, wish, fin_limit, noise), plant, share) for plant, share in near]
     gains, forward, reference, depth_gain, slowed = Gains(0.0), 0.0, 0.0, 0.0, 1.0
     for designed, plant, share in made:
         own = designed.gains.times(share)
@@ -110,7 +101,7 @@ def _row(
     phase, gain, delay = (min(w[i] for w in worst) for i in range(3))
     gains = Gains(float(gains.kp), float(gains.ki), float(gains.kd))
     return Row(
-        float(speed), gains, forward, reference, fin_limit, depth_gain if depth else 0.0, source.supports(speed), slowed,
+        float(speed), gains, forward, reference, fin_limit, depth_gain if depth else 0.0, plants.source.supports(speed), slowed,
         phase, gain, delay, min(d.held for d, _, _ in made), max(d.settling for d, _, _ in made),
     )  # fmt: skip
 
@@ -138,7 +129,7 @@ def actuator_of(source: ParameterSource, limits: FinLimits) -> dict[str, float |
     return own | {name: value for name, value in limits.record().items() if value is not None}
 
 
-def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None, knots: Sequence[float]) -> dict[str, Any]:
+def _provenance(source: ParameterSource, wish: Wish, speed_lost: str, knots: Sequence[float]) -> dict[str, Any]:
     names = NAMES[source.axis]
     sign = float(np.sign(source.base_at(float(source.speeds[0]))[names.authority]))
     low, high = float(source.speeds[0]), float(source.speeds[-1])
@@ -148,7 +139,7 @@ def _provenance(source: ParameterSource, wish: Wish, surge: SurgeModel | None, k
         "runs": [r for m in source.models for r in m.runs],
         "effects": sorted({e for m in source.models for e in m.effects}),
         "effects_not_counted": list(not_counted(source.models)),
-        "speed_lost": speed_kept_said(source.axis, surge),
+        "speed_lost": speed_lost,
         "draws": DESIGN_DRAWS,
         "draws_rejected": max(source.share_rejected(speed, DESIGN_DRAWS, SEED) for speed in knots),
         "schedule_variable": "speed_m_s: forward speed through the water, m/s",

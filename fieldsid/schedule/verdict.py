@@ -17,9 +17,9 @@ from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import (
     DEPTH_STEP_M,
     DEPTH_STEP_S,
+    LONGEST_STEP_S,
     READ_OFF,
     STEP_ANGLE_RAD,
-    STEP_DURATION_S,
     Verification,
     stated_limits,
 )
@@ -92,7 +92,7 @@ def _settles(checked: Verification, step: float) -> str:
     """Return how long a step (deg) takes to settle where it takes longest, by the estimate and over the draws."""
     slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
     by_draws = (
-        f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {STEP_DURATION_S:.0f} s"
+        f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {LONGEST_STEP_S:.0f} s"
     )
     return f"a {step:.0f} deg step settles within {slowest:.1f} s at every speed" + (f", {by_draws}" if checked.spread else "")
 
@@ -111,7 +111,7 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     if unheld.draws_held < HELD_SHARE and not found and checked.spread:
         found.append(f"at {number(unheld.speed, 3)} m/s it holds {100 * unheld.draws_held:.0f} % of the draws it was designed on")
     if not isfinite(slowest.settling):
-        found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {STEP_DURATION_S:.0f} s")
+        found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {LONGEST_STEP_S:.0f} s")
     deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
     if deepest is not None and not isfinite(deepest.depth_settling):
         where = f"at {number(deepest.speed, 3)} m/s a {DEPTH_STEP_M:.0f} m depth step"
@@ -136,7 +136,7 @@ def against_constant(checked: Verification) -> str:
 
 
 def _seconds(value: float) -> str:
-    return f"{value:.1f} s" if isfinite(value) else f"more than {STEP_DURATION_S:.0f} s"
+    return f"{value:.1f} s" if isfinite(value) else f"more than {LONGEST_STEP_S:.0f} s"
 
 
 def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:
@@ -180,4 +180,5 @@ def lost(source: ParameterSource) -> tuple[str, ...]:
     if not source.models:
         return ("a table carries no effects",)
     left = not_counted(source.models)
-    return (f"not counted in full: {', '.join(left)}",) if left else ()
+    unsure = [f"left out, its fin's sign not known: {', '.join(source.left_out)}"] if source.left_out else []
+    return (*([f"not counted in full: {', '.join(left)}"] if left else []), *unsure)

@@ -19,6 +19,7 @@ from fieldsid.runtime.worker_pool import parallel_map
 from fieldsid.schedule.best_constant import best_constant, held_at
 from fieldsid.schedule.flown.response import (
     LIMIT_CYCLE_SHARE,
+    SETTLING_BAND,
     Steps,
     about_rest,
     depth_response,
@@ -28,12 +29,11 @@ from fieldsid.schedule.flown.response import (
     step_response,
     swing,
 )
-from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.flown.straight_leg import straight_leg
-from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant, family_at
+from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
 from fieldsid.schedule.margins import control_margins, margins, worst_of
+from fieldsid.schedule.plants import plants_of
 from fieldsid.schedule.record import Row, Schedule
-from fieldsid.turning.steady.speed_loss import fit_surge
 
 VERIFY_DRAWS = 60
 SEED = 77
@@ -47,6 +47,12 @@ STEPS_RAD = {
 FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
 STEP_DURATION_S = 60.0
+LONGEST_STEP_S = 240.0
+"""A large hull with small fins needs 50 s for 90 deg of heading: a step is flown longer until it has come to rest."""
+FLIGHT_ERROR_SHARE = 0.01
+"""What a flight is off its model's by, over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less
+than said, which is half a swing of settling where an overshoot just touches the corridor."""
+AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
 DEPTH_STEP_S = 120.0
 PITCH_LIMIT_RAD = 0.3490658503988659
@@ -57,8 +63,9 @@ class StepCheck(Brief):
     """A step of one size (rad) by the estimate and by 95 % of the draws: overshoot as a share of it, settling in s (5 %).
 
     Those of the draws are about where each comes to rest; `off` (rad) is how far that is from what was asked, by 95 % of them:
-    what a trim that is not known to better leaves. `swing` is what still swings in the last quarter, peak to peak as a share of
-    the step, by 95 % of the draws.
+    what a trim that is not known to better leaves. `settling_median` and `settling95` (s) are the middle of the draws and the
+    band that holds 95 % of them: settling jumps by half a swing where an overshoot just leaves the corridor. `swing` is what
+    still swings in the last quarter, peak to peak as a share of the step, by 95 % of the draws.
     """
 
     size: float
@@ -66,6 +73,8 @@ class StepCheck(Brief):
     overshoot_most: float
     settling: float
     settling_most: float
+    settling_median: float
+    settling95: tuple[float, float]
     swing: float
     off: float
 
@@ -74,7 +83,8 @@ class StepCheck(Brief):
         return {
             "step_rad": self.size, "overshoot_percent": 100 * self.overshoot,
             "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
-            "settling_most_s": self.settling_most, "swing_percent": 100 * self.swing,
+            "settling_most_s": self.settling_most, "settling_median_s": self.settling_median,
+            "settling_interval95_s": list(self.settling95), "swing_percent": 100 * self.swing,
             "steady_error_most_rad": self.off,
         }  # fmt: skip
 
@@ -186,7 +196,8 @@ class Verification(Plotted):
     disturbance: float
     """Where the speed lost in the turn comes from; the rms of the models' disturbance moment, rad/s^2, zero for none."""
     unstable: bool
-    """Whether the hull alone is unstable at one of the speeds: how it settles hangs on what a model leaves out."""
+    """Whether the hull alone is unstable at one of the speeds, and each speed has a model of its own: how it settles then hangs
+    on what that leaves out."""
 
     @property
     def worst(self) -> dict[str, float]:
@@ -215,19 +226,16 @@ def verify_schedule(
 ) -> Verification:
     """Fly a schedule on the parameters it was made from, with their errors, at its knots and midway between them.
 
-    runs are those the models came from: the speed lost in a turn is identified from them.
+    runs are those the models came from: the vehicle in surge, sway and yaw is identified from them.
     """
     limits = limits or stated_limits(schedule)
-    surge = fit_surge(runs) if runs and schedule.axis is Axis.YAW else None
+    of = plants_of(source, limits, runs)
     places = checked_speeds(schedule)
-    plants = [
-        slowing(family_at(source, speed, limits, draws, SEED + 10 * i), surge, schedule.at(speed).fin_limit, SEED + i)
-        for i, (speed, _) in enumerate(places)
-    ]
+    plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
     constant = best_constant(schedule, plants, step=STEP_ANGLE_RAD[schedule.axis], seconds=STEP_DURATION_S)
 
     def checked(i: int) -> tuple[Check, Check, FlownSet]:
-        (speed, knot), plant, noise = places[i], plants[i], _noise_at(source, places[i][0])
+        (speed, knot), plant, noise = places[i], plants[i], of.noise_at(places[i][0])
         one, steps, leg = _check(plant, schedule.at(speed), schedule.rows, schedule, noise, knot=knot, constant=False)
         held = held_at(constant, schedule, speed)
         other, theirs, _ = _check(plant, held, (held,), schedule, noise, knot=knot, constant=True)
@@ -235,17 +243,9 @@ def verify_schedule(
 
     scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
-    kept, heard = speed_kept_said(schedule.axis, surge), max((m.noise.disturbance for m in source.models), default=0.0)
-    unstable = any(float(p.growth[0]) > 0.0 for p in plants)
+    kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
+    unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
     return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable)
-
-
-def _noise_at(source: ParameterSource, speed: float) -> Noise | None:
-    """Return the noise of the model that counts most at a speed, None for a table."""
-    if not source.models:
-        return None
-    nearest, _ = max(source.near(speed), key=lambda at: at[1])
-    return source.models[nearest].noise
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
@@ -267,12 +267,12 @@ def _check(
     phase, gain, delay = control_margins(plant, row.gains)
     found = margins(plant, row.gains)
     least_phase, least_gain, least_delay = found.worst()
-    flights = [step_response(plant, rows, reference=size, seconds=STEP_DURATION_S) for size in STEPS_RAD[schedule.axis]]
+    flights = [_flown_to_rest(plant, rows, size) for size in STEPS_RAD[schedule.axis]]
     small, usual, large = (_step(s, size) for s, size in zip(flights, STEPS_RAD[schedule.axis], strict=True))
     known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
     bent, unknown = (step_response(one, r, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD) for r in (known, rows))
-    leg = straight_leg(plant, rows, noise)
+    leg = straight_leg(one, rows, noise)
     depth_over, depth_settled = _depth(one, rows) if schedule.depth else (float("nan"), float("nan"))
     check = Check(
         row.speed, knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
@@ -281,15 +281,32 @@ def _check(
         float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
         float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled,
     )  # fmt: skip
-    return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg.one()
+    return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
+
+
+def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row] | Row, size: float) -> Steps:
+    """Return a step flown longer where it has not come to rest: what is slow does then, what hunts goes on."""
+    for seconds in (STEP_DURATION_S, 2.0 * STEP_DURATION_S, LONGEST_STEP_S):
+        flight = step_response(plant, rows, reference=size, seconds=seconds)
+        if worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
+            break
+    return flight
 
 
 def _step(flown: Steps, size: float) -> StepCheck:
     moved, off = about_rest(flown.angle, size), np.abs(steady_error(flown.angle, size))
-    over, settled, left = overshoot(moved, size), settling(flown.time, moved, size), swing(flown.angle, size)
+    over, left = overshoot(moved, size), swing(flown.angle, size)
+    settled, wide, narrow = (
+        np.where(off < size, settling(flown.time, moved, size, band), np.inf)
+        for band in (SETTLING_BAND, SETTLING_BAND + FLIGHT_ERROR_SHARE, SETTLING_BAND - FLIGHT_ERROR_SHARE)
+    )
     over[0], settled[0] = overshoot(flown.angle, size)[0], settling(flown.time, flown.angle, size)[0]  # its trim is known
     most = [worst_of(part, most=True) for part in (over, settled, left, off)]
-    return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], most[2], most[3])
+    low, middle, high = (
+        float(np.quantile(of, share, method="closest_observation"))
+        for of, share in ((wide, 0.025), (settled, 0.5), (narrow, 0.975))
+    )
+    return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], middle, (low, high), most[2], most[3])
 
 
 def _trimmed(row: Row, fin: float) -> Row:

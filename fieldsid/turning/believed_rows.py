@@ -11,10 +11,9 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 from fieldsid.turning.prediction import SIDES, TurnRow, settling_flight
-from fieldsid.turning.steady.blended_turns import blended_turns
+from fieldsid.turning.steady.blended_turns import blended_radius
 from fieldsid.turning.steady.speed_loss import SurgeModel
 
-SEED = 20240511
 MAX_IDENTIFIED_WIDTH = 0.35
 """Widest band of a turn that counts as identified, over the radius."""
 LEAST_EFFECTIVE = 10.0
@@ -30,11 +29,9 @@ def believed_rows(
 
     Raises ModelError where nothing that the runs allow has a settled turn.
     """
-    own = blended_turns(source, np.array(speeds, dtype=np.float64), rudder, surge, 1, np.random.default_rng(SEED))
+    own = blended_radius(source, np.array(speeds, dtype=np.float64), rudder, surge)
     return [
-        _believed_row(
-            source, belief, belief.turn(float(speed), rudder, sign), float(own[side].radius[0, i]), float(speed), side, rudder
-        )
+        _believed_row(source, belief, belief.turn(float(speed), rudder, sign), float(own[side][i]), float(speed), side, rudder)
         for side, sign in SIDES.items()
         for i, speed in enumerate(speeds)
     ]

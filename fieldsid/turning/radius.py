@@ -16,6 +16,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.maneuvering.belief import Belief, believe
+from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD
 from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
 from fieldsid.turning.paper_formulas import (
@@ -36,6 +37,8 @@ METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
 REPEATED_SD = 0.005
 """Share by which a circle differs from one flight to the next: hulls of the ensemble (seed 1) were 0.1 to 0.3 % off the truth in
 a water that turns them with a hundredth of the rudder's moment, at the very speed and rudder asked for."""
+LEAST_HELD_FIN_RAD = 0.01
+"""A circle with less rudder is that of a trim, or of a current."""
 MIN_REPORTED_OFFSET_RAD = 0.0025
 """An offset in rad that moves a radius by a hundredth."""
 
@@ -71,24 +74,7 @@ def turn_radius(
             found=f"--law {', '.join(source.own_laws)}",
             hint="add `--method u_turn`, or leave `--law` out",
         )
-    belief = before = None
-    unfitted: list[Note] = []
-    if chosen in ("simulated", "maneuvering") and method != "simulated" and runs:
-        rng = np.random.default_rng(SEED)
-        try:
-            before = believe(runs, source.models, length, rng)
-            belief = believe((*runs, *measured), source.models, length, rng) if measured else before
-        except ModelError as error:
-            if method == "maneuvering":
-                raise
-            belief = before = None
-            words = f"{error.what}: {error.found}; each speed's own model is simulated instead"
-            unfitted.append(Note("maneuvering_not_fitted", words, {"runs": [run.name for run in runs]}))
-    if method == "maneuvering" and belief is None:
-        raise UsageError(
-            "surge, sway and yaw cannot be fitted without runs that have a speed, a fin and a turn", found=f"{len(runs)} runs",
-            hint="name them with `--runs`, with surge_m_s mapped",
-        )  # fmt: skip
+    before, belief, unfitted = _beliefs(source, runs, measured, length, method, chosen)
     surge = fit_surge(runs) if chosen in ("simulated", "maneuvering") and runs else None
     turns, lacking = _circles(measured, unfit, needed=belief is None)
 
@@ -104,11 +90,37 @@ def turn_radius(
         _refuse_turns(source, speeds, rudder_max)
     rows = rows_at(speeds, rudder_max, belief)
     least = (lambda _speed: 0.0) if not by_formula else (lambda speed: abs(_offset(source, speed)))
-    compared = [_compared(turn, rows_at, least) for turn in turns]
+    against = [turn for turn in turns if _against_rudder(turn, source)]
+    lacking += [_turned_against(turn) for turn in against]
+    compared = [_compared(turn, rows_at, least) for turn in turns if not any(turn is other for other in against)]
     rows = [_with_measurement(row, compared, rudder_max) for row in rows]
     return TurnPrediction(
         tuple(rows), tuple(compared), rudder_max, surge, (*unfitted, *lacking, *_notes(source, rows, chosen, surge, fin_zero))
     )
+
+
+def _beliefs(
+    source: ParameterSource, runs: Sequence[Run], measured: Sequence[Run], length: float | None, method: str, chosen: str
+) -> tuple[Belief | None, Belief | None, list[Note]]:
+    """Return what runs alone and all together make believe, None where nothing is asked of them, and a note where no fit is."""
+    before = belief = None
+    notes: list[Note] = []
+    if chosen in ("simulated", "maneuvering") and method != "simulated" and runs:
+        try:
+            before = believe(runs, source.models, length)
+            belief = believe((*runs, *measured), source.models, length) if measured else before
+        except ModelError as error:
+            if method == "maneuvering":
+                raise
+            before = belief = None
+            words = f"{error.what}: {error.found}; each speed's own model is simulated instead"
+            notes.append(Note("maneuvering_not_fitted", words, {"runs": [run.name for run in runs]}))
+    if method == "maneuvering" and belief is None:
+        raise UsageError(
+            "surge, sway and yaw cannot be fitted without runs that have a speed, a fin and a turn", found=f"{len(runs)} runs",
+            hint="name them with `--runs`, with surge_m_s mapped",
+        )  # fmt: skip
+    return before, belief, notes
 
 
 def _circles(measured: Sequence[Run], unfit: Refused[Run] | None, *, needed: bool) -> tuple[list[MeasuredTurn], list[Note]]:
@@ -284,12 +296,23 @@ def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, qu
     return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
 
 
+def _against_rudder(turn: MeasuredTurn, source: ParameterSource) -> bool:
+    """Return whether a circle was turned away from its rudder, as an unstable hull may: a run, and not the rudder's circle."""
+    way = float(np.sign(source.base_at(float(source.speeds[0]))[NAMES[Axis.YAW].authority])) * turn.fin
+    return bool(np.isfinite(way)) and abs(turn.fin) > LEAST_HELD_FIN_RAD and (way > 0.0) != (turn.side == "starboard")
+
+
+def _turned_against(turn: MeasuredTurn) -> Note:
+    words = f"{turn.run} turned to {turn.side} with a rudder of {turn.fin:.3g} rad to the other side: it is not compared"
+    return Note("turned_against_rudder", words, {"runs": [turn.run]})
+
+
 def _compared(
     turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
 ) -> MeasuredRow:
     """Return a measured turn with its prediction; there is none where its fin is below the least one predicted at its speed."""
     speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
-    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(0.01, least(speed))):
+    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(speed))):
         nan = float("nan")
         return MeasuredRow(turn, nan, (nan, nan))
     row = next(r for r in rows_at([speed], abs(turn.fin)) if r.side == turn.side)
@@ -297,9 +320,13 @@ def _compared(
 
 
 def _with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: float) -> TurnRow:
-    """Return the row with the measured radius where a circle was flown at this speed, side and rudder."""
+    """Return the row with the measured radius where a circle was flown at this speed, side and rudder.
+
+    A u-turn ends before it has settled, and what carried it is not known: a belief has it among its runs, and is nearer.
+    """
     for m in measured:
-        if m.entered(row.speed, row.side) and m.held(rudder):
+        whole = row.method != "maneuvering" or abs(m.turn.circle.turned) >= LEAST_TURN_FOR_CURRENT_RAD
+        if whole and m.entered(row.speed, row.side) and m.held(rudder):
             return replace(
                 row,
                 radius=m.turn.circle.radius,
@@ -366,6 +393,9 @@ def _notes(
         notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 50 %)"))
     if method == "u_turn":
         notes += _offset_notes(source, fin_zero)
+    if source.left_out:
+        words = f"the sign of its {NAMES[Axis.YAW].authority} is not known, and it is another than elsewhere: left out"
+        notes.append(Note("model_left_out", f"{', '.join(source.left_out)}: {words}", {"models": list(source.left_out)}))
     return notes
 
 

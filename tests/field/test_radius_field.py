@@ -59,3 +59,29 @@ def test_measured_circle_is_the_true_one_within_half_a_percent(shared_data, trut
     turn = measure_turn(load_run(shared_data / "lauv" / f"{kind}_v{v}.csv.gz"))
     assert turn.circle.radius == pytest.approx(truth["speeds"][v][kind]["R_circle_m"], rel=0.005)
     assert turn.side == ("port" if kind == "circle_port" else "starboard")
+
+
+def test_a_u_turn_at_one_speed_helps_the_others_and_is_no_settled_circle(tmp_path, shared_data, truth):
+    source, runs = models(tmp_path, shared_data, ("rudder",), EFFECTS)
+    u_turn = load_run(shared_data / "lauv" / "uturn_v1.50.csv.gz")
+    speeds = [float(v) for v in SPEEDS]
+    alone = turn_radius(source, speeds, truth["delta_max_rad"], runs=runs)
+    helped = turn_radius(source, speeds, truth["delta_max_rad"], runs=runs, measured=[u_turn])
+    for before, row in zip(alone.rows, helped.rows, strict=True):
+        side = "circle_stbd" if row.side == "starboard" else "circle_port"
+        wanted = truth["speeds"][f"{row.speed:.2f}"][side]["R_circle_m"]
+        assert row.trust == "identified"
+        assert row.radius == pytest.approx(wanted, rel=0.03), (row.speed, row.side)
+        assert row.interval95[0] <= wanted <= row.interval95[1], (row.speed, row.side)
+        assert row.interval95[1] - row.interval95[0] < 0.6 * (before.interval95[1] - before.interval95[0])
+
+
+def test_a_circle_at_half_rudder_counts_as_a_run(tmp_path, shared_data, truth):
+    source, runs = models(tmp_path, shared_data, ("rudder",), EFFECTS)
+    half = load_run(shared_data / "lauv" / "circle_half_stbd_v1.50.csv.gz")
+    (starboard,) = (
+        r for r in turn_radius(source, [1.5], truth["delta_max_rad"], runs=runs, measured=[half]).rows if r.side == "starboard"
+    )
+    wanted = truth["speeds"]["1.50"]["circle_stbd"]["R_circle_m"]
+    assert starboard.trust != "measured"
+    assert starboard.radius == pytest.approx(wanted, rel=0.04)

@@ -4,6 +4,7 @@ Every hull is drawn, flown with sensor noise, identified, and turned to both sid
     python tests/truth/radius_table.py --draws 300 --seed 7 --json rows.json [--minutes 8] [--sets pulses,pulses+zigzag]
     python tests/truth/radius_table.py --pool rows.json more.json
 Rows are saved after every hull; the same command goes on where the last one ended, after so many minutes if asked to.
+Further sets: pulses+uturn, pulses+half, "pulses+zigzag by rpm".
 Of every fourteen hulls seven log no sway. Seed 1 is that of the prior (`radius_prior.py`): measure with another.
 """
 
@@ -30,10 +31,10 @@ from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.turning.radius import turn_radius
 from truth.maneuvering.hulls import KINDS, Hull, draw_hull
 from truth.maneuvering.motion import true_turn
-from truth.maneuvering.trials import SETS, Log, training
+from truth.maneuvering.trials import MORE_SETS, SETS, TURNS, Log, training
 
 EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
-WANTED = {"pulses": 0.8, "pulses+zigzag": 0.35, "pulses+circle": 0.35}
+WANTED = {"pulses": 0.8, "pulses+zigzag": 0.35, "pulses+circle": 0.35} | dict.fromkeys(MORE_SETS, 0.35)
 """Widest band wanted, as a share of the radius."""
 
 
@@ -79,7 +80,7 @@ def as_run(log: Log) -> Run:
 def evaluate(hull: Hull, draw: int, which: str, seed: int) -> list[Outcome]:
     """Return the turns of one hull after one training set."""
     sway = draw // len(KINDS) % 2 == 0
-    rng = np.random.default_rng([seed, draw, SETS.index(which)])
+    rng = np.random.default_rng([seed, draw, (*SETS, *MORE_SETS).index(which)])
     logs = training(hull, which, rng, sway=sway)
     truth = {(v, side): true_turn(hull, v, sign)[0] for v in hull.speeds for side, sign in (("port", -1.0), ("starboard", 1.0))}
     nan = float("nan")
@@ -90,11 +91,11 @@ def evaluate(hull: Hull, draw: int, which: str, seed: int) -> list[Outcome]:
     try:
         models = []
         for speed in hull.speeds:
-            runs = [as_run(log) for log in logs if log.speed == speed and log.name != "circle"]
+            runs = [as_run(log) for log in logs if log.speed == speed and log.name not in TURNS and "surge_m_s" in log.columns]
             models += [f.model for f in identify(runs, Axis.YAW, effects=EFFECTS, joint=len(runs) > 1)]
         source = source_of_models(models, [f"m{i}" for i in range(len(models))])
-        circles = [as_run(log) for log in logs if log.name == "circle"]
-        runs = [as_run(log) for log in logs if log.name != "circle"]
+        circles = [as_run(log) for log in logs if log.name in TURNS]
+        runs = [as_run(log) for log in logs if log.name not in TURNS]
         found = turn_radius(source, hull.speeds, hull.rudder_limit, runs=runs, measured=circles)
     except FieldsidError as error:
         return [outcome(key, nan, nan, nan, "refused", str(error)) for key in truth]
@@ -122,7 +123,7 @@ def table(rows: list[Outcome]) -> list[str]:
     head = ("rows", "bad", "bias %", "mid %", "90th %", "worst %", "held %", "width", "w 90th")
     wide = (5, 4, 7, 7, 7, 8, 7, 7, 7)
     lines = [" ".join([" " * 42, *(f"{h:>{w}s}" for h, w in zip(head, wide, strict=True))])]
-    for which in SETS:
+    for which in (*SETS, *MORE_SETS):
         own = [r for r in rows if r.training == which]
         if not own:
             continue

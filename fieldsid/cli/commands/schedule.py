@@ -115,7 +115,8 @@ def design(
 
     Damping and phase margin hold with the fin's lag and delay, half of the margin for 95 % of the draws of the models' errors,
     and a step flown by them comes to rest: with the fin's limits and the speed lost in the turn. P and PI are slowed until they
-    do; with a rate the gains are those that settle soonest. What none holds is refused. The feed-forward cancels the trim.
+    do; with a rate the gains are those of least error and fin, each over its largest. What none holds is refused. The
+    feed-forward cancels the trim.
 
     Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
     """

@@ -11,10 +11,13 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, close_loop
+from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
 
 STEP_S = 0.02
+HULL_STEP_S = 0.04
+"""Of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth (test_hull_flights.py)."""
 SETTLING_BAND = 0.05
 FASTEST_LAG_S = 1e-6
 TAIL_SHARE = 0.25
@@ -47,9 +50,9 @@ def overshoot(values: FloatArray, size: float) -> FloatArray:
     return np.asarray(np.maximum(np.max(values / size, axis=0) - 1.0, 0.0))
 
 
-def settling(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
-    """Return the time after which steps (t, n) stay within 5 % of `size`, (n,) s; inf if never."""
-    off = np.abs(values - size) > SETTLING_BAND * abs(size)
+def settling(time: FloatArray, values: FloatArray, size: float, band: float = SETTLING_BAND) -> FloatArray:
+    """Return the time after which steps (t, n) stay within `band` (5 %) of `size`, (n,) s; inf if never."""
+    off = np.abs(values - size) > band * abs(size)
     last = time.size - 1 - np.argmax(off[::-1], axis=0)
     return np.asarray(np.where(off.any(axis=0), np.where(last >= time.size - 1, np.inf, time[last]), 0.0))
 
@@ -59,8 +62,8 @@ def lateness(time: FloatArray, values: FloatArray, size: float) -> FloatArray:
 
     Unlike the time to settle it does not jump where an overshoot leaves the corridor. An error counts up to three steps.
     """
-    off = np.minimum(np.abs(values / size - 1.0), MOST_ERROR)
-    return np.asarray(np.sqrt(np.maximum(time @ np.nan_to_num(off, nan=MOST_ERROR), STEP_S) * STEP_S))
+    off, step = np.minimum(np.abs(values / size - 1.0), MOST_ERROR), float(time[1] - time[0])
+    return np.asarray(np.sqrt(np.maximum(time @ np.nan_to_num(off, nan=MOST_ERROR), step) * step))
 
 
 def swing(values: FloatArray, size: float) -> FloatArray:
@@ -113,6 +116,8 @@ def _run(
     pitch_limit: float,
     push: FloatArray | None = None,
 ) -> Steps:
+    if plant.hull is not None:
+        return _run_hulls(plant, plant.hull, rows, reference, seconds, offset, push)
     plants = np.column_stack(
         [
             plant.damping, plant.stiffness, plant.authority, plant.offset + offset, plant.quadratic, plant.beyond_square,
@@ -121,13 +126,38 @@ def _run(
             np.minimum(plant.fin_rate, 1e6) * STEP_S, plant.powers, plant.speed_loss,
         ]
     )  # fmt: skip
-    table = np.array([_gains(r) for r in ([rows] if isinstance(rows, Row) else rows)])
+    table = _table(rows)
     count = round(seconds / STEP_S) + 1
     out = np.zeros((plant.count, count, OUT_COLUMNS))
     pushed = np.zeros(count) if push is None else push
     close_loop(np.ascontiguousarray(plants), table, reference, depth, pitch_limit, plant.speed, STEP_S, pushed, out)
     angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
     return Steps(STEP_S * np.arange(count, dtype=np.float64), angle, fin, deep, speed)
+
+
+def _run_hulls(
+    plant: LinearPlant,
+    hull: FloatArray,
+    rows: Sequence[Row] | Row,
+    reference: float,
+    seconds: float,
+    offset: float,
+    push: FloatArray | None,
+) -> Steps:
+    """Return the flights of a plant's vehicles in surge, sway and yaw."""
+    way = np.where(plant.authority < 0.0, 1.0, -1.0)
+    limited = np.minimum(plant.fin_rate, 1e6)
+    settings = np.column_stack([way, plant.offset + offset, np.maximum(plant.lag, FASTEST_LAG_S), limited, plant.delay])
+    count = round(seconds / HULL_STEP_S) + 1
+    pushed = np.zeros(count) if push is None else np.interp(HULL_STEP_S * np.arange(count), STEP_S * np.arange(push.size), push)
+    out = np.zeros((plant.count, count, OUT_COLUMNS))
+    close_hull_loop(np.ascontiguousarray(hull), settings, _table(rows), reference, plant.speed, HULL_STEP_S, pushed, out)
+    angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
+    return Steps(HULL_STEP_S * np.arange(count, dtype=np.float64), angle, fin, deep, speed)
+
+
+def _table(rows: Sequence[Row] | Row) -> FloatArray:
+    return np.array([_gains(r) for r in ([rows] if isinstance(rows, Row) else rows)])
 
 
 def _gains(row: Row) -> tuple[float, ...]:

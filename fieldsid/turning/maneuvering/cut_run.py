@@ -14,15 +14,15 @@ import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, simulate
+from fieldsid.turning.maneuvering.equations import simulate
 from fieldsid.turning.maneuvering.flown import HEADING, RATE, SURGE, SWAY, FlownRun
 
 OWN = 3
 """Nuisances of a run before its segments': straight speed, bias of the rate, bias of the sway."""
 SWAY_BIAS_SD = 0.02
 """m/s: what a Doppler log may be off by across the hull."""
-START_SD = 0.3
-"""Prior of a segment's first state and of the straight speed about those measured: m/s, and rad/s."""
+STATE_SD = 0.3
+"""Prior of a segment's first state about that measured: m/s, and rad/s."""
 LEAST_STRAIGHT_M_S = 0.05
 LARGEST_RESIDUAL = 1e6
 """Weighted residuals are clipped here where a simulation has left the water."""
@@ -41,7 +41,7 @@ class CutRun:
         """Return measured less simulated (4, n) with coefficients p and nuisances `local`, NaN where nothing was measured."""
         run, states = self.run, local[OWN:].reshape(-1, 3)
         straight = max(float(local[0]), LEAST_STRAIGHT_M_S)
-        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust, STATIONS, HEIGHTS)
+        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust)
         out[RATE] += local[1]
         out[HEADING] += local[1]
         out[SWAY] += local[2]
@@ -88,5 +88,5 @@ def cut_run(run: FlownRun, segment_s: float) -> CutRun:
                 states[i, j] = np.mean(values[np.isfinite(values)])
             elif channel == SURGE:
                 states[i, j] = run.speed
-    spread = np.concatenate([[START_SD, run.rate_bias_sd, SWAY_BIAS_SD], np.full(states.size, START_SD)])
+    spread = np.concatenate([[run.speed_sd, run.rate_bias_sd, SWAY_BIAS_SD], np.full(states.size, STATE_SD)])
     return CutRun(run, begins, np.concatenate([[run.speed, 0.0, 0.0], states.ravel()]), 1.0 / spread)

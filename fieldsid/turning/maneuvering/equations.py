@@ -35,43 +35,41 @@ REFERENCE_SPEED_M_S = 1.5
 STEP_S = 0.05
 STATIONS = np.linspace(-0.45, 0.45, 10)
 HEIGHTS = 0.1 * np.sqrt(1.0 - np.abs(2.0 * STATIONS) ** 3)
+SUMS = np.concatenate([np.zeros((1, 4)), np.cumsum(HEIGHTS[:, None] * STATIONS[:, None] ** np.arange(4), axis=0)])
+"""Sums of h x^n over the first stations (11, 4): the flow across changes its sign at one place along the hull at most."""
+FIRST_STATION, STATION_STEP = float(STATIONS[0]), float(STATIONS[1] - STATIONS[0])
 LEAST_SURGE_M_S = 0.02
 MOST_M_S = 50.0
 
 
 @inner
-def _slope(
-    u: float,
-    v: float,
-    r: float,
-    delta: float,
-    push: float,
-    straight: float,
-    p: FloatArray,
-    places: FloatArray,
-    heights: FloatArray,
+def crossflow(v: float, w: float) -> tuple[float, float]:
+    """Return J0 and J1 of the strips, with w = L r the flow across for each length along: sum h x^n (v + x w)|v + x w|."""
+    last = SUMS.shape[0] - 1
+    below = 0
+    sign = 1.0 if v > 0.0 else -1.0
+    if w != 0.0:
+        sign = 1.0 if w > 0.0 else -1.0
+        place = (-v / w - FIRST_STATION) / STATION_STEP
+        below = min(max(math.ceil(min(max(-1.0, place), last + 1.0)), 0), last)
+    a0, a1 = SUMS[last, 0] - 2.0 * SUMS[below, 0], SUMS[last, 1] - 2.0 * SUMS[below, 1]
+    a2, a3 = SUMS[last, 2] - 2.0 * SUMS[below, 2], SUMS[last, 3] - 2.0 * SUMS[below, 3]
+    return sign * (v * v * a0 + 2.0 * v * w * a1 + w * w * a2), sign * (v * v * a1 + 2.0 * v * w * a2 + w * w * a3)
+
+
+@inner
+def slope(
+    u: float, v: float, r: float, delta: float, push: float, straight: float, lift: float, p: FloatArray
 ) -> tuple[float, float, float]:
-    """Return the accelerations; `push` is the thrust over that of the straight run, p the coefficients."""
+    """Return the accelerations; `push` is the thrust over that of the straight run, `lift` from `rudder_lift`, p the rest."""
     length = p[0]
     surge = max(u, LEAST_SURGE_M_S)
-    j0 = 0.0
-    j1 = 0.0
-    for i in range(places.size):
-        across = v + places[i] * length * r
-        part = heights[i] * across * abs(across)
-        j0 += part
-        j1 += part * places[i]
+    j0, j1 = crossflow(v, length * r)
     side = v + p[5] * length * r
-    alpha = delta + p[13] - math.atan2(side, surge)
+    alpha = delta + p[13] - math.atan(side / surge)
     ratio = (alpha / p[12]) ** 2
-    lift = (
-        p[4]
-        * (straight / REFERENCE_SPEED_M_S) ** p[17]
-        * (surge * surge + side * side)
-        * alpha
-        / math.sqrt(math.sqrt(1.0 + ratio * ratio))
-    )
-    cosine = lift * math.cos(delta)
+    force = lift * (surge * surge + side * side) * alpha / math.sqrt(math.sqrt(1.0 + ratio * ratio))
+    cosine = force * math.cos(delta)
     thrust = push * straight * straight * (1.0 + p[3] * (1.0 - u / straight))
     viscous = p[21] / length * REFERENCE_SPEED_M_S * (straight - u)
     du = (
@@ -79,7 +77,7 @@ def _slope(
         + viscous
         + p[2] * v * r
         + p[15] * length * r * r
-        - p[2] * lift * math.sin(delta) / length
+        - p[2] * force * math.sin(delta) / length
     )
     # water takes energy from a hull that sways, and gives it none (Fossen 2011, property 6.3)
     linear_sway, linear_yaw = max(p[7] * surge + p[18] * REFERENCE_SPEED_M_S, 0.0), p[10] * surge + p[19] * REFERENCE_SPEED_M_S
@@ -87,6 +85,12 @@ def _slope(
     moment = -p[9] * surge * v - linear_yaw * length * r - p[20] * p[11] * j1 + p[5] * cosine
     dr = moment / (p[6] * length * length)
     return du, dv, dr
+
+
+@inner
+def rudder_lift(p: FloatArray, straight: float) -> float:
+    """Return R at the speed in m/s that the thrust holds on a straight course."""
+    return float(p[4] * (straight / REFERENCE_SPEED_M_S) ** p[17])
 
 
 @jit
@@ -98,8 +102,6 @@ def simulate(
     time: FloatArray,
     fin: FloatArray,
     thrust: FloatArray,
-    places: FloatArray,
-    heights: FloatArray,
 ) -> FloatArray:
     """Return surge, sway, rate and heading (4, n) of a run in segments that begin at samples `begins` with states (m, 3).
 
@@ -110,6 +112,7 @@ def simulate(
     u, v, r, heading = first[0, 0], first[0, 1], first[0, 2], 0.0
     angle = fin[0, 0]
     segment = 0
+    lift = rudder_lift(p, straight)
     for i in range(count):
         if segment < begins.size and i == begins[segment]:
             u, v, r = first[segment, 0], first[segment, 1], first[segment, 2]
@@ -125,9 +128,9 @@ def simulate(
             asked = fin[i, 0] + (fin[i, 1] - fin[i, 0]) * (j + 0.5) / pieces
             between = angle + min(max((asked - angle) * (1.0 - half), -0.5 * h * p[16]), 0.5 * h * p[16])
             push = thrust[i] + (thrust[i + 1] - thrust[i]) * (j + 0.5) / pieces
-            du, dv, dr = _slope(u, v, r, angle, push, straight, p, places, heights)
+            du, dv, dr = slope(u, v, r, angle, push, straight, lift, p)
             mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
-            du, dv, dr = _slope(mu, mv, mr, between, push, straight, p, places, heights)
+            du, dv, dr = slope(mu, mv, mr, between, push, straight, lift, p)
             heading += h * mr
             u = min(max(u + h * du, LEAST_SURGE_M_S), MOST_M_S)
             v = min(max(v + h * dv, -MOST_M_S), MOST_M_S)
@@ -137,19 +140,20 @@ def simulate(
 
 
 @jit
-def settle(p: FloatArray, straight: float, fin: float, places: FloatArray, heights: FloatArray) -> FloatArray:
+def settle(p: FloatArray, straight: float, fin: float) -> FloatArray:
     """Return surge, sway and rate (3,) of the circle that a straight run settles to with the rudder at `fin` rad.
 
     NaN where it has not settled after 400 lengths: within a thousandth over the last 40.
     """
     h = 0.1 * p[0] / straight
+    lift = rudder_lift(p, straight)
     u, v, r = straight, 0.0, 0.0
     low, high = 1e9, -1e9
     block = 400
     for i in range(1, 10 * block + 1):
-        du, dv, dr = _slope(u, v, r, fin, 1.0, straight, p, places, heights)
+        du, dv, dr = slope(u, v, r, fin, 1.0, straight, lift, p)
         mu, mv, mr = u + 0.5 * h * du, v + 0.5 * h * dv, r + 0.5 * h * dr
-        du, dv, dr = _slope(mu, mv, mr, fin, 1.0, straight, p, places, heights)
+        du, dv, dr = slope(mu, mv, mr, fin, 1.0, straight, lift, p)
         u, v, r = max(u + h * du, LEAST_SURGE_M_S), v + h * dv, r + h * dr
         if not (abs(v) < MOST_M_S and abs(r) < MOST_M_S):
             break

@@ -27,6 +27,11 @@ LEAST_SPEED_M_S = 0.1
 DISCREPANCY = 0.03
 """Share of the motion that the equations themselves are off by."""
 DISCREPANCY_LENGTH_M = 2.0
+START_SD = 0.3
+"""Of a straight speed about that measured, m/s."""
+RPM = "propeller_rpm"
+SPEED_OF_RPM_SHARE = 0.03
+"""A propeller's slip on a straight course is alike at every speed to within a few hundredths (Fossen 2011, section 9.4)."""
 SURGE, SWAY, RATE, HEADING = range(4)
 
 
@@ -35,7 +40,8 @@ class FlownRun:
     """One run: time (n,) s, fin (n-1, 2) rad before the servo's lag, thrust (n,) over the straight run's.
 
     `measured` (4, n) surge, sway, rate and heading, NaN where not measured; heading only where there is no rate. The rate is
-    free of the bias that the heading shows, to within `rate_bias_sd` rad/s.
+    free of the bias that the heading shows, to within `rate_bias_sd` rad/s. `speed` is that of its straight part, m/s, known to
+    `speed_sd`: measured, or that of the propeller's turns.
     """
 
     name: str
@@ -45,11 +51,8 @@ class FlownRun:
     measured: FloatArray
     rate_bias_sd: float
     discrepancy: FloatArray
-
-    @property
-    def speed(self) -> float:
-        """Speed of its straight part, m/s."""
-        return _straight_speed(self.measured)
+    speed: float
+    speed_sd: float
 
     @property
     def turns(self) -> bool:
@@ -65,10 +68,21 @@ class FlownRun:
         return np.unique(np.searchsorted(self.time, np.linspace(self.time[0], self.time[-1], count + 1)[:-1]))
 
 
-def flown_run(run: Run, model: Model | None) -> FlownRun | None:
-    """Return what a run says of a maneuver, None where it lacks fin, yaw or speed; a model's actuator effects shape the fin."""
+def flown_run(run: Run, model: Model | None, speed_per_rpm: float | None = None) -> FlownRun | None:
+    """Return what a run says of a maneuver, None where it lacks fin, yaw or speed; a model's actuator effects shape the fin.
+
+    A run without a speed has that of its propeller's turns on a straight course, where `speed_per_rpm` (m/s per 1/min) is known:
+    the surge in its turns is then a state that nothing measures.
+    """
     steered = run.has("rudder_rad") or run.has("rudder_measured_rad")
-    if not steered or not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")) or not knows_speed(run):
+    if not steered or not (run.has("yaw_rate_rad_s") or run.has("yaw_rad")):
+        return None
+    surge = run["surge_m_s"] if knows_speed(run) else np.full(len(run), np.nan)
+    speed, speed_sd = float(np.nanpercentile(surge, 90)) if knows_speed(run) else float("nan"), START_SD
+    if not np.isfinite(speed) and speed_per_rpm is not None and run.has(RPM):
+        speed = speed_per_rpm * _turns_at_start(run)
+        speed_sd = SPEED_OF_RPM_SHARE * speed
+    if not speed > 0.0:
         return None
     record = record_of(run, Axis.YAW)
     if len(record) < LEAST_SAMPLES:
@@ -84,20 +98,34 @@ def flown_run(run: Run, model: Model | None) -> FlownRun | None:
     bias, bias_sd = _rate_bias(record)
     rate = rate - bias
     sway = run["sway_m_s"] if run.has("sway_m_s") else none
-    measured = np.stack([run["surge_m_s"], sway, rate if has_rate else none, heading])
+    measured = np.stack([surge, sway, rate if has_rate else none, heading])
     fin = np.stack([path.start, path.end], axis=1)
     if model is not None and model.base[NAMES[model.axis].authority] > 0.0:
         fin = -fin  # the equations' rudder turns to port
     thrust = _thrust(record.signals.get("thrust"), record.thrust_column, len(record))
-    return FlownRun(run.name, record.time, fin, thrust, measured, bias_sd, _discrepancy(record.time, measured))
+    off = _discrepancy(record.time, measured, speed)
+    return FlownRun(run.name, record.time, fin, thrust, measured, bias_sd, off, speed, speed_sd)
 
 
-def _discrepancy(time: FloatArray, measured: FloatArray) -> FloatArray:
+def speed_per_rpm(runs: Sequence[Run]) -> float | None:
+    """Return the straight speed (m/s) for each turn of the propeller in a minute, by runs that have both; None where none has."""
+    both = [r for r in runs if knows_speed(r) and r.has(RPM)]
+    known = [float(np.nanpercentile(r["surge_m_s"], 90)) / turns for r in both if (turns := _turns_at_start(r)) > 0.0]
+    return float(np.median(known)) if known else None
+
+
+def _turns_at_start(run: Run) -> float:
+    turns = run[RPM]
+    turns = turns[np.isfinite(turns)]
+    return float(np.median(turns[: max(10, turns.size // 20)])) if turns.size else float("nan")
+
+
+def _discrepancy(time: FloatArray, measured: FloatArray, speed: float) -> FloatArray:
     """Standard deviation (4,) that the model's own error counts as in every sample: a share of what the run shows.
 
     It stays alike for the time that the hull takes over a few metres, and so counts as the more in single samples.
     """
-    speed, step = _straight_speed(measured), float(np.median(np.diff(time)))
+    step = float(np.median(np.diff(time)))
     width = max(1, round(1.0 / step))
     straight = np.array([speed, 0.0, 0.0, 0.0])
     out = np.zeros(4)
@@ -107,10 +135,6 @@ def _discrepancy(time: FloatArray, measured: FloatArray) -> FloatArray:
             whole = values[: values.size // width * width].reshape(-1, width).mean(axis=1)
             out[i] = np.sqrt(np.mean((whole - (whole.mean() if i == HEADING else 0.0)) ** 2))
     return np.asarray(DISCREPANCY * out * np.sqrt(max(2.0 * DISCREPANCY_LENGTH_M / speed / step, 1.0)))
-
-
-def _straight_speed(measured: FloatArray) -> float:
-    return float(np.nanpercentile(measured[SURGE], 90))
 
 
 def _rate_bias(record: Record) -> tuple[float, float]:
@@ -140,14 +164,15 @@ def _thrust(thrust: FloatArray | None, column: str, count: int) -> FloatArray:
 
 
 def usable_runs(runs: Sequence[Run], models: Sequence[Model]) -> tuple[FlownRun, ...]:
-    """Return what runs say; the fin is shaped by the model of the nearest speed."""
+    """Return what runs say; the fin is shaped by the model of the nearest speed, the first where a run has none."""
     found = []
+    of_rpm = speed_per_rpm(runs)
     for run in runs:
-        near = None
+        near = models[0] if models else None
         if models and knows_speed(run):
             speed = max(float(np.nanmedian(run["surge_m_s"])), LEAST_SPEED_M_S)
             near = min(models, key=lambda m: abs(np.log(m.law.reference / speed)) if m.law.reference > 0 else np.inf)
-        flown = flown_run(run, near)
+        flown = flown_run(run, near, of_rpm)
         if flown is not None:
             found.append(flown)
     return tuple(found) if any(f.turns for f in found) else ()

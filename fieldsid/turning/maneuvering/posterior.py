@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.turning.maneuvering.equations import HEIGHTS, STATIONS, coefficients, settle
+from fieldsid.turning.maneuvering.equations import coefficients, settle
 from fieldsid.turning.maneuvering.fit import Fitted
 
 CHAINS = 8
@@ -141,9 +141,7 @@ class SettledTurns:
 
 def settled_turns(posterior: Posterior, entry: FloatArray, fin: float) -> SettledTurns:
     """Return the circles that straight runs at entry speeds (s,) m/s settle to with the rudder at `fin` rad."""
-    states = np.array(
-        [[settle(p, float(u), fin, STATIONS, HEIGHTS) for u in entry] for p in map(coefficients, posterior.vectors)]
-    )
+    states = np.array([[settle(p, float(u), fin) for u in entry] for p in map(coefficients, posterior.vectors)])
     surge, sway, rate = states[..., 0], states[..., 1], states[..., 2]
     path = np.hypot(surge, sway)
     return SettledTurns(path / np.abs(rate), rate, surge, path)

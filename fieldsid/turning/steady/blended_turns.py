@@ -36,6 +36,42 @@ def blended_turns(
     source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
 ) -> dict[str, BlendedTurns]:
     """Return the settled turns of a source's models with the rudder held at `rudder` rad, to either side by name."""
+    asked = _asked(source, entry, rudder, surge, draws, rng)
+
+    def turned(of: _Asked) -> tuple[SteadyTurn, Transient]:
+        turn = steady_turn(of.plant, of.speed_loss, entry[of.used], SIDES[of.side])
+        return turn, turn_transient(of.plant, of.speed_loss, entry[of.used], SIDES[of.side], rudder)
+
+    sums = {side: _Sums(draws, entry.size) for side in SIDES}
+    for of, (turn, after) in zip(asked, parallel_map(turned, asked), strict=True):
+        sums[of.side].add(of.used, of.share, turn, after)
+    effects = tuple(sorted({e for m in source.models for e in m.effects}))
+    return {side: total.turns(entry, effects) for side, total in sums.items()}
+
+
+def blended_radius(source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None) -> dict[str, FloatArray]:
+    """Return the estimate's settled radius (s,) m to either side by name: no draws, and not the way into the turn."""
+    log_radius = {side: np.zeros(entry.size) for side in SIDES}
+    for of in _asked(source, entry, rudder, surge, 1, np.random.default_rng(0)):
+        turn = steady_turn(of.plant, of.speed_loss, entry[of.used], SIDES[of.side])
+        log_radius[of.side][of.used] += of.share * np.log(turn.radius[0])
+    return {side: np.exp(total) for side, total in log_radius.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Turns of one model to one side: the entry speeds used (k,), the model's share at each, its plant and loss of speed."""
+
+    side: str
+    used: npt.NDArray[np.int_]
+    share: FloatArray
+    plant: YawPlant
+    speed_loss: SpeedLoss
+
+
+def _asked(
+    source: ParameterSource, entry: FloatArray, rudder: float, surge: SurgeModel | None, draws: int, rng: np.random.Generator
+) -> list[_Asked]:
     weight = np.zeros((len(source.models), entry.size))
     for i, speed in enumerate(entry):
         for index, share in source.near(float(speed)):
@@ -45,18 +81,8 @@ def blended_turns(
         used = np.flatnonzero(weight[index])
         if used.size:
             plant, speed_loss = _plant_and_speed_loss(model, rudder, surge, draws, rng, entry[used])
-            asked += [(side, index, used, plant, speed_loss) for side in SIDES]
-
-    def turned(of: tuple[str, int, npt.NDArray[np.int_], YawPlant, SpeedLoss]) -> tuple[SteadyTurn, Transient]:
-        side, _, used, plant, speed_loss = of
-        turn = steady_turn(plant, speed_loss, entry[used], SIDES[side])
-        return turn, turn_transient(plant, speed_loss, entry[used], SIDES[side], rudder)
-
-    sums = {side: _Sums(draws, entry.size) for side in SIDES}
-    for (side, index, used, _, _), (turn, after) in zip(asked, parallel_map(turned, asked), strict=True):
-        sums[side].add(used, weight[index, used], turn, after)
-    effects = tuple(sorted({e for m in source.models for e in m.effects}))
-    return {side: total.turns(entry, effects) for side, total in sums.items()}
+            asked += [_Asked(side, used, weight[index, used], plant, speed_loss) for side in SIDES]
+    return asked
 
 
 class _Sums:

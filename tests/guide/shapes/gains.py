@@ -94,8 +94,12 @@ class StepCheck(Shape):
     """Time to stay within 5 % by the estimate; null if never."""
     settling_most_s: Number
     """Longest over 95 % of the draws."""
+    settling_median_s: Number
+    """The middle of the draws."""
+    settling_interval95_s: list[Number]
+    """The band that holds 95 % of the draws, with what a flight is off its model's."""
     swing_percent: Number
-    """What still swings in the last quarter of a minute, peak to peak."""
+    """What still swings in the last quarter of the flight, peak to peak."""
     steady_error_most_rad: Number
     """How far from what was asked it comes to rest, by 95 % of the draws: the error of the trim."""
 

@@ -1,4 +1,4 @@
-"""Training sets of a hull: pulses, pulses with zig-zags, pulses with a circle; each speed a run, sensors with noise."""
+"""Training sets of a hull: pulses, with zig-zags, with one circle, u-turn or half circle; a run at each speed, with noise."""
 
 from __future__ import annotations
 
@@ -11,6 +11,11 @@ from truth.maneuvering.motion import HOLD, OPEN, ZIGZAG, fly
 
 SAMPLE_S = 0.1
 SETS = ("pulses", "pulses+zigzag", "pulses+circle")
+MORE_SETS = ("pulses+uturn", "pulses+half", "pulses+zigzag by rpm")
+"""One u-turn, one circle at half the rudder, both at the middle speed; zig-zags of which only the propeller's turns tell the
+speed."""
+TURNS = ("circle", "uturn", "half")
+RPM_PER_M_S = 420.0
 GYRO, COMPASS, DVL, FIX = 0.003, 0.005, 0.02, 0.1
 """Standard deviations: rad/s, rad, m/s, m."""
 GUST_SHARE, GUST_TIME_S = 0.01, 2.0
@@ -32,11 +37,20 @@ def training(hull: Hull, which: str, rng: np.random.Generator, *, sway: bool) ->
     logs = []
     for index, speed in enumerate(hull.speeds):
         logs.append(_log(hull, f"pulses{index}", speed, *_pulses(hull, speed), rng, sway=sway))
-        if which == "pulses+zigzag":
+        if which.startswith("pulses+zigzag"):
             logs.append(_log(hull, f"zigzag{index}", speed, *_zigzag(hull, speed), rng, sway=sway))
-        if which == "pulses+circle" and index == 2:
-            logs.append(_log(hull, "circle", speed, *_circle(hull, speed), rng, sway=sway))
-    return logs
+        turn = which.removeprefix("pulses+")
+        if turn in TURNS and index == 2:
+            logs.append(_log(hull, turn, speed, *_turn(hull, speed, turn), rng, sway=sway))
+    return [_by_rpm(log) for log in logs] if which.endswith("by rpm") else logs
+
+
+def _by_rpm(log: Log) -> Log:
+    """Return a log with the propeller's turns; one of a zig-zag has nothing else that tells a speed."""
+    columns = log.columns | {"propeller_rpm": np.full(log.time.size, RPM_PER_M_S * log.speed)}
+    if log.name.startswith("zigzag"):
+        columns = {k: v for k, v in columns.items() if k not in ("surge_m_s", "sway_m_s", "x_m", "y_m")}
+    return Log(log.name, log.speed, log.time, columns)
 
 
 def _passage(hull: Hull, speed: float) -> float:
@@ -63,10 +77,15 @@ def _zigzag(hull: Hull, speed: float) -> tuple[np.ndarray, np.ndarray]:
     return np.zeros(time.size), np.where(time < 3.0, HOLD, ZIGZAG)
 
 
-def _circle(hull: Hull, speed: float) -> tuple[np.ndarray, np.ndarray]:
+def _turn(hull: Hull, speed: float, which: str) -> tuple[np.ndarray, np.ndarray]:
     time = np.arange(0.0, 6.0 + max(60.0, 45.0 * _passage(hull, speed)), SAMPLE_S)
-    command = np.where(time < 6.0, 0.0, -hull.rudder_limit)
-    return command, np.where(time < 6.0, HOLD, OPEN)
+    command = np.where(time < 6.0, 0.0, -hull.rudder_limit * (0.5 if which == "half" else 1.0))
+    mode = np.where(time < 6.0, HOLD, OPEN)
+    if which == "uturn":
+        settings = np.array([0.0, 0.0, hull.rudder_limit, 1.0, 1.2 * _passage(hull, speed)])
+        heading = fly(hull.of, speed, command, mode, settings, SAMPLE_S, np.zeros(time.size))[0][:, 3]
+        mode[np.abs(heading) > np.pi - 0.3] = HOLD  # the pilot meets her
+    return command, mode
 
 
 def _log(

@@ -17,7 +17,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
-from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of
+from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
 from fieldsid.plant.points import distinct_speeds
 from fieldsid.plant.table import read_table
 
@@ -93,6 +93,23 @@ def test_authority_of_opposite_signs_is_refused_naming_the_rows(tmp_path):
     with pytest.raises(DataError, match="sign of b2") as caught:
         load_parameter_source([written(tmp_path, TABLE.replace("-1.1,", "1.1,"))])
     assert "row 2: b2 = 1.1" in caught.value.found
+
+
+def authority_model(speed, b2, error):
+    values = {"a22": 1.0, "b2": b2, "C0": 0.0}
+    covariance = np.diag([0.01, error**2, 1e-6])
+    return Model(Axis.YAW, (), values, {}, tuple(values), covariance, SpeedLaw(speed), Noise(0.01, 0.01))
+
+
+def test_a_model_whose_fin_has_no_known_sign_is_left_out_where_it_disagrees():
+    models = [authority_model(1.0, -0.5, 0.02), authority_model(1.5, 20.0, 750.0), authority_model(2.0, -2.0, 0.05)]
+    source = source_of_models(models, ["a", "b", "c"])
+    assert source.left_out == ("b",)
+    assert list(source.speeds) == [1.0, 2.0]
+    alike = source_of_models([models[0], authority_model(1.5, -1.0, 5.0)], ["a", "b"])
+    assert alike.left_out == ()
+    with pytest.raises(DataError, match="sign of b2"):
+        source_of_models([models[0], authority_model(1.5, 20.0, 2.0)], ["a", "b"])
 
 
 def test_models_of_two_axes_are_refused(tmp_path):

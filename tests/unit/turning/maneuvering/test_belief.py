@@ -32,7 +32,7 @@ def runs_of(number, which, *, sway=True, seed=SEED):
 
 
 def believed(runs, models=(), length=None):
-    return believe(runs, models, length, np.random.default_rng(1))
+    return believe(runs, models, length, 1)
 
 
 @pytest.mark.parametrize(("number", "sway"), [pytest.param(0, True, marks=pytest.mark.slow), (3, False), (6, True)])
@@ -97,10 +97,11 @@ def test_draws_worth_less_widen_the_band(monkeypatch):
     assert width(1.0) > 1.01 * width(200.0)
 
 
-def test_a_circle_at_one_speed_helps_the_others():
-    hull, runs = runs_of(1, "pulses+circle")
+@pytest.mark.parametrize("turn", ["circle", "uturn", "half"])
+def test_a_turn_at_one_speed_helps_the_others(turn):
+    hull, runs = runs_of(1, f"pulses+{turn}")
     with_circle = believed(runs)
-    without = believed([r for r in runs if r.name != "circle"])
+    without = believed([r for r in runs if r.name != turn])
     truth = true_turn(hull, hull.speeds[4], -1.0)[0]
     near, far = (b.turn(hull.speeds[4], hull.rudder_limit, -1.0) for b in (with_circle, without))
     assert near.radius == pytest.approx(truth, rel=0.05)
@@ -120,6 +121,24 @@ def test_the_length_that_is_given_is_kept():
     hull, runs = runs_of(0, "pulses")
     length = float(np.exp(believed(runs, length=hull.of.length).fitted.vector[0]))
     assert length == pytest.approx(hull.of.length, rel=0.15)
+
+
+def test_zigzags_that_only_the_propeller_gives_a_speed_tell_the_circle():
+    hull, runs = runs_of(1, "pulses+zigzag by rpm")
+    assert not any(r.has("surge_m_s") or r.has("x_m") for r in runs if r.name.startswith("zigzag"))
+    belief, pulses = believed(runs), believed([r for r in runs if r.name.startswith("pulses")])
+    assert len(belief.runs) == 10
+    for speed in (hull.speeds[0], hull.speeds[4]):
+        truth = true_turn(hull, speed, 1.0)[0]
+        turn, far = (b.turn(speed, hull.rudder_limit, 1.0) for b in (belief, pulses))
+        assert turn.radius == pytest.approx(truth, rel=0.05)
+        assert turn.interval95[0] <= truth <= turn.interval95[1]
+        assert turn.interval95[1] - turn.interval95[0] < min(0.35 * truth, 0.8 * (far.interval95[1] - far.interval95[0]))
+
+
+def test_turns_of_a_propeller_tell_no_speed_where_no_run_has_both():
+    _, runs = runs_of(1, "pulses+zigzag by rpm")
+    assert believed([r for r in runs if r.name.startswith("zigzag")]) is None
 
 
 def test_runs_without_a_speed_say_nothing():
@@ -147,7 +166,7 @@ def test_a_singular_matrix_leaves_the_models_simulated_and_says_why(monkeypatch,
     def singular(*_):
         raise np.linalg.LinAlgError("Singular matrix")
 
-    hull, runs = runs_of(0, "pulses")
+    hull, runs = runs_of(0, "pulses", seed=6)  # runs that nothing was believed of before
     models = [f.model for f in identify(runs[:1], Axis.YAW, effects=("quadratic_damping",))]
     source = source_of_models(models, ["m0"])
     monkeypatch.setattr(f"fieldsid.turning.maneuvering.belief.{where}", singular)

@@ -9,7 +9,16 @@ from truth.maneuvering.motion import true_turn
 from truth.radius_prior import reduced
 
 from fieldsid.numerics.jit import plain_of
-from fieldsid.turning.maneuvering.equations import HEIGHTS, NAMES, STATIONS, coefficients, growth_rate, settle, simulate
+from fieldsid.turning.maneuvering.equations import (
+    HEIGHTS,
+    NAMES,
+    STATIONS,
+    coefficients,
+    crossflow,
+    growth_rate,
+    settle,
+    simulate,
+)
 from fieldsid.turning.maneuvering.prior import prior
 
 
@@ -25,7 +34,7 @@ def run(p, fin, seconds=20.0, step=0.1, simulated=simulate):
     time = np.arange(0.0, seconds, step)
     path = np.full((time.size - 1, 2), fin)
     first = np.array([[1.5, 0.0, 0.0]])
-    return simulated(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), STATIONS, HEIGHTS)
+    return simulated(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size))
 
 
 def test_a_straight_run_stays_straight_and_keeps_its_speed():
@@ -44,7 +53,7 @@ def test_port_and_starboard_mirror_each_other():
 
 def test_the_settled_circle_is_where_the_simulation_ends():
     p = hull(rudder_offset=0.0, lag=0.05)
-    np.testing.assert_allclose(run(p, -0.3, seconds=300.0)[:3, -1], settle(p, 1.5, -0.3, STATIONS, HEIGHTS), rtol=1e-3)
+    np.testing.assert_allclose(run(p, -0.3, seconds=300.0)[:3, -1], settle(p, 1.5, -0.3), rtol=1e-3)
 
 
 def test_the_compiled_equations_are_the_plain_ones():
@@ -52,14 +61,24 @@ def test_the_compiled_equations_are_the_plain_ones():
     np.testing.assert_allclose(run(p, 0.2, seconds=3.0), run(p, 0.2, seconds=3.0, simulated=plain_of(simulate)), rtol=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("v", "w"), [(0.3, 0.0), (-0.3, 0.0), (0.0, 0.7), (0.1, 0.6), (0.1, -0.6), (-0.2, 0.9), (2.0, 0.1), (0.0, 0.0)]
+)
+def test_the_strips_are_summed_as_they_stand(v, w):
+    across = v + STATIONS * w
+    found = crossflow(v, w)
+    for power in (0, 1):
+        assert found[power] == pytest.approx(float(np.sum(HEIGHTS * across * np.abs(across) * STATIONS**power)), abs=1e-15)
+
+
 def test_without_viscous_damping_the_circle_is_the_same_at_every_speed():
     p = hull(rudder_offset=0.0)
-    radii = [np.hypot(u, v) / abs(r) for u, v, r in (settle(p, s, -0.3, STATIONS, HEIGHTS) for s in (0.7, 1.5, 3.0))]
+    radii = [np.hypot(u, v) / abs(r) for u, v, r in (settle(p, s, -0.3) for s in (0.7, 1.5, 3.0))]
     np.testing.assert_allclose(radii, radii[0], rtol=1e-3)
 
 
 def test_a_hull_that_swings_for_ever_has_no_settled_circle():
-    assert np.isnan(settle(hull(yaw_rate=-5.0, cross_drag=1e-9, stall=50.0), 1.5, -0.3, STATIONS, HEIGHTS)).all()
+    assert np.isnan(settle(hull(yaw_rate=-5.0, cross_drag=1e-9, stall=50.0), 1.5, -0.3)).all()
 
 
 def test_growth_is_that_of_a_small_disturbance():
@@ -69,7 +88,7 @@ def test_growth_is_that_of_a_small_disturbance():
     time = np.arange(0.0, 6.0, 0.05)
     first = np.array([[1.5, 0.0, 1e-9]])
     path = np.zeros((time.size - 1, 2))
-    rate = simulate(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), STATIONS, HEIGHTS)[2]
+    rate = simulate(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size))[2]
     assert np.log(rate[-1] / rate[-21]) == pytest.approx(growth, rel=0.02)
 
 
@@ -79,5 +98,5 @@ def test_the_equations_turn_as_hulls_of_every_kind_do(number):
     drawn = draw_hull(number, 3)
     p = coefficients(np.concatenate([[np.log(drawn.of.length)], reduced(drawn.of), np.zeros(len(NAMES) - 17)]))
     p[[NAMES.index(n) for n in NAMES if n.endswith("_viscous")]] = 0.0  # the ensemble has none
-    u, v, r = settle(p, drawn.speeds[2], -drawn.rudder_limit, STATIONS, HEIGHTS)
+    u, v, r = settle(p, drawn.speeds[2], -drawn.rudder_limit)
     assert np.hypot(u, v) / r == pytest.approx(true_turn(drawn, drawn.speeds[2], 1.0)[0], rel=0.05)

@@ -1,0 +1,76 @@
+"""What a schedule is made for and tried on: the plants at any speed, by the belief of all runs where they allow one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.errors import ModelError
+from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.schedule.believed_plant import believed_plant
+from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
+from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at, plants_at
+from fieldsid.turning.maneuvering.belief import Belief, believe
+from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
+
+BELIEVED = "speed lost in the turn, sway and drag as all runs together have them"
+
+
+@dataclass(frozen=True, slots=True)
+class Plants:
+    """A source's plants, their fin's limits, and how a vehicle loses speed: by a belief, else as `surge` has it."""
+
+    source: ParameterSource
+    limits: FinLimits
+    surge: SurgeModel | None
+    belief: Belief | None
+
+    def at(self, speed: float, fin_limit: float, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
+        """Return the plants next to a speed (m/s), `draws` of the errors of each, with weights that sum to one."""
+        near = plants_at(self.source, speed, self.limits, draws, seed)
+        if self.belief is None:
+            return [(slowing(plant, self.surge, fin_limit, seed), share) for plant, share in near]
+        first = near[0][0]
+        offset = np.sum([share * plant.offset for plant, share in near], axis=0)
+        return [(believed_plant(self.belief, replace(first, offset=offset), self.limits, draws), 1.0)]
+
+    def family_at(self, speed: float, fin_limit: float, draws: int, seed: int) -> LinearPlant:
+        """Return the whole uncertainty set at a speed (m/s)."""
+        if self.belief is None:
+            return slowing(family_at(self.source, speed, self.limits, draws, seed), self.surge, fin_limit, seed)
+        return self.at(speed, fin_limit, draws, seed)[0][0]
+
+    def noise_at(self, speed: float) -> Noise | None:
+        """Return the noise of the model that counts most at a speed (m/s), None for a table."""
+        if not self.source.models:
+            return None
+        nearest, _ = max(self.source.near(speed), key=lambda at: at[1])
+        return self.source.models[nearest].noise
+
+    @property
+    def says(self) -> str:
+        """Where the loss of speed comes from, in words."""
+        return BELIEVED if self.belief is not None else speed_kept_said(self.source.axis, self.surge)
+
+
+def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run]) -> Plants:
+    """Return the plants of a source; runs are those its models came from.
+
+    A belief is formed of yaw models with effects whose runs have a fin, a turn and a speed, as a turning radius is; where the
+    fit of it fails, or lies where no vehicle does, the models' own plants are taken, one for each of their speeds.
+    """
+    if source.axis is not Axis.YAW or not runs:
+        return Plants(source, limits, None, None)
+    belief = None
+    if any(model.effects for model in source.models):
+        try:
+            belief = believe(runs, source.models, None)
+        except ModelError:
+            belief = None
+    usual = belief is not None and belief.fitted.is_usual
+    return Plants(source, limits, fit_surge(runs), belief if usual else None)
