@@ -61,6 +61,11 @@ def probability(p: float) -> str:
     return f"{p:.3f}" if 0.001 <= p <= 0.999 else "< 0.001" if p < 0.001 else "> 0.999"
 
 
+def p_value(p: float) -> str:
+    """Return a p-value with its sign: `p = 0.031`, and `p < 0.001` below that, where a tail is no number to rely on."""
+    return f"p = {p:.2g}" if p >= 0.001 else "p < 0.001"
+
+
 def in_unit(unit: str) -> str:
     """Return a unit as it is printed behind a number: nothing where the number is a plain one, whose unit is 1."""
     return "" if unit == "1" else unit

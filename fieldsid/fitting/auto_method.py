@@ -24,6 +24,7 @@ from fieldsid.models.model import Noise
 from fieldsid.noise.noise_kinds import NOISE_PARAMETERS
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import MIN_WHITENESS_P
+from fieldsid.rounding import p_value
 
 MIN_P_VALUE = MIN_WHITENESS_P / 2.0
 """p-value below which what is left is no disturbance: there are two tests."""
@@ -73,12 +74,12 @@ def choose(problem: Problem, plain: Solution, refine: Callable[[], Solution]) ->
         why = f"the free run of prediction error is {free.over_motion:.3g} times as far off as the motion's own mean"
         return _with_reason(plain, f"output error: {why}", known | {"mean_ratio": free.over_motion})
     if min(agreement_p, independence_p) >= MIN_P_VALUE:
-        why = f"a disturbance explains where it differs from output error (p = {min(agreement_p, independence_p):.2g})"
+        why = f"a disturbance explains where it differs from output error ({p_value(min(agreement_p, independence_p))})"
         return _with_reason(refined, f"prediction error: {why}; {times}", known)
     if independence_p < MIN_P_VALUE:
-        why = f"what prediction error leaves follows fin and motion (p = {independence_p:.2g}), so an effect may be missing"
+        why = f"what prediction error leaves follows fin and motion ({p_value(independence_p)}), so an effect may be missing"
     else:
-        why = f"prediction error differs by more than its disturbance explains (p = {agreement_p:.2g})"
+        why = f"prediction error differs by more than its disturbance explains ({p_value(agreement_p)})"
     known |= {"ratio_limit": MAX_FREE_RUN_RATIO, "disturbance_time_s": refined.noise.disturbance_time}
     if not _has_own_time(refined.noise):
         why += f", and no disturbance of {refined.noise.disturbance_time:.2g} s is resolved"

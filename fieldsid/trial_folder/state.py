@@ -19,7 +19,7 @@ from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read,
 from fieldsid.trial_folder.make import RUNS
 
 METADATA_KEY = b"fieldsid"
-LOG, RUN, MODEL = "log", "run", "model"
+LOG, RUN, MODEL, PLANNED = "log", "run", "model", "planned"
 SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
 """Kinds of files that a user writes: they are read, and made of nothing."""
 
@@ -111,6 +111,8 @@ def _item(path: Path, name: str, folder: Path) -> Item | None:
         return _own(path, name, kind, folder)
     if not _is_log(path):
         return None
+    if _is_planned(path):
+        return Item(name, PLANNED)
     return Item(name, RUN if name.startswith(f"{RUNS}/") else LOG)
 
 
@@ -141,6 +143,12 @@ def _is_log(path: Path) -> bool:
     except LogError:
         return False
     return True
+
+
+def _is_planned(path: Path) -> bool:
+    """Whether a table is a fin to fly, which `sysid plan` wrote beside its plan: nothing was measured."""
+    plan = path.with_name("plan.yaml")
+    return path.name.startswith("leg") and plan.is_file() and own_kind(plan) == "plan"
 
 
 def _sources(named: Any, folder: Path) -> tuple[Source, ...]:

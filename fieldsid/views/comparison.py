@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut, facts
-from fieldsid.rounding import number
+from fieldsid.rounding import number, p_value
 from fieldsid.views._words import error_facts, merit_row, percent, speed_words, table, times, warned, where_block, where_rows
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def page(found: Comparison) -> Page:
             ("speed", speed_words(found.shown.record.speed)),
             *error_facts(found.merit, found.floor),
             ("judged by", f"the {found.leading.name}: Theil {number(m.theil, 3)}, R^2 {number(m.r2, 3)}"),
-            ("whiteness", f"p = {number(m.whiteness_p, 2)}"),
+            ("whiteness", p_value(m.whiteness_p)),
         ),
     )
     failing = tuple(where_block(f"Where the {channel.name} fails", channel.where) for channel in found.failing)

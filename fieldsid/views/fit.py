@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
-from fieldsid.rounding import number
+from fieldsid.rounding import number, p_value
 from fieldsid.views._words import (
     base_words,
     counted,
@@ -59,7 +59,7 @@ def page(fit: Fit) -> Page:
             ("samples", f"{sum(len(r) for r in records)} in {seconds:.1f} s"),
             ("estimated", counted(len(model.free), "parameter")),
             *error_facts(goodness_of_fit(fit.predictions), fit.floor),
-            ("whiteness", "" if whiteness is None else f"p = {number(whiteness, 2)}"),
+            ("whiteness", "" if whiteness is None else p_value(whiteness)),
         ),
     )
     blocks = (known, parameter_block(model), _correlations(fit), _runs(fit))

@@ -103,6 +103,15 @@ def test_what_a_model_made_is_no_measured_run(run_cli, folder, name):
     assert [f["run"] for f in answer.json["fits"]] == ["pulses_1.0", "pulses_1.4"]
 
 
+def test_the_fin_of_a_planned_leg_is_no_log(run_cli, folder):
+    (folder / "plan").mkdir()
+    (folder / "plan/plan.yaml").write_text("schema: fieldsid/plan/1\n")
+    for name in ("plan/leg01_doublet_1.40m_s.csv", "logs/leg01.csv"):
+        (folder / name).write_text("time_s,rudder_rad\n0,0\n0.05,0.1\n")
+    kinds = {f["path"]: f["kind"] for f in run_cli("status", "--json").json["files"]}
+    assert (kinds["plan/leg01_doublet_1.40m_s.csv"], kinds["logs/leg01.csv"]) == ("planned", "log")
+
+
 @pytest.mark.parametrize(
     ("command", "verdict", "files", "next_"),
     [

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.rounding import in_unit, number, with_error
+from fieldsid.rounding import in_unit, number, p_value, with_error
 
 
 @pytest.mark.parametrize(
@@ -44,3 +44,13 @@ def test_a_number_alone_has_four_digits(value, expected):
 
 def test_a_plain_number_has_no_unit_behind_it():
     assert [in_unit(u) for u in ("1", "1/s", "rad", "")] == ["", "1/s", "rad", ""]
+
+
+def test_a_p_value_is_no_number_far_out_in_the_tail():
+    assert [p_value(p) for p in (0.63, 0.0162, 0.001, 0.0009, 0.0)] == [
+        "p = 0.63",
+        "p = 0.016",
+        "p = 0.001",
+        "p < 0.001",
+        "p < 0.001",
+    ]

@@ -10,6 +10,7 @@ from fieldsid.noise.noise_kinds import NOISE_KINDS
 from fieldsid.noise.whiten import is_white, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import MIN_WHITENESS_P, ljung_box_p
+from fieldsid.rounding import p_value
 
 
 def residuals_of(problem: Problem, x: FloatArray) -> list[FloatArray]:
@@ -44,6 +45,6 @@ def chosen_noise(problem: Problem, x: FloatArray, weights: Noise) -> tuple[str, 
 def _words(noise_kind: str, p: float) -> str:
     says = NOISE_KINDS[noise_kind].says
     return (
-        f"residuals are not white (p = {p:.2g}): {says}, and the standard errors are those of that noise; "
+        f"residuals are not white ({p_value(p)}): {says}, and the standard errors are those of that noise; "
         "an effect that the model lacks leaves such residuals too: `sysid diagnose`"
     )

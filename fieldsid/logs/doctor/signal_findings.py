@@ -92,9 +92,11 @@ def _frozen(name: str, time: FloatArray, values: FloatArray) -> list[Note]:
     limit = max(FROZEN_S, 5 * step)
     if lengths[k] <= limit:
         return []
+    start, end = float(time[starts[k]]), float(time[ends[k]])
+    before, after = (f"`--to {start:.2f}`",) if start > time[0] else (), (f"`--from {end:.2f}`",) if end < time[-1] else ()
     message = (
-        f"{name} is frozen at {values[starts[k]]:.6g} from {time[starts[k]]:.2f} to {time[ends[k]]:.2f} s "
-        f"(limit {limit:.3g} s); leave it out: `--to {time[starts[k]]:.2f}` or `--from {time[ends[k]]:.2f}`"
+        f"{name} is frozen at {values[starts[k]]:.6g} from {start:.2f} to {end:.2f} s (limit {limit:.3g} s); "
+        f"leave it out: {' or '.join((*before, *after))}"
     )
     return [Note("frozen", message, {"signal": name, "value": float(lengths[k]), "limit": limit})]
 

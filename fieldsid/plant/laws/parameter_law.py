@@ -18,7 +18,7 @@ from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile, student_tail
 from fieldsid.plant.laws.regression import Regression, fit_power_law, fit_powers, rounding_of, t_factor
-from fieldsid.rounding import nine_digits
+from fieldsid.rounding import nine_digits, p_value
 
 FAMILY_ALPHA = 0.05
 MIN_DEGREES_OF_FREEDOM = 2
@@ -49,10 +49,10 @@ class Exponent:
             return f"{spread}: two speeds fit any exponent, so nothing is tested"
         if self.p_against_2 < 0.05:
             return (
-                f"{spread}: not u^2 (p = {self.p_against_2:.2g}); something is missing from the model or moves with speed "
+                f"{spread}: not u^2 ({p_value(self.p_against_2)}); something is missing from the model or moves with speed "
                 "(lag, sway, r|r|, thrust): `sysid diagnose` finds which"
             )
-        return f"{spread}: u^2 is not refuted (p = {self.p_against_2:.2g}); a high R^2 alone would not have shown that"
+        return f"{spread}: u^2 is not refuted ({p_value(self.p_against_2)}); a high R^2 alone would not have shown that"
 
 
 @dataclass(frozen=True, slots=True, repr=False)

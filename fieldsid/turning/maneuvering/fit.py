@@ -6,7 +6,6 @@ noise of each channel is that of its residuals, taken larger by (1 + rho)/(1 - r
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -56,16 +55,11 @@ class Fitted:
     precision: FloatArray
     cost: float
 
-    def cost_at(self, vector: FloatArray, most: float = math.inf) -> float:
-        """Return minus twice the log posterior at a vector, the nuisances moved to where they fit best to first order.
-
-        Once it is above `most` no more runs are simulated, and it is infinite.
-        """
+    def cost_at(self, vector: FloatArray) -> float:
+        """Return minus twice the log posterior at a vector, the nuisances moved to where they fit best to first order."""
         step, p = vector - self.vector, coefficients(vector)
         total = self.prior_cost(vector)
         for cut, local, response in zip(self.cuts, self.local, self.response, strict=True):
-            if total > most:
-                return math.inf
             total += cut.cost(p, local + response @ step, self.noise)
         return total
 

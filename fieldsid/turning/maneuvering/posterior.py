@@ -20,7 +20,7 @@ from fieldsid.turning.maneuvering.fit import Fitted
 
 CHAINS = 8
 STEPS, EVERY = 76, 2
-"""Steps of a chain, each of about five simulations, most of the first runs only; of which of them the turns are worked out."""
+"""Steps of a chain, each of about five simulations of all runs, and of which of them the turns are worked out."""
 BEFORE_ADAPTED, LEFT_OUT = 14, 16
 """Steps before the Gaussian is moved, and those of them and after them that are left out."""
 START_SHARE = 0.5
@@ -70,19 +70,18 @@ class _Gaussian:
 
 
 def _moved(
-    cost: Callable[[FloatArray, float], float], about: _Gaussian, start: FloatArray, steps: int, rng: np.random.Generator
+    cost: Callable[[FloatArray], float], about: _Gaussian, start: FloatArray, steps: int, rng: np.random.Generator
 ) -> FloatArray:
     """Return the chains (c, steps, 22) that go on from states (c, 22)."""
 
-    def rest(vector: FloatArray, least: float) -> float:
+    def rest(vector: FloatArray) -> float:
         away = vector - about.centre
-        of_gaussian = float(away @ about.precision @ away)
-        return -0.5 * (cost(vector, of_gaussian - 2.0 * least) - of_gaussian)
+        return -0.5 * (cost(vector) - float(away @ about.precision @ away))
 
     out = np.empty((start.shape[0], steps, start.shape[1]))
     for chain in range(start.shape[0]):
         vector = start[chain]
-        height = rest(vector, -math.inf)
+        height = rest(vector)
         for step in range(steps):
             vector, height = _slice(rest, about, vector, height, rng)
             out[chain, step] = vector
@@ -90,19 +89,16 @@ def _moved(
 
 
 def _slice(
-    rest: Callable[[FloatArray, float], float], about: _Gaussian, vector: FloatArray, height: float, rng: np.random.Generator
+    rest: Callable[[FloatArray], float], about: _Gaussian, vector: FloatArray, height: float, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:
-    """Return the next state, on an ellipse through this one and a draw of the Gaussian, and what `rest` gives there.
-
-    rest may be minus infinity where it is below its second argument.
-    """
+    """Return the next state, on an ellipse through this one and a draw of the Gaussian, and what `rest` gives there."""
     away, other = vector - about.centre, about.root @ rng.standard_normal(vector.size)
     least = height + math.log(1.0 - rng.uniform())
     angle = rng.uniform(0.0, 2.0 * math.pi)
     low, high = angle - 2.0 * math.pi, angle
     while high - low > NARROWEST_RAD:
         new = about.centre + away * math.cos(angle) + other * math.sin(angle)
-        found = rest(new, least)
+        found = rest(new)
         if found > least:
             return new, found
         low, high = (angle, high) if angle < 0.0 else (low, angle)

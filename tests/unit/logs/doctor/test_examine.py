@@ -187,6 +187,15 @@ def test_degrees_of_one_of_a_pair_are_told_by_what_is_set(signal, units, advice)
     assert message(changed(run, **{signal: np.degrees(run[signal])}), "unit", units=units).message.endswith(advice)
 
 
+@pytest.mark.parametrize(
+    ("where", "ways"), [(slice(0, 60), ["--from"]), (slice(300, 360), ["--to", "--from"]), (slice(-60, None), ["--to"])]
+)
+def test_a_frozen_stretch_at_an_end_is_left_out_at_that_end(where, ways):
+    run = healthy()
+    said = message(changed(run, yaw_rate_rad_s=with_value(run["yaw_rate_rad_s"], where, 0.01)), "frozen").message
+    assert [w for w in ("--to", "--from") if w in said] == ways
+
+
 def test_a_sign_that_is_set_is_taken_back_and_stamps_are_named_where_they_were_chosen():
     run = healthy()
     against, astern = changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"]), changed(run, surge_m_s=-run["surge_m_s"])
