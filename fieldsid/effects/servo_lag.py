@@ -98,15 +98,23 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
 
 
 def equivalent_solution(values: Values, axis: Axis) -> dict[str, float] | None:
-    """Return the start with the servo's pole and the hull's exchanged: in yaw the same response at one speed."""
+    """Return the start with the servo's slow pole and the hull's exchanged: in yaw the same response at one speed.
+
+    With inertia the servo's two time constants T1 >= T2 have the sum `lag` and the product inertia_share lag^2; they are real
+    where inertia_share is 1/4 at most.
+    """
     damping, lag = values[NAMES[axis].damping], values["lag"]
-    if axis is not Axis.YAW or damping <= 0.0 or lag <= FASTEST_S:
+    apart = 1.0 - 4.0 * values.get("inertia_share", 0.0)
+    if axis is not Axis.YAW or damping <= 0.0 or lag <= FASTEST_S or apart < 0.0:
         return None
-    return {
-        NAMES[axis].damping: 1.0 / lag,
-        "lag": 1.0 / damping,
-        NAMES[axis].authority: values[NAMES[axis].authority] / (lag * damping),
+    slow, fast = (0.5 * lag * (1.0 + sign * np.sqrt(apart)) for sign in (1.0, -1.0))
+    moved = 1.0 / damping + fast
+    exchanged = {
+        NAMES[axis].damping: 1.0 / slow,
+        "lag": moved,
+        NAMES[axis].authority: values[NAMES[axis].authority] / (slow * damping),
     }
+    return exchanged | {"inertia_share": fast / damping / moved**2} if "inertia_share" in values else exchanged
 
 
 SLACKENING = Coefficient(

@@ -76,7 +76,7 @@ class Search(MoveEvaluation):
         for h in self._front(best)[:MAX_JOINED]:
             more = [e for e in idle if e.name not in h.names]
             names = frozenset((*h.names, *(e.name for e in more)))
-            if not more or names in self.tried or len(names) > len(self.known) + MAX_EFFECTS:
+            if not more or names in self.tried:
                 continue
             fitted, other = h.likelihood_fit.fitted, best.likelihood_fit.fitted
             problem = fitted.problem.with_effects([*h.effects, *more])

@@ -248,3 +248,23 @@ def test_a_path_that_hardly_moves_is_mapped_like_one_that_rests():
     log = record([0.0, 1.0, 2.0], [0.2, 0.2 + 3e-7, 0.2 + 6e-6], held=False)
     path = through("stall", log, stall_angle=0.1, slope_after=0.5)
     np.testing.assert_allclose(path.mean, 0.15 + 0.5 * (log.commanded.mean - 0.2), atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [{}, {"inertia_share": 0.12}], ids=("of first order", "with inertia"))
+def test_the_equivalent_solution_exchanges_the_poles_of_servo_and_hull(shape):
+    """Poles and static gain of b2 / ((inertia lag^2 s^2 + lag s + 1) (s + a22)), by the roots of the polynomials."""
+    values = {"a22": 2.0, "b2": -3.0, "lag": 1.4} | shape
+    other = values | pick_effect("servo_lag").equivalent_solution(values, Axis.YAW)
+
+    def poles_and_gain(v):
+        servo = [v.get("inertia_share", 0.0) * v["lag"] ** 2, v["lag"], 1.0]
+        return np.sort(np.roots(np.polymul(np.trim_zeros(servo, "f"), [1.0, v["a22"]]))), v["b2"] / v["a22"]
+
+    assert other["lag"] < values["lag"]
+    for before, after in zip(poles_and_gain(values), poles_and_gain(other), strict=True):
+        np.testing.assert_allclose(after, before, rtol=1e-12)
+
+
+@pytest.mark.parametrize("values", [{"a22": -0.1}, {"lag": 0.0}, {"inertia_share": 0.5}])
+def test_what_has_no_pole_to_exchange_has_no_equivalent_solution(values):
+    assert pick_effect("servo_lag").equivalent_solution({"a22": 2.0, "b2": -3.0, "lag": 0.4} | values, Axis.YAW) is None
