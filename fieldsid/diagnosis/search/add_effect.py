@@ -60,8 +60,11 @@ def add_effect(
     """Return the moves worth evaluating: the `most` best of two screens, by output-error cost and by whitened cost.
 
     All starts of every effect where `most` is None. `anew`: time shifts are tried too, because a base model that lacks one has
-    biased parameters (see `_iterate_time_shift`). `flown`: the output-error screen was done before, and is left out.
+    biased parameters (see `_iterate_time_shift`). `flown`: the output-error screen was done before, and is left out. A parent
+    that diverges has no moves: nothing is linearised there.
     """
+    if not np.isfinite(parent.likelihood_fit.log_likelihood):
+        return []
     grounds = (
         [(_likelihood_linearisation(parent), False)]
         if flown

@@ -72,6 +72,13 @@ def test_a_model_that_diverges_is_not_expanded(base):
     assert not base._is_expandable(replace(h, validation_log_density=np.full(1, -np.inf)))
 
 
+def test_a_model_that_diverges_has_no_moves(base):
+    h = base.base()
+    lost = replace(h, likelihood_fit=replace(h.likelihood_fit, log_likelihood=-np.inf))
+    assert add_effect(h, base.catalogue, None, base.parallel, anew=False, flown=True)
+    assert not add_effect(lost, base.catalogue, None, base.parallel, anew=False, flown=True)
+
+
 @pytest.mark.parametrize(("unseen", "kept"), [(-300.0, False), (1.0, True)])
 def test_a_better_fit_is_kept_where_unseen_runs_agree(base, other_ends, unseen, kept):
     other_ends(unseen)
