@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from fieldsid.errors import DataError, ModelError, UsageError
+from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import Note, Run
-from fieldsid.logs.several.sifting import Refused, attempt, sifted
+from fieldsid.logs.several.sifting import Refused
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
+from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
 from fieldsid.turning.maneuvering.belief import Belief, believe
-from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD
-from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
 from fieldsid.turning.paper_formulas import (
     FIN_ZERO_TOLERANCE,
@@ -27,18 +26,13 @@ from fieldsid.turning.paper_formulas import (
     u_turn,
     usable_fin,
 )
-from fieldsid.turning.prediction import SIDES, MeasuredRow, TurnPrediction, TurnRow, settling_flight
+from fieldsid.turning.prediction import SIDES, TurnPrediction, TurnRow, settling_flight
 from fieldsid.turning.steady.blended_turns import BlendedTurns, blended_turns
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
 RADIUS_DRAWS = 500
 SEED = 20240511
 METHODS = ("auto", "u_turn", "steady", "simulated", "maneuvering")
-REPEATED_SD = 0.005
-"""Share by which a circle differs from one flight to the next: hulls of the ensemble (seed 1) were 0.1 to 0.3 % off the truth in
-a water that turns them with a hundredth of the rudder's moment, at the very speed and rudder asked for."""
-LEAST_HELD_FIN_RAD = 0.01
-"""A circle with less rudder is that of a trim, or of a current."""
 MIN_REPORTED_OFFSET_RAD = 0.0025
 """An offset in rad that moves a radius by a hundredth."""
 
@@ -76,7 +70,7 @@ def turn_radius(
         )
     before, belief, unfitted = _beliefs(source, runs, measured, length, method, chosen)
     surge = fit_surge(runs) if chosen in ("simulated", "maneuvering") and runs else None
-    turns, lacking = _circles(measured, unfit, needed=belief is None)
+    turns, lacking = circles_of(measured, unfit, needed=belief is None)
 
     def rows_at(at: Sequence[float], rudder: float, known: Belief | None = before) -> list[TurnRow]:
         if known is not None:
@@ -90,10 +84,10 @@ def turn_radius(
         _refuse_turns(source, speeds, rudder_max)
     rows = rows_at(speeds, rudder_max, belief)
     least = (lambda _speed: 0.0) if not by_formula else (lambda speed: abs(_offset(source, speed)))
-    against = [turn for turn in turns if _against_rudder(turn, source)]
-    lacking += [_turned_against(turn) for turn in against]
-    compared = [_compared(turn, rows_at, least) for turn in turns if not any(turn is other for other in against)]
-    rows = [_with_measurement(row, compared, rudder_max) for row in rows]
+    against = [turn for turn in turns if against_rudder(turn, source)]
+    lacking += [turned_against(turn) for turn in against]
+    compared = [compared_with(turn, rows_at, least) for turn in turns if not any(turn is other for other in against)]
+    rows = [with_measurement(row, compared, rudder_max) for row in rows]
     return TurnPrediction(
         tuple(rows), tuple(compared), rudder_max, surge, (*unfitted, *lacking, *_notes(source, rows, chosen, surge, fin_zero))
     )
@@ -121,18 +115,6 @@ def _beliefs(
             hint="name them with `--runs`, with surge_m_s mapped",
         )  # fmt: skip
     return before, belief, notes
-
-
-def _circles(measured: Sequence[Run], unfit: Refused[Run] | None, *, needed: bool) -> tuple[list[MeasuredTurn], list[Note]]:
-    """Return the circles of measured runs; where none has one and none is `needed`, a note that they count as runs only."""
-    try:
-        return [turn for _, turn in sifted(measured, (attempt(measure_turn, run) for run in measured), unfit)], []
-    except DataError as error:
-        if needed:
-            raise
-        names = ", ".join(run.name for run in measured)
-        words = f"{error.what}: {names} shapes the prediction, but there is no circle to compare it with"
-        return [], [Note("no_circle", words, {"runs": [run.name for run in measured]})]
 
 
 def _formula_rows(
@@ -294,57 +276,6 @@ def _reach(source: ParameterSource, speed: float, rudder: float, rate: float, qu
     slowest = model.values.get("cross_damping", np.inf) * model.law.scale(speed)
     seen = slowest * model.trained.get("held_s", 0.0) >= 1.0
     return data_coverage(model.trained, fin=rudder, rate=abs(rate), quarter_s=quarter_s, speed_flown=flown, sway_settles=seen)
-
-
-def _against_rudder(turn: MeasuredTurn, source: ParameterSource) -> bool:
-    """Return whether a circle was turned away from its rudder, as an unstable hull may: a run, and not the rudder's circle."""
-    way = float(np.sign(source.base_at(float(source.speeds[0]))[NAMES[Axis.YAW].authority])) * turn.fin
-    return bool(np.isfinite(way)) and abs(turn.fin) > LEAST_HELD_FIN_RAD and (way > 0.0) != (turn.side == "starboard")
-
-
-def _turned_against(turn: MeasuredTurn) -> Note:
-    words = f"{turn.run} turned to {turn.side} with a rudder of {turn.fin:.3g} rad to the other side: it is not compared"
-    return Note("turned_against_rudder", words, {"runs": [turn.run]})
-
-
-def _compared(
-    turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
-) -> MeasuredRow:
-    """Return a measured turn with its prediction; there is none where its fin is below the least one predicted at its speed."""
-    speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
-    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(speed))):
-        nan = float("nan")
-        return MeasuredRow(turn, nan, (nan, nan))
-    row = next(r for r in rows_at([speed], abs(turn.fin)) if r.side == turn.side)
-    return MeasuredRow(turn, row.radius, row.interval95)
-
-
-def _with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: float) -> TurnRow:
-    """Return the row with the measured radius where a circle was flown at this speed, side and rudder.
-
-    A u-turn ends before it has settled, and what carried it is not known: a belief has it among its runs, and is nearer.
-    """
-    for m in measured:
-        whole = row.method != "maneuvering" or abs(m.turn.circle.turned) >= LEAST_TURN_FOR_CURRENT_RAD
-        if whole and m.entered(row.speed, row.side) and m.held(rudder):
-            return replace(
-                row,
-                radius=m.turn.circle.radius,
-                interval95=_repeatable(m.turn),
-                method="measured",
-                trust="measured",
-                because=(),
-                settle_with=f"settled by `{m.turn.run}`",
-            )
-    return row
-
-
-def _repeatable(turn: MeasuredTurn) -> tuple[float, float]:
-    """Return the 95 % interval of a measured circle as another flight would give it: the water is not the same again."""
-    low, high = turn.circle.interval95
-    middle = turn.circle.radius
-    half = float(np.hypot(0.5 * (high - low), 1.96 * REPEATED_SD * middle))
-    return middle - half, middle + half
 
 
 def _by_side(rows: Sequence[TurnRow]) -> list[TurnRow]:

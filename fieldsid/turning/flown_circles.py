@@ -1,0 +1,87 @@
+"""Circles that were flown beside a prediction: found in their runs, compared with it, and put in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fieldsid.errors import DataError
+from fieldsid.logs.run import Note, Run
+from fieldsid.logs.several.sifting import Refused, attempt, sifted
+from fieldsid.models.axis import NAMES, Axis
+from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD
+from fieldsid.turning.measured.measured_turn import MeasuredTurn, measure_turn
+from fieldsid.turning.prediction import MeasuredRow, TurnRow
+
+REPEATED_SD = 0.005
+"""Share by which a circle differs from one flight to the next: hulls of the ensemble (seed 1) were 0.1 to 0.3 % off the truth in
+a water that turns them with a hundredth of the rudder's moment, at the very speed and rudder asked for."""
+LEAST_HELD_FIN_RAD = 0.01
+"""A circle with less rudder is that of a trim, or of a current."""
+
+
+def circles_of(measured: Sequence[Run], unfit: Refused[Run] | None, *, needed: bool) -> tuple[list[MeasuredTurn], list[Note]]:
+    """Return the circles of measured runs; where none has one and none is `needed`, a note that they count as runs only."""
+    try:
+        return [turn for _, turn in sifted(measured, (attempt(measure_turn, run) for run in measured), unfit)], []
+    except DataError as error:
+        if needed:
+            raise
+        names = ", ".join(run.name for run in measured)
+        words = f"{error.what}: {names} shapes the prediction, but there is no circle to compare it with"
+        return [], [Note("no_circle", words, {"runs": [run.name for run in measured]})]
+
+
+def against_rudder(turn: MeasuredTurn, source: ParameterSource) -> bool:
+    """Return whether a circle was turned away from its rudder, as an unstable hull may: a run, and not the rudder's circle."""
+    way = float(np.sign(source.base_at(float(source.speeds[0]))[NAMES[Axis.YAW].authority])) * turn.fin
+    return bool(np.isfinite(way)) and abs(turn.fin) > LEAST_HELD_FIN_RAD and (way > 0.0) != (turn.side == "starboard")
+
+
+def turned_against(turn: MeasuredTurn) -> Note:
+    """Return the note that says so."""
+    words = f"{turn.run} turned to {turn.side} with a rudder of {turn.fin:.3g} rad to the other side: it is not compared"
+    return Note("turned_against_rudder", words, {"runs": [turn.run]})
+
+
+def compared_with(
+    turn: MeasuredTurn, rows_at: Callable[[Sequence[float], float], list[TurnRow]], least: Callable[[float], float]
+) -> MeasuredRow:
+    """Return a measured turn with its prediction; there is none where its fin is below the least one predicted at its speed."""
+    speed = turn.entry_speed if np.isfinite(turn.entry_speed) else turn.path_speed
+    if not (np.isfinite(turn.fin) and abs(turn.fin) > max(LEAST_HELD_FIN_RAD, least(speed))):
+        nan = float("nan")
+        return MeasuredRow(turn, nan, (nan, nan))
+    row = next(r for r in rows_at([speed], abs(turn.fin)) if r.side == turn.side)
+    return MeasuredRow(turn, row.radius, row.interval95)
+
+
+def with_measurement(row: TurnRow, measured: Sequence[MeasuredRow], rudder: float) -> TurnRow:
+    """Return the row with the measured radius where a circle was flown at this speed, side and rudder.
+
+    A u-turn ends before it has settled, and what carried it is not known: a belief has it among its runs, and is nearer.
+    """
+    for m in measured:
+        whole = row.method != "maneuvering" or abs(m.turn.circle.turned) >= LEAST_TURN_FOR_CURRENT_RAD
+        if whole and m.entered(row.speed, row.side) and m.held(rudder):
+            return replace(
+                row,
+                radius=m.turn.circle.radius,
+                interval95=_repeatable(m.turn),
+                method="measured",
+                trust="measured",
+                because=(),
+                settle_with=f"settled by `{m.turn.run}`",
+            )
+    return row
+
+
+def _repeatable(turn: MeasuredTurn) -> tuple[float, float]:
+    """Return the 95 % interval of a measured circle as another flight would give it: the water is not the same again."""
+    low, high = turn.circle.interval95
+    middle = turn.circle.radius
+    half = float(np.hypot(0.5 * (high - low), 1.96 * REPEATED_SD * middle))
+    return middle - half, middle + half
