@@ -1,8 +1,7 @@
 """Gains at one speed for a chosen controller: by formula, with the bandwidth and damping that `optimum` finds.
 
 The estimate has the damping and phase margin asked; 95 % of the draws of its errors leave half of the margin and fly the step,
-with the fin's limits, the speed lost in the turn and the drag of the turning hull. P and PI are as fast as that lets them, what
-has a rate is that of least quadratic cost.
+with the fin's limits, the speed lost in the turn and the drag of the turning hull. P and PI are as fast as that lets them.
 
 Yaw P is the paper's: kp = a22^2 / (4 zeta^2 b2) puts the poles at damping zeta; with a fin's lag, delay or a sway state it is
 found as the largest gain whose poles keep that damping, which is the same number where there are none. Feed-forward is
@@ -20,19 +19,18 @@ from scipy.linalg import solve_continuous_are
 
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import Axis
-from fieldsid.models.model import Noise
 from fieldsid.registry import near
 from fieldsid.schedule.controller import KINDS, Gains
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, margins, worst_of
+from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
 from fieldsid.schedule.optimum import (
     DRAWS_MARGIN_SHARE,
     LACK_ROUNDING,
     Demand,
     Found,
-    best_gains,
     fastest_gains,
     flown,
+    soonest_gains,
 )
 
 INTEGRAL_SHARE = 0.1
@@ -89,20 +87,21 @@ def check_wish(wish: Wish) -> None:
         raise UsageError("the phase margin must lie in 10 .. 80 deg", found=f"{wish.phase_margin_deg:g}", hint=hint)
 
 
-def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float, noise: Noise | None = None) -> Designed:
+def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
     """Return the gains of one speed that serve most of a plant's draws; raises ModelError where the estimate is not served.
 
     P and PI that serve fewer than half of the draws are refused as well; with a rate, where no gains serve as many draws as they
-    have to, they are the estimate's, and `held` says of how few: half-way between serves neither. `noise` is the sensors'.
+    have to, they are the estimate's, and `held` says of how few: half-way between serves neither.
     """
     one, family = plant.one(), plant.distinct()
     if wish.kind in PROPORTIONAL and one.slow_damping[0] <= 0:
         raise _unstable(family, wish, fin_limit)
-    asked = _Asked(wish, fin_limit, noise)
-    found = _found(family, asked)
+    found, demand = _found(family, wish, fin_limit), _demand(family, wish, fin_limit)
     if found is None:
-        raise _refusal(family, asked)
-    did = flown(family, found.gains, asked.demand(family))
+        raise _refusal(family, wish, fin_limit)
+    did = flown(family, found.gains, demand)
+    if did.held < HELD_SHARE and (alone := _found(one, wish, fin_limit)) is not None:
+        found, did = alone, flown(family, alone.gains, demand)
     crossover = float(np.nan_to_num(margins(one, found.gains).crossover[0]))
     depth_gain = _depth_gain(family, found.gains) if plant.axis is Axis.PITCH else 0.0
     return Designed(found.gains, crossover, found.share, _reference_gain(one), depth_gain, did.held, did.settling)
@@ -132,48 +131,24 @@ def _reference_gain(plant: LinearPlant) -> float:
     return float(plant.stiffness[0]) / float(plant.slow_authority[0])
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What is asked of the loop, of which fin (rad), under which noise of the sensors."""
-
-    wish: Wish
-    fin_limit: float
-    noise: Noise | None
-
-    def demand(self, family: LinearPlant) -> Demand:
-        wish, noise = self.wish, self.noise
-        allowed = _overshoot_of(min(wish.damping, DRAWS_MARGIN_SHARE * wish.phase_margin_deg / 100.0))
-        seconds = float(np.clip(FLOWN_TIMES / _full_bandwidth(family.one(), wish, self.fin_limit), *FLOWN_S))
-        return Demand(
-            _damping_floor(wish), wish.phase_margin_deg, wish.largest_error, allowed, self.fin_limit, seconds,
-            *((0.0, 0.0) if noise is None else (_known(noise.angle), _known(noise.rate))),
-        )  # fmt: skip
-
-    def of(self, family: LinearPlant) -> Found:
-        """Return the gains that lack nothing with a family, or least."""
-        wish, demand = self.wish, self.demand(family)
-        attempt = _DESIGN_ATTEMPTS[wish.kind](family.one(), wish, self.fin_limit)
-        if wish.kind in PROPORTIONAL:
-            return fastest_gains(family, lambda share: attempt(share, 1.0), demand)
+def _found(family: LinearPlant, wish: Wish, fin_limit: float) -> Found | None:
+    """Return the gains of least cost; None where they do not serve the estimate, or with P and PI not half of the draws."""
+    demand = _demand(family, wish, fin_limit)
+    attempt = _DESIGN_ATTEMPTS[wish.kind](family.one(), wish, fin_limit)
+    if wish.kind in PROPORTIONAL:
+        found = fastest_gains(family, lambda share: attempt(share, 1.0), demand)
+    else:
         most = MOST_DAMPING / wish.damping if wish.kind in RATE_FED else 1.0
-        return best_gains(family, attempt, demand, most, bounded=wish.bandwidth is not None)
-
-
-def _found(family: LinearPlant, asked: _Asked) -> Found | None:
-    """Return the gains that serve a family, else its estimate; None where none do, or with P and PI not half of the draws."""
-    found = asked.of(family)
-    # rather the estimate's gains than half-way ones, and rather a fin that trembles than a vehicle that leaves its course
-    for other, of in ((asked, family.one()), (replace(asked, noise=None), family), (replace(asked, noise=None), family.one())):
-        if found.lack > LACK_ROUNDING:
-            found = other.of(of)
-    if found.lack > LACK_ROUNDING:
+        found = soonest_gains(family, attempt, demand, most, bounded=wish.bandwidth is not None)
+    if found.own_lack > LACK_ROUNDING:
         return None
-    few = asked.wish.kind in PROPORTIONAL and flown(family, found.gains, asked.demand(family)).held < LEAST_HELD
-    return None if few else found
+    return None if wish.kind in PROPORTIONAL and flown(family, found.gains, demand).held < LEAST_HELD else found
 
 
-def _known(noise: float) -> float:
-    return noise if np.isfinite(noise) else 0.0
+def _demand(family: LinearPlant, wish: Wish, fin_limit: float) -> Demand:
+    allowed = _overshoot_of(min(wish.damping, DRAWS_MARGIN_SHARE * wish.phase_margin_deg / 100.0))
+    seconds = float(np.clip(FLOWN_TIMES / _full_bandwidth(family.one(), wish, fin_limit), *FLOWN_S))
+    return Demand(_damping_floor(wish), wish.phase_margin_deg, wish.largest_error, allowed, fin_limit, seconds)
 
 
 def _full_bandwidth(one: LinearPlant, wish: Wish, fin_limit: float) -> float:
@@ -187,7 +162,7 @@ def _unstable(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
     return ModelError(
         f"the plant is unstable at {family.speed:.3g} m/s, and a proportional gain alone cannot hold it",
         found=f"damping {family.slow_damping[0]:.3g} 1/s{grows}{_of_draws(family)}",
-        hint=_remedy(family, _Asked(wish, fin_limit, None)),
+        hint=_remedy(family, wish, fin_limit),
     )
 
 
@@ -196,11 +171,11 @@ def _of_draws(family: LinearPlant) -> str:
     return f"; unstable by {unstable} of {family.count} draws of the errors" if unstable and family.count > 1 else ""
 
 
-def _refusal(family: LinearPlant, asked: _Asked) -> ModelError:
-    one, wish = family.one(), asked.wish
+def _refusal(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
+    one = family.one()
     whom = "" if family.count == 1 or wish.kind not in PROPORTIONAL else " for half of the draws of the models' errors"
     found = f"damping {one.slow_damping[0]:.3g} 1/s, fin lag {one.lag[0]:.3g} s, delay {one.delay[0]:.3g} s"
-    hint = _remedy(family, asked)
+    hint = _remedy(family, wish, fin_limit)
     return ModelError(
         f"no {wish.kind} gain keeps damping {wish.damping:g} and {wish.phase_margin_deg:g} deg at {family.speed:.3g} m/s{whom}",
         found=f"{found}{_of_draws(family)}",
@@ -208,9 +183,8 @@ def _refusal(family: LinearPlant, asked: _Asked) -> ModelError:
     )
 
 
-def _remedy(family: LinearPlant, asked: _Asked) -> str:
+def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
     """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does."""
-    wish = asked.wish
     others = {
         **{f"--controller {kind}": replace(wish, kind=kind) for kind in ("pd", "pid", "lqr") if kind != wish.kind},
         **{f"--damping {d:g}": replace(wish, damping=d) for d in (0.5, 0.3) if d < wish.damping},
@@ -225,7 +199,7 @@ def _remedy(family: LinearPlant, asked: _Asked) -> str:
     for option, other in others.items():
         if other.kind in PROPORTIONAL and one.slow_damping[0] <= 0:
             continue
-        if _found(family, replace(asked, wish=other)) is not None:
+        if _found(family, other, fin_limit) is not None:
             return f"at this speed there is one with `{option}`"
     return ""
 

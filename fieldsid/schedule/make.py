@@ -87,8 +87,7 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
 
 def _row(plants: Plants, speed: float, fin_limit: float, wish: Wish, *, depth: bool) -> Row:
     near = plants.at(speed, fin_limit, DESIGN_DRAWS, SEED)
-    noise = plants.noise_at(speed)
-    made = [(design_gains(plant, wish, fin_limit, noise), plant, share) for plant, share in near]
+    made = [(design_gains(plant, wish, fin_limit), plant, share) for plant, share in near]
     gains, forward, reference, depth_gain, slowed = Gains(0.0), 0.0, 0.0, 0.0, 1.0
     for designed, plant, share in made:
         own = designed.gains.times(share)

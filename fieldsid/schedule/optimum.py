@@ -1,54 +1,46 @@
-"""Gains of least quadratic cost that meet what is asked of them: requirements that hold, and weights from what is at hand.
+"""Gains as the minimum of one continuous cost: how late the flown step is right, what the margins lack, how wide the band is.
 
-At every bandwidth the damping is the least with which the requirements hold: the estimate has the damping of its poles and the
-phase margin asked, 95 % of the draws half of that margin, their flown steps overshoot no more than such a margin does and come
-to rest, and the sensors' noise leaves the fin its travel. Among the bandwidths with which they hold, that of the least
-int (error / largest error)^2 + (fin / its limit)^2 dt over the flown step, the mean of the draws: the error counts as the
-largest one that is to be met, the fin as what it has (Bryson & Ho 1975, section 5.2), and there is nothing left to choose.
-All of this is continuous in the gains and in the plant: rows next to each other differ by what the plant differs.
+The lateness is sqrt(int t |error| dt) over the step (ITAE; Graham & Lathrop 1953): the time constant of a first-order answer.
+What lacks is counted of the estimate (all of the wish), of 95 % of the draws (half of its margin) and of their flown steps.
+Every part is continuous in the gains and in the plant: rows next to each other differ by what the plant differs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
+from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.controller import Gains, least_damping
-from fieldsid.schedule.flown.response import (
-    LIMIT_CYCLE_SHARE,
-    MOST_ERROR,
-    Steps,
-    about_rest,
-    overshoot,
-    settling,
-    step_response,
-    swing,
-)
+from fieldsid.schedule.flown.response import LIMIT_CYCLE_SHARE, about_rest, lateness, overshoot, settling, step_response, swing
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import margins, worst_of
+from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
 from fieldsid.schedule.record import Row
 
 DRAWS_MARGIN_SHARE = 0.5
 """Share of the wished phase margin that a draw of the errors has to leave: the estimate has all of it."""
-NOISE_SHARE = 0.1
-"""Standard deviation that the sensors' noise may have at the fin, over its limit and over its rate: three of them leave the loop
-two thirds of either."""
-AUTOPILOT_PERIOD_S = 0.1
-"""A fin without a lag of its own moves over so much time: autopilots of such vehicles run at 10 Hz or so."""
 SEARCHED_RAD_S = np.geomspace(5e-3, 100.0, 240)
 """Coarser than the margins' own grid: it is interpolated between, and the row found is checked on the fine one."""
-SLOWEST_SHARE, FASTEST_SHARE = 0.03, 1.5
-"""Of the bandwidth that uses the whole fin at the largest error."""
-BANDWIDTHS, DAMPINGS = 13, 5
-"""Places looked at before what lies between two of them is halved."""
+LACK_PRICE = 20.0
+"""Cost of lacking the whole of a requirement: a tenth of a margin costs more than any time that giving it up could buy."""
+BANDWIDTH_PRICE = 0.1
+"""A tenth more of bandwidth has to buy 1 % of the time: beyond the fin's limit it buys nothing."""
+DAMPING_PRICE = 0.05
+"""So that of dampings which lack alike the wished one is taken."""
+BEYOND_PRICE = 2.0
+"""Bandwidth that uses more than the whole fin at the largest error costs more than the time it could buy, which goes with 1."""
+SLOWEST_SHARE, FASTEST_SHARE = 0.03, 2.0
+SCANNED = 7
 PLACE_ROUNDING = 1e-3
-"""To how much of an e-fold a place is found: gains to a thousandth."""
+"""To how much of an e-fold the least is found: gains to a thousandth."""
+LACK_ROUNDING = 2e-3
 FORMULA_ROUNDING = 1e-6
 """A formula that meets the damping exactly must not lack by rounding."""
-LACK_ROUNDING = 2e-3
+OWN_PRICE = 5.0
+"""What the estimate lacks counts so many times what draws lack: gains that do not serve it are refused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +48,7 @@ class Demand:
     """What gains have to leave: damping of the estimate's poles, phase margin (deg) of the estimate, the step (rad) flown.
 
     `draws_overshoot` is the share by which 95 % of the draws may overshoot; `fin_limit` (rad) bounds the fin; a step is flown
-    for `seconds`; `angle_noise` (rad) and `rate_noise` (rad/s) are the sensors'.
+    for `seconds`.
     """
 
     damping: float
@@ -65,16 +57,15 @@ class Demand:
     draws_overshoot: float
     fin_limit: float
     seconds: float
-    angle_noise: float = 0.0
-    rate_noise: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Gains, the share of the full-fin bandwidth they have, and what they lack of the requirement they are farthest from."""
+    """Gains, the share of the full-fin bandwidth they have, what they lack: of the estimate's margins, and of everything."""
 
     gains: Gains
     share: float
+    own_lack: float
     lack: float
 
 
@@ -86,217 +77,118 @@ class Flown:
     settling: float
 
 
-def least_place(lack: Callable[[float], float], low: float, high: float, count: int) -> float | None:
-    """Return the least place at which a continuous lack is nil, looked at from below in `count` places; None where none is."""
-    before, of_before = low, lack(low)
-    if of_before <= LACK_ROUNDING:
-        return low
-    for place in map(float, np.linspace(low, high, count)[1:]):
-        found = lack(place)
-        if found <= 0.0:
-            return _edge(lack, before, place)
-        before = place
-    return None
-
-
-def _edge(lack: Callable[[float], float], outside: float, inside: float) -> float:
-    """Return the place next to where a lack vanishes on the way from `outside` to `inside`, on the side where it is nil."""
-    place = float(brentq(lack, outside, inside, xtol=PLACE_ROUNDING))
-    return place + (1.0 if inside > outside else -1.0) * min(PLACE_ROUNDING, abs(inside - place))
-
-
-def minimum(cost: Callable[[float], float], low: float, high: float, count: int) -> float:
+def minimum(cost: Callable[[float], float], low: float, high: float) -> float:
     """Return where a continuous cost is least between two places: scanned, then by Brent's method around the best."""
-    places = np.linspace(low, high, count)
+    places = np.linspace(low, high, SCANNED)
     costs = [cost(float(x)) for x in places]
     at = int(np.argmin(costs))
-    around = (float(places[max(at - 1, 0)]), float(places[min(at + 1, count - 1)]))
+    around = (float(places[max(at - 1, 0)]), float(places[min(at + 1, SCANNED - 1)]))
     near = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": PLACE_ROUNDING})
     return float(near.x) if near.fun < costs[at] else float(places[at])
 
 
 def fastest_gains(family: LinearPlant, attempt: Callable[[float], Gains], demand: Demand) -> Found:
-    """Return the gains of the largest share (up to 1) of what an attempt wishes that lack nothing, or those that lack least."""
-    return _Search(family, lambda share, _: attempt(share), demand, 0.0).fastest(0.0)
+    """Return the gains of the largest share (up to 1) of what an attempt wishes that lack nothing, or the least."""
+
+    def cost(log_share: float) -> float:
+        gains = attempt(float(np.exp(log_share)))
+        return LACK_PRICE * (linear_lack(family, gains, demand) + flown_lack(family, gains, demand)) - log_share
+
+    share = float(np.exp(minimum(cost, np.log(SLOWEST_SHARE), 0.0)))
+    return _found(family, attempt(share), share, demand)
 
 
-def best_gains(
+def soonest_gains(
     family: LinearPlant, attempt: Callable[[float, float], Gains], demand: Demand, most_damping: float, *, bounded: bool
 ) -> Found:
-    """Return the gains of least cost that lack nothing over bandwidth and damping, an attempt's shares of those wished.
+    """Return the gains of least cost over bandwidth and damping, an attempt's shares of those wished.
 
-    `most_damping` is the largest multiple of the wished damping; `bounded` keeps to a bandwidth that was asked for. Where all
-    lack something they are those that lack least.
+    `most_damping` is the largest multiple of the wished damping; `bounded` keeps to a bandwidth that was asked for.
     """
-    search = _Search(family, attempt, demand, float(np.log(most_damping)))
-    return search.fastest(0.0) if bounded else search.best(float(np.log(FASTEST_SHARE)))
+    most = float(np.log(most_damping))
 
+    def needed(share: float) -> float:
+        def lacking(log_more: float) -> float:
+            return LACK_PRICE * linear_lack(family, attempt(share, float(np.exp(log_more))), demand) + DAMPING_PRICE * log_more
 
-@dataclass(frozen=True, slots=True)
-class _Tried:
-    """What was found at one bandwidth, a logarithm: that of the damping, what lacks, the step's cost (s)."""
+        return minimum(lacking, 0.0, most) if most > 0.0 and linear_lack(family, attempt(share, 1.0), demand) > 0.0 else 0.0
 
-    place: float
-    more: float
-    lack: float
-    cost: float
+    def cost(share: float, log_more: float) -> float:
+        gains = attempt(share, float(np.exp(log_more)))
+        late, lack = _lateness_and_lack(family, gains, demand)
+        beyond = BANDWIDTH_PRICE * np.log(share) + BEYOND_PRICE * max(np.log(share), 0.0)
+        price = -np.log(share) if bounded else np.log(late) + beyond
+        return float(price + DAMPING_PRICE * log_more + LACK_PRICE * (linear_lack(family, gains, demand) + lack))
 
-    @property
-    def serves(self) -> bool:
-        return self.lack <= LACK_ROUNDING
+    def of_share(log_share: float) -> float:
+        share = float(np.exp(log_share))
+        return cost(share, needed(share))
 
-
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """Bandwidths from the fastest down, at each the least damping that serves; places are logarithms of shares."""
-
-    family: LinearPlant
-    attempt: Callable[[float, float], Gains]
-    demand: Demand
-    most: float
-
-    def gains(self, place: float, more: float) -> Gains:
-        return self.attempt(float(np.exp(place)), float(np.exp(more)))
-
-    def lack(self, place: float, more: float) -> float:
-        return lack(self.family, self.gains(place, more), self.demand)
-
-    def tried(self, place: float) -> _Tried:
-        """Return the least damping that serves at a bandwidth, that which lacks least where none does."""
-
-        def linear(more: float) -> float:
-            return linear_lack(self.family, self.gains(place, more), self.demand)
-
-        more: float | None = 0.0
-        if self.most > 0.0:
-            more = least_place(linear, 0.0, self.most, DAMPINGS)
-        cost, found = np.inf, np.inf
-        if more is not None:
-            cost, found = _cost_and_lack(self.family, self.gains(place, more), self.demand)
-            if found > LACK_ROUNDING and self.most > more:
-                more = least_place(lambda x: self.lack(place, x), more, self.most, DAMPINGS)
-        if more is None:
-            more = minimum(lambda x: self.lack(place, x), 0.0, self.most, DAMPINGS)
-        if not found <= LACK_ROUNDING:
-            cost, found = _cost_and_lack(self.family, self.gains(place, more), self.demand)
-        return _Tried(place, more, found, cost)
-
-    def lack_at(self, place: float) -> float:
-        return self.tried(place).lack
-
-    def served(self, highest: float) -> tuple[list[_Tried], float | None]:
-        """Return what serves from the fastest of some places down to one beyond the least cost, and the place above the first."""
-        above, found = None, []
-        for place in map(float, np.linspace(highest, np.log(SLOWEST_SHARE), BANDWIDTHS)):
-            tried = self.tried(place)
-            if tried.serves:
-                found.append(tried)
-                if len(found) > 1 and tried.cost > found[-2].cost:
-                    break
-            elif found:
-                break
-            else:
-                above = place
-        return found, above
-
-    def top(self, first: _Tried, above: float | None) -> _Tried:
-        """Return what is found at the fastest bandwidth that serves."""
-        return first if above is None or first.lack > 0.0 else self.tried(_edge(self.lack_at, above, first.place))
-
-    def fastest(self, highest: float) -> Found:
-        found, above = self.served(highest)
-        return self.found(self.top(found[0], above)) if found else self.least()
-
-    def best(self, highest: float) -> Found:
-        found, above = self.served(highest)
-        if not found:
-            return self.least()
-        step = (highest - float(np.log(SLOWEST_SHARE))) / (BANDWIDTHS - 1)
-        near = min(found, key=lambda t: t.cost)
-        most = near.place + step
-        if near is found[0]:
-            most = self.top(near, above).place
-        around = (near.place - step, min(most, highest))
-        least = minimize_scalar(
-            lambda x: self.priced(float(x)), bounds=around, method="bounded", options={"xatol": PLACE_ROUNDING}
-        )
-        tried = self.tried(float(least.x))
-        return self.found(tried if tried.serves and tried.cost < near.cost else near)
-
-    def priced(self, place: float) -> float:
-        """Return the cost at a bandwidth that serves, infinite at one that does not."""
-        tried = self.tried(place)
-        return tried.cost if tried.serves else np.inf
-
-    def least(self) -> Found:
-        """Return the gains that lack least."""
-        place = minimum(self.lack_at, float(np.log(SLOWEST_SHARE)), 0.0, BANDWIDTHS)
-        return self.found(self.tried(place))
-
-    def found(self, tried: _Tried) -> Found:
-        return Found(self.gains(tried.place, tried.more), float(np.exp(tried.place)), max(tried.lack, 0.0))
+    place = minimum(of_share, np.log(SLOWEST_SHARE), 0.0 if bounded else np.log(FASTEST_SHARE))
+    # the price has its corner at the whole fin: met exactly, a row is the formula's, not a thousandth off
+    share = 1.0 if abs(place) <= 2.0 * PLACE_ROUNDING and of_share(0.0) <= of_share(place) else float(np.exp(place))
+    more = minimum(lambda x: cost(share, x), needed(share), most) if most > 0.0 else 0.0
+    return _found(family, attempt(share, float(np.exp(more))), share, demand)
 
 
 def linear_lack(family: LinearPlant, gains: Gains, demand: Demand) -> float:
-    """Return what the requirement lacks that is missed most, as a share of it, of poles, margins and noise; below nil: none."""
+    """Return what poles and phase margins lack, each as a share of what is asked; zero where nothing lacks."""
+    own, draws = _lacks(family, gains, demand)
+    return OWN_PRICE * own + draws
+
+
+def _lacks(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[float, float]:
+    """Return what the estimate's poles and margin lack, and what the margins of 95 % of the draws do."""
     asked = demand.phase_margin_deg
     phase = margins(family, gains, SEARCHED_RAD_S).phase_deg
-    lacks = [
-        (demand.damping - float(least_damping(family.one(), gains)[0])) / demand.damping,
-        (asked - float(phase[0])) / asked,
-        worst_of((DRAWS_MARGIN_SHARE * asked - phase) / asked, most=True),
-        noise_share(family, gains, demand) / NOISE_SHARE - 1.0,
-    ]
-    return max(lacks) - FORMULA_ROUNDING
+    poles = max(demand.damping - float(least_damping(family.one(), gains)[0]), 0.0) / demand.damping
+    own = poles + max(asked - float(phase[0]), 0.0) / asked
+    draws = _of_draws((DRAWS_MARGIN_SHARE * asked - phase) / asked) if family.count > 1 else 0.0
+    return own if own > FORMULA_ROUNDING else 0.0, draws
 
 
-def noise_share(family: LinearPlant, gains: Gains, demand: Demand) -> float:
-    """Return the standard deviation of the sensors' noise at the fin over its limit, or over its rate where that is more."""
-    moved = float(np.hypot(gains.kp * demand.angle_noise, gains.kd * demand.rate_noise))
-    rate = moved / max(float(family.lag[0]), AUTOPILOT_PERIOD_S)
-    return max(moved / demand.fin_limit, rate / float(family.fin_rate[0]))
+def _of_draws(lacks: FloatArray) -> float:
+    """Return what 95 % of the draws lack, (d,): the worst of them and their mean, each draw's at most a whole requirement.
 
-
-def lack(family: LinearPlant, gains: Gains, demand: Demand) -> float:
-    """Return what the requirement lacks that is missed most: those of `linear_lack`, and those of the flown steps."""
-    return _cost_and_lack(family, gains, demand)[1]
-
-
-def _cost_and_lack(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[float, float]:
-    """Return the mean quadratic cost (s) of the draws' steps, and what lacks."""
-    steps = _step(family, gains, demand)
-    moved = about_rest(steps.angle, demand.step)
-    over, left = overshoot(moved, demand.step) - demand.draws_overshoot, swing(steps.angle, demand.step) - LIMIT_CYCLE_SHARE
-    missed = worst_of(np.maximum(over, left), most=True)
-    return quadratic_cost(steps, demand.step, demand.fin_limit), max(missed, linear_lack(family, gains, demand))
-
-
-def quadratic_cost(steps: Steps, size: float, fin_limit: float) -> float:
-    """Return int (error / size)^2 + (fin / limit)^2 dt of steps, the mean of all, s; the fin about where it comes to rest.
-
-    An error counts up to one that is three times the step: what diverges costs that.
+    The worst is a corner that the least of a cost keeps to; where it cannot be met the mean still tells more from fewer draws.
     """
-    off = steps.angle / size - 1.0
-    fin = (steps.fin - steps.fin[-1]) / fin_limit
-    each = np.minimum(np.nan_to_num(off**2, nan=np.inf), MOST_ERROR**2) + np.minimum(np.nan_to_num(fin**2), 4.0)
-    return float(np.mean(np.sum(each, axis=0)) * (steps.time[1] - steps.time[0]))
+    held = np.sort(np.clip(np.where(np.isfinite(lacks), lacks, np.sign(lacks)), 0.0, 1.0))
+    best = held[: int(np.ceil(HELD_SHARE * held.size - 1e-9))]
+    return float(best[-1] + np.mean(best))
 
 
-def _step(family: LinearPlant, gains: Gains, demand: Demand) -> Steps:
+def flown_lack(family: LinearPlant, gains: Gains, demand: Demand) -> float:
+    """Return by how much the flown steps of 95 % of the draws overshoot or swing more than they may."""
+    return _lateness_and_lack(family, gains, demand)[1]
+
+
+def _lateness_and_lack(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[float, float]:
+    time, angle = _step(family, gains, demand)
+    moved = about_rest(angle, demand.step)
+    late = lateness(time, moved, demand.step)
+    late[0] = lateness(time, angle, demand.step)[0]  # its trim is known: what it has not reached is late
+    slowest = max(float(late[0]), worst_of(late, most=True))
+    over, left = overshoot(moved, demand.step) - demand.draws_overshoot, swing(angle, demand.step) - LIMIT_CYCLE_SHARE
+    return slowest, _of_draws(np.maximum(over, 0.0) + np.maximum(left, 0.0))
+
+
+def _step(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[FloatArray, FloatArray]:
     reference_gain = float(family.stiffness[0]) / float(family.slow_authority[0])
     row = Row(family.speed, gains, -float(family.offset[0]), reference_gain, demand.fin_limit)
-    # a trim that is known to no better moves where a loop comes to rest, and not how: all fly with that of the estimate
-    trimmed = replace(family, offset=np.full(family.count, family.offset[0]))
-    return step_response(trimmed, row, reference=demand.step, seconds=demand.seconds)
+    steps = step_response(family, row, reference=demand.step, seconds=demand.seconds)
+    return steps.time, steps.angle
+
+
+def _found(family: LinearPlant, gains: Gains, share: float, demand: Demand) -> Found:
+    own, draws = _lacks(family, gains, demand)
+    return Found(gains, share, own, own + draws + flown_lack(family, gains, demand))
 
 
 def flown(family: LinearPlant, gains: Gains, demand: Demand) -> Flown:
     """Return what the draws do with gains."""
-    steps = _step(family, gains, demand)
-    moved = about_rest(steps.angle, demand.step)
-    rests = (overshoot(moved, demand.step) <= demand.draws_overshoot + LACK_ROUNDING) & (
-        swing(steps.angle, demand.step) <= LIMIT_CYCLE_SHARE
-    )
+    time, angle = _step(family, gains, demand)
+    moved = about_rest(angle, demand.step)
+    rests = (overshoot(moved, demand.step) <= demand.draws_overshoot) & (swing(angle, demand.step) <= LIMIT_CYCLE_SHARE)
     phase = margins(family, gains).phase_deg
     damped = phase >= DRAWS_MARGIN_SHARE * demand.phase_margin_deg - LACK_ROUNDING * demand.phase_margin_deg
-    return Flown(float(np.mean(rests & damped)), worst_of(settling(steps.time, moved, demand.step), most=True))
+    return Flown(float(np.mean(rests & damped)), worst_of(settling(time, moved, demand.step), most=True))

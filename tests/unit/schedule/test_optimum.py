@@ -11,7 +11,7 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.schedule.design import Wish
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.optimum import least_place, minimum
+from fieldsid.schedule.optimum import minimum
 
 REFERENCE = 1.5
 HULLS = {
@@ -35,23 +35,16 @@ def test_no_step_of_the_gains_is_larger_than_the_plants_own(hull):
     speeds = np.geomspace(1.2, 1.2 * 1.02**6, 7)
     rows = design_schedule(source_at(HULLS[hull]), 0.26, speeds=list(speeds), wish=Wish("pd")).rows
     kp, kd = (np.array([getattr(r.gains, n) for r in rows]) for n in ("kp", "kd"))
-    # from row to row the speed rises by 2 %, the authority by 4 %, the lag over the hull's time by 2 %; kd b = 2 zeta w - a
+    # from row to row the speed rises by 2 %, the fin's authority by 4 %; kd b = 2 zeta w - a differs by no more of its own terms
     authority = abs(HULLS[hull]["b2"]) * (speeds / REFERENCE) ** 2
     damped = abs(kd) + abs(HULLS[hull]["a22"]) / authority * speeds / REFERENCE
-    assert np.abs(np.diff(np.log(np.abs(kp)))).max() < 0.06
+    assert np.abs(np.diff(np.log(np.abs(kp)))).max() < 0.04
     assert (np.abs(np.diff(kd)) / damped[1:]).max() < 0.06
     assert all(r.draws_held >= 0.95 for r in rows)
     assert all(r.phase_margin_deg >= 22.5 - 0.1 for r in rows)
 
 
 def test_the_minimum_is_found_inside_and_at_an_end():
-    assert minimum(lambda x: (x - 0.37) ** 2, -1.0, 2.0, 7) == pytest.approx(0.37, abs=2e-3)
-    assert minimum(lambda x: -x, -1.0, 2.0, 7) == 2.0
-    assert minimum(lambda x: abs(x - 1.1) + 0.1 * x, -1.0, 2.0, 7) == pytest.approx(1.1, abs=5e-3)
-
-
-def test_the_least_place_is_where_a_lack_vanishes_and_none_where_it_does_not():
-    assert least_place(lambda x: 0.37 - x, 0.0, 1.0, 5) == pytest.approx(0.37, abs=3e-3)
-    assert least_place(lambda x: 0.37 - x, 0.0, 1.0, 5) >= 0.37
-    assert least_place(lambda x: x - 1.0, 0.0, 1.0, 5) == 0.0
-    assert least_place(lambda _: 1.0, 0.0, 1.0, 5) is None
+    assert minimum(lambda x: (x - 0.37) ** 2, -1.0, 2.0) == pytest.approx(0.37, abs=2e-3)
+    assert minimum(lambda x: -x, -1.0, 2.0) == 2.0
+    assert minimum(lambda x: abs(x - 1.1) + 0.1 * x, -1.0, 2.0) == pytest.approx(1.1, abs=5e-3)
