@@ -92,7 +92,8 @@ def write_patch(patch: Patch) -> Path:
     if _text(path) != patch.before:
         raise ArtifactError(f"`{path}` changed meanwhile", found="other text than was compared", hint="run the export again")
     backup = _free(path)
-    shutil.copy2(path, backup)
+    with replacing(backup) as temporary:  # a copy that is interrupted is no backup
+        shutil.copy2(path, temporary)
     with replacing(path, force=True) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         stream.write(patch.after)
     path.chmod(mode & 0o777)

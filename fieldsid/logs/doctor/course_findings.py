@@ -53,12 +53,14 @@ def _course(run: Run) -> list[Note]:
         return []
     time, width, (x, y, yaw) = found
     dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
-    moved = np.hypot(dx, dy) > LEAST_WAY_M
+    way = np.hypot(dx, dy)
+    moved = way > LEAST_WAY_M
     if moved.sum() < 20:
         return []
     heading = trapezoid_integral(time, yaw)
     course, mean = np.arctan2(dy, dx)[moved], ((heading[width:] - heading[:-width]) / (time[width:] - time[:-width]))[moved]
-    along, against = (complex(np.mean(np.exp(1j * (course - sign * mean)))) for sign in (1.0, -1.0))
+    # by the way made: a course of little more than the sensors' noise says little
+    along, against = (complex(np.average(np.exp(1j * (course - s * mean)), weights=way[moved])) for s in (1.0, -1.0))
     if abs(against) > AGREES and abs(against) - abs(along) > TURNED:
         message = (
             f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "

@@ -28,7 +28,8 @@ OF_ANOTHER_THERE: Mapping[str, frozenset[str]] = MappingProxyType(
      "rudder_rad": frozenset({"roll"})}
 )  # fmt: skip
 OVER_GROUND = frozenset({"gps", "gnss", "course", "cog", "sog", "ground", "track"})
-"""Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own."""
+"""Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
+that hears nothing under water, beside a position that was estimated."""
 GLIDER = MappingProxyType({"m": "measured", "c": "commanded"})
 """What the first letter of a glider's sensor says, as in `m_fin` and `c_fin`."""
 
@@ -137,5 +138,6 @@ def _of_use(signal: str, sure: int, words: set[str]) -> tuple[str, int] | None:
         return None
     if signal in ("yaw_rad", "surge_m_s"):
         sure += ("true" in words) - ("magnetic" in words)
+    if signal in ("yaw_rad", "surge_m_s", LATITUDE, LONGITUDE):
         sure = 1 if OVER_GROUND & words else sure
     return signal, sure

@@ -251,3 +251,13 @@ def test_a_dive_of_centimetres_tells_the_sign_of_depth_where_pitch_explains_it()
     signals = {"pitch_rad": pitch, "surge_m_s": np.ones_like(time), "depth_m": depth}
     assert "dive_sign" not in {n.code for n in examine(Run("r", time, signals))}
     assert "dive_sign" in {n.code for n in examine(Run("r", time, {**signals, "depth_m": 10.0 - depth}))}
+
+
+@pytest.mark.parametrize("is_enu", [True, False])
+def test_a_vehicle_that_hovers_for_most_of_the_log_still_tells_the_frame_of_its_heading(is_enu):
+    random, time = np.random.default_rng(4), 0.1 * np.arange(4000)
+    speed = np.where((time // 40.0) % 3 == 0, 1.0, 0.05)
+    yaw = np.cumsum(0.1 * 0.15 * np.sin(0.05 * time))
+    x, y = (np.cumsum(0.1 * speed * f(yaw)) + 0.15 * random.standard_normal(time.size) for f in (np.cos, np.sin))
+    run = Run("hover", time, {"yaw_rad": 0.5 * np.pi - yaw if is_enu else yaw, "x_m": x, "y_m": y})
+    assert ("course_against" in {n.code for n in examine(run)}) == is_enu

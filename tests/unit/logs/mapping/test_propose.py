@@ -159,3 +159,9 @@ def test_a_pose_in_the_plane_gives_x_y_and_heading_and_a_commanded_one_the_goal(
     assert planar("/NED_pose").keys() == {"x_m", "y_m", "yaw_rad"}
     assert planar("/ref").keys() == {"yaw_goal_rad"}
     assert planar("/NED_pose")["x_m"].sure > planar("/ins_pose")["x_m"].sure
+
+
+def test_an_estimated_position_comes_before_that_of_a_receiver_which_hears_nothing_under_water():
+    for name, signal in (("lat", "latitude"), ("lon", "longitude")):
+        assert meaning_of(name)[0] == meaning_of(f"{name}_gps")[0] == signal
+        assert meaning_of(name)[1] > meaning_of(f"{name}_gps")[1]
