@@ -7,7 +7,7 @@ whose jump was made at some time since the sample before, by half a step h/2 on 
     T_hat - 2 s_T <= T <= T_hat + 2 s_T + h/2,    s_T = s_a / a^2
 
 Where h > T_hat, and what is open is no less than T_hat itself, a vehicle that answers at once fits too: the gain is known, the
-damping from below alone.
+damping from below alone. A model with a lag or a hidden state has slower poles than that of the hull, and is not asked.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import DataError
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES
@@ -31,6 +32,8 @@ def sampling_findings(model: Model, records: Sequence[Record]) -> tuple[Note, ..
 
     Raises DataError where the samples of none of the runs tell the time constant from none at all.
     """
+    if any(e.extra_states or any(c.unit == "s" for c in e.shared) for e in effects_of(model)):
+        return ()
     names = NAMES[model.axis]
     damping, authority = model.values[names.damping], model.values[names.authority]
     step, is_held = min((float(np.median(r.steps)), r.fin_is_held) for r in records)

@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from fieldsid.errors import DataError
+from fieldsid.fitting.checks.sampling_checks import sampling_findings
 from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import Model, Noise
+from fieldsid.models.record import record_of
+from fieldsid.models.speed_law import SpeedLaw
 
 FINE_S = 0.05
 
@@ -73,3 +77,19 @@ def test_a_pulse_between_two_samples_is_refused_for_the_samples_that_there_are()
         identify([run], Axis.YAW)
     assert "3 measured samples in 60 s" in refused.value.found
     assert "sampled more often" in refused.value.hint
+
+
+@pytest.mark.parametrize(("effects", "asked"), [((), True), (("servo_lag",), False), (("sway_coupling",), False)])
+def test_a_model_with_slower_poles_than_the_hulls_is_not_asked(effects, asked):
+    """A lag of 0.4 s or a hidden state is seen in samples 0.05 s apart, whatever the hull's own pole."""
+    time = FINE_S * np.arange(400)
+    run = Run("hull", time, {"yaw_rad": 0.1 * time, "yaw_rate_rad_s": 0.0 * time, "rudder_rad": 0.1 * np.sign(np.sin(time))})
+    own = {"servo_lag": {"lag": 0.4}, "sway_coupling": {"cross_damping": 0.8, "cross_rate": 0.1}}
+    values = {"a22": 40.0, "b2": -10.0, "C0": 0.0} | {k: v for e in effects for k, v in own[e].items()}
+    model = Model(Axis.YAW, effects, values, {}, ("a22",), np.array([[400.0]]), SpeedLaw(1.4), Noise(0.005, 0.005))
+    records = [record_of(run, Axis.YAW)]
+    if asked:
+        with pytest.raises(DataError, match="too coarse"):
+            sampling_findings(model, records)
+    else:
+        assert sampling_findings(model, records) == ()
