@@ -9,7 +9,7 @@ import numpy as np
 
 from fieldsid._version import __version__
 from fieldsid.artifacts import sha256_of
-from fieldsid.errors import UsageError
+from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
@@ -59,12 +59,15 @@ def design_schedule(
         raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
-    plants = plants_of(source, limits, runs)
-
-    def made(speed: float) -> Row:
-        return _row(plants, speed, fin_limit, wish, depth=depth)
-
-    rows = tuple(parallel_map(made, knots))
+    plants, refused = plants_of(source, limits, runs), False
+    try:
+        rows = _rows(plants, knots, fin_limit, wish, depth=depth)
+    except ModelError:
+        if plants.belief is None:
+            raise
+        # what pulses say of an unstable hull's sway may be further off than each speed's own model, which holds near its pulses
+        plants, refused = plants.without_belief(), True
+        rows = _rows(plants, knots, fin_limit, wish, depth=depth)
     return Schedule(
         axis=source.axis,
         kind=wish.kind,
@@ -73,7 +76,7 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=actuator_of(source, limits),
-        provenance=_provenance(source, wish, plants.says, knots),
+        provenance=_provenance(source, wish, plants.says, knots) | {"belief_refused": refused},
         stated=limits.record(),
     )
 
@@ -83,6 +86,10 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
     if not all(np.isfinite(s) and s > 0 for s in knots):
         raise UsageError("speeds must be above zero", found=f"{knots}", hint="write `--speeds 1.0,1.5,2.0`")
     return knots
+
+
+def _rows(plants: Plants, knots: Sequence[float], fin_limit: float, wish: Wish, *, depth: bool) -> tuple[Row, ...]:
+    return tuple(parallel_map(lambda speed: _row(plants, speed, fin_limit, wish, depth=depth), knots))
 
 
 def _row(plants: Plants, speed: float, fin_limit: float, wish: Wish, *, depth: bool) -> Row:

@@ -52,6 +52,10 @@ class Plants:
         nearest, _ = max(self.source.near(speed), key=lambda at: at[1])
         return self.source.models[nearest].noise
 
+    def without_belief(self) -> Plants:
+        """Return the models' own plants, one for each of their speeds."""
+        return replace(self, belief=None)
+
     @property
     def says(self) -> str:
         """Where the loss of speed comes from, in words."""

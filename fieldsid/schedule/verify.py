@@ -226,10 +226,12 @@ def verify_schedule(
 ) -> Verification:
     """Fly a schedule on the parameters it was made from, with their errors, at its knots and midway between them.
 
-    runs are those the models came from: the vehicle in surge, sway and yaw is identified from them.
+    runs are those the models came from: the vehicle in surge, sway and yaw is identified from them, unless that took no gains.
     """
     limits = limits or stated_limits(schedule)
     of = plants_of(source, limits, runs)
+    if schedule.provenance.get("belief_refused", False):
+        of = of.without_belief()
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
     constant = best_constant(schedule, plants, step=STEP_ANGLE_RAD[schedule.axis], seconds=STEP_DURATION_S)

@@ -40,6 +40,10 @@ FLOWN_S = 240.0
 """Long enough for the largest hull to come to rest from 90 deg."""
 
 
+BAND_EDGE = 0.05
+"""Share by which the 2.5 and 97.5 % points of 60 draws differ from one seed to another."""
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """One step flown beside what was said of it: median and 95 % band of the draws (s); NaN without a schedule."""
@@ -66,8 +70,9 @@ class Outcome:
 
     @property
     def in_band(self) -> bool:
-        """Whether settling is as said, or in the band that was said."""
-        return self.as_said or self.said_low <= self.flown <= self.said_high
+        """Whether settling is as said, or in the band that was said, whose edges are known from 60 draws to BAND_EDGE."""
+        edges = (1.0 - BAND_EDGE) * self.said_low, (1.0 + BAND_EDGE) * self.said_high
+        return self.as_said or edges[0] <= self.flown <= edges[1]
 
     @property
     def hunts(self) -> bool:

@@ -97,8 +97,9 @@ def test_a_circle_flown_with_less_fin_than_the_offset_has_no_prediction(tmp_path
     turn = {"yaw_rad": 0.1 * time, "yaw_rate_rad_s": np.full(time.size, 0.1), "surge_m_s": np.full(time.size, 1.4)}
     track = {"x_m": 14.0 * np.sin(0.1 * time), "y_m": -14.0 * np.cos(0.1 * time), "rudder_rad": np.full(time.size, 0.05)}
     prediction = turn_radius(table(tmp_path), [1.4], 0.3, measured=[Run("circle", time, {**turn, **track})])
-    assert np.isnan(prediction.measured[0].predicted)
-    assert prediction.measured[0].turn.circle.radius == pytest.approx(14.0, rel=1e-3)
+    assert prediction.measured == ()
+    (note,) = [n for n in prediction.notes if n.code == "turned_against_rudder"]
+    assert "0.05 rad to the other side" in note.message
 
 
 def test_paths_are_quoted(tmp_path, monkeypatch):
