@@ -16,7 +16,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
 from fieldsid.runtime.worker_pool import parallel_map
 from fieldsid.schedule.controller import Gains
-from fieldsid.schedule.design import Wish, check_wish, design_gains
+from fieldsid.schedule.design import PROPORTIONAL, Wish, check_wish, design_gains
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants, plants_of
@@ -63,8 +63,8 @@ def design_schedule(
     try:
         rows = _rows(plants, knots, fin_limit, wish, depth=depth)
     except ModelError:
-        if plants.belief is None:
-            raise
+        if plants.belief is None or wish.kind in PROPORTIONAL:
+            raise  # nothing but a rate holds what may be unstable
         # what pulses say of an unstable hull's sway may be further off than each speed's own model, which holds near its pulses
         plants, refused = plants.without_belief(), True
         rows = _rows(plants, knots, fin_limit, wish, depth=depth)

@@ -95,10 +95,13 @@ def test_steps_settle_as_said_and_nothing_hunts(trial):
         assert check.speed_least == pytest.approx(kept.min(), rel=0.05)
 
 
-def test_what_p_cannot_hold_is_refused_with_what_can(trial):
+@pytest.mark.parametrize("with_runs", [False, True])
+def test_what_p_cannot_hold_is_refused_with_what_can(trial, with_runs):
     growth = float(np.linalg.eigvals(yaw_plane(trial.hull, 2.0)[0]).real.max())
     if growth < 0.0:
         pytest.skip("this hull is stable")
     with pytest.raises(ModelError, match="unstable") as caught:
-        design_schedule(trial.source, 0.26, speeds=[2.0], wish=Wish("p"), limits=FinLimits(lag=FINS.lag))
+        design_schedule(
+            trial.source, 0.26, speeds=[2.0], wish=Wish("p"), limits=FinLimits(lag=FINS.lag), runs=trial.runs if with_runs else ()
+        )
     assert "`--controller pd`" in caught.value.hint
