@@ -89,7 +89,8 @@ def simulate(
             0.0,
         )
     start = np.array(state, dtype=np.float64)
-    arrays = assemble(record, parts, base_at(model, record.speed), values, model.law.scale(record.speed))
+    counted = record.at_speed(model.law.effective(record.speed))
+    arrays = assemble(counted, parts, base_at(model, record.speed), values, model.law.scale(record.speed))
     arrays = with_moments(record, arrays, parts, values, start)
     out = integrate_record(record, arrays, start)
     if not np.isfinite(out).all():

@@ -14,8 +14,8 @@ from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Va
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
-GRID = tuple(round(0.05 * i, 2) for i in range(1, 21))
-"""Shares of a run; at the last of them nothing has happened in it."""
+GRID = tuple(round(0.05 * i, 2) for i in range(21))
+"""Shares of a run; at the first of them it had all happened before, at the last nothing has happened in it."""
 
 
 def happened(share: float, record: Record, ramp: float = 0.0) -> FloatArray:

@@ -111,6 +111,14 @@ class Record(Brief):
         object.__setattr__(other, "commanded", other.path_with_lead(other.command_lead))
         return other
 
+    def at_speed(self, speed: float) -> Record:
+        """Return the record that counts as flown at another speed, in m/s, and all else as it is; itself at its own."""
+        if speed == self.speed or not np.isfinite(speed):
+            return self
+        other = copy(self)
+        object.__setattr__(other, "speed", speed)
+        return other
+
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""
         if role not in self.signals:

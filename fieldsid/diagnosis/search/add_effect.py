@@ -12,6 +12,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, fit_
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.fitting.initial.effect_screen import (
+    EVENT_UNIT,
     Linearisation,
     ScreenResult,
     backtrack,
@@ -144,7 +145,7 @@ def is_redundant_start(move: SearchMove, parent: ScoredModel, known: ScoredModel
 
 def _starts_apart(screened: ScreenResult, x: FloatArray) -> bool:
     """Whether an event of a run starts so far from where x has it that one would not converge to the other."""
-    events = {c.name for c in screened.effect.nuisance if c.unit == "run"}
+    events = {c.name for c in screened.effect.nuisance if c.unit == EVENT_UNIT}
     slots = screened.problem.layout.parameters
     return any(
         abs(a - b) > MIN_EVENT_SEPARATION_SHARE for s, a, b in zip(slots, screened.start, x, strict=True) if s.name in events

@@ -20,8 +20,13 @@ from fieldsid.fitting.initial.effect_screen import (
     under_speed_groups,
 )
 from fieldsid.fitting.initial.equation_error import equation_error_start
-from fieldsid.fitting.initial.trim_speed_law import MIN_TRIM_LAW_ERROR_GAIN, possible_trims, speeds_differ_in_group
-from fieldsid.fitting.problem.parameters import SpeedGroups, layout_of, speed_groups
+from fieldsid.fitting.initial.trim_speed_law import (
+    MIN_TRIM_LAW_ERROR_GAIN,
+    SPEED_SCATTER_SHARE,
+    possible_trims,
+    speeds_differ_in_group,
+)
+from fieldsid.fitting.problem.parameters import GROUP_WIDTH_TRAINED, SpeedGroups, layout_of, speed_groups
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect
@@ -77,25 +82,40 @@ def error_product(fitted: FittedProblem, axis: Axis) -> float:
 def other_speed_law(h: ScoredModel, resolution_floor: Noise, noise_kind: str, *, asks_for_more: bool) -> ScoredModel | None:
     """Return a model under another speed law (see `under_other_speed_law`) where that has more evidence, None elsewhere.
 
-    An authority shared by all speeds is determined far better. A group that does not follow the law, or a run that was not flown
-    at its group's speed, shows only once the missing effect is found.
+    An authority shared by all speeds is determined far better. A group that does not follow the law, or runs that were flown at
+    one speed though the turn slowed some down, show only once the missing effect is found.
     """
     fitted = h.likelihood_fit.fitted
     groups = fitted.problem.layout.groups
     if groups.snapped and asks_for_more:
-        own = speed_groups(fitted.problem.records, width=FINE_GROUP_WIDTH, trim_of_fin=groups.trim_of_fin)
-        own = replace(groups, snapped=False, run_speeds=own.run_speeds)
-        return _better(h, *under_speed_groups(fitted.problem, fitted.x, own), resolution_floor, noise_kind, 0.0)
+        return _better(h, _snapped(h, snapped=False), resolution_floor, noise_kind, 0.0)
+    other = None
+    if asks_for_more and _speeds_scatter(h):
+        other = _better(h, _snapped(h, snapped=True), resolution_floor, noise_kind, ALTERNATIVE_LOG_ODDS)
     one_speed = len(groups.speeds) == 1
     if (one_speed or groups.by_law) and not (asks_for_more and speeds_differ_in_group(groups)):
-        return None
-    return _better(
-        h,
-        *under_other_speed_law(fitted.problem, fitted.x),
-        resolution_floor,
-        noise_kind,
-        ALTERNATIVE_LOG_ODDS if one_speed else 0.0,
+        return other
+    law = under_other_speed_law(fitted.problem, fitted.x)
+    lawful = _better(h if other is None else other, law, resolution_floor, noise_kind, ALTERNATIVE_LOG_ODDS if one_speed else 0.0)
+    return other if lawful is None else lawful
+
+
+def _snapped(h: ScoredModel, *, snapped: bool) -> tuple[Problem, FloatArray]:
+    """Return the problem of a model with its runs at their groups' speeds, or each at its own, and x carried over."""
+    fitted = h.likelihood_fit.fitted
+    groups = fitted.problem.layout.groups
+    taken = speed_groups(fitted.problem.records, width=FINE_GROUP_WIDTH, snapped=snapped, trim_of_fin=groups.trim_of_fin)
+    return under_speed_groups(fitted.problem, fitted.x, replace(groups, snapped=snapped, run_speeds=taken.run_speeds))
+
+
+def _speeds_scatter(h: ScoredModel) -> bool:
+    """Whether a run, of the validation too, has another speed than the group it would count with, by more than is measured."""
+    problem = h.likelihood_fit.fitted.problem
+    law = replace(
+        problem.layout.law(dict(zip(problem.layout.names, h.likelihood_fit.fitted.x, strict=False))), snap=GROUP_WIDTH_TRAINED
     )
+    speeds = [r.speed for r in (*problem.records, *h.validation)]
+    return any(abs(law.effective(u) - u) > SPEED_SCATTER_SHARE * u for u in speeds)
 
 
 @dataclass(slots=True)
@@ -169,8 +189,8 @@ def other_trim_law(h: ScoredModel, resolution_floor: Noise) -> ScoredModel | Non
 
 
 def _better(
-    h: ScoredModel, problem: Problem, x: FloatArray, resolution_floor: Noise, noise_kind: str, worth: float
+    h: ScoredModel, law: tuple[Problem, FloatArray], resolution_floor: Noise, noise_kind: str, worth: float
 ) -> ScoredModel | None:
-    """Return the scored model of a problem with the same effects, where it gains that much evidence, None elsewhere."""
-    other = score_model(fit_maximum_likelihood(problem, x, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation)
+    """Return the scored model of a problem with the same effects, from x, where it gains that much evidence, None elsewhere."""
+    other = score_model(fit_maximum_likelihood(*law, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation)
     return other if other.log_evidence > h.log_evidence + worth else None

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.fitting.initial.joint_grid_search import joint_grid_search
-from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
 from fieldsid.fitting.problem.parameters import ParameterLayout, SpeedGroups, group_name, layout_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import NAMES
@@ -27,6 +27,8 @@ from fieldsid.rounding import nine_digits
 
 MAX_SCAN_POINTS = 12
 MAX_BACKTRACKS = 4
+MAX_SETTLING_ITERATIONS, SETTLED_COST_SHARE = 4, 1e-3
+"""Iterations in which all but an event moves to where the effect leads it, and the share of the cost that each must gain."""
 WEAK_START_SHARE = 0.03
 """Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's."""
 EVENT_UNIT, EVENT_REFINEMENT = "run", 7
@@ -280,14 +282,26 @@ def _gauss_newton_step(left: FloatArray, before: FloatArray) -> FloatArray:
 
 
 def backtrack(linearisation: Linearisation, screened: ScreenResult) -> ScreenResult:
-    """Return a screen result with its start moved back towards the scan point until its cost is no higher than there."""
+    """Return a screen result with its start moved back towards the scan point until its cost is no higher than there.
+
+    An event stays at its best grid point while everything else moves to where the effect leads it: from the parent's parameters,
+    which its lack has biased, the first step of an event's time leads to another event, or to none.
+    """
     problem, x, start = screened.problem, screened.point, screened.start
     limit = cost_of(problem, x, linearisation.noise)
     for _ in range(MAX_BACKTRACKS):
         if cost_of(problem, start, linearisation.noise) <= limit:
-            return replace(screened, start=start)
+            break
         start = 0.6 * x + 0.4 * start
-    return replace(screened, start=x)
+    else:
+        start = x
+    events = {c.name for c in screened.effect.nuisance if c.unit == EVENT_UNIT}
+    if events:
+        free = [i for i, slot in enumerate(problem.layout.parameters) if slot.name not in events]
+        start = levenberg_marquardt(
+            problem, start, linearisation.noise, free=free, max_iterations=MAX_SETTLING_ITERATIONS, tolerance=SETTLED_COST_SHARE
+        ).x
+    return replace(screened, start=start)
 
 
 def project_out(basis: FloatArray, rows: FloatArray) -> FloatArray:

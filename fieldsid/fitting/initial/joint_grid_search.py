@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -19,14 +21,27 @@ much."""
 def joint_grid_search(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
     """Return the grid points (R,) with the least total cost after one common step, within its bounds (k,).
 
-    square (R, G, 1 + k + S, 1 + k + S) are each run's products at each grid point, the parent's shared parameters last. First the
-    steps that single runs would take are compared, with the parent's shared parameters projected out of each run. Then step and
-    grid points alternate; at last with the parent's shared parameters common to all runs, because an event at a run's start that
-    persists is to that run alone equivalent to another trim.
+    square (R, G, 1 + k + S, 1 + k + S) are each run's products at each grid point, the parent's shared parameters last. From the
+    step that each run alone would take at each point, with the parent's shared parameters projected out of it, step and grid
+    points alternate; at last with the parent's shared parameters common to all runs, because an event at a run's start that
+    persists is to that run alone equivalent to another trim. The least cost of all these ends counts: runs that had the event all
+    along and runs that never had it change places at little cost.
     """
-    alone = _schur_complement(square, 1 + low.size)
-    chosen = _alternate_grid_and_step(alone, _best_single_run_step(alone, low, high), low, high)
-    return _alternate_grid_and_step(square, chosen, low, high)
+    alone, runs = _schur_complement(square, 1 + low.size), np.arange(square.shape[0])
+    starts = _distinct(_first_least(_costs(alone, step)) for step in _single_run_steps(alone, low, high))
+    own = _distinct(_alternate_grid_and_step(alone, start, low, high) for start in starts)
+    ends = _distinct(_alternate_grid_and_step(square, start, low, high) for start in own)
+
+    def cost(chosen: npt.NDArray[np.intp]) -> float:
+        step = _bounded_step(square[runs, chosen].sum(axis=0), low, high)
+        return nine_digits(float(_costs(square, step)[runs, chosen].sum()))
+
+    return min(ends, key=cost)
+
+
+def _distinct(points: Iterable[npt.NDArray[np.intp]]) -> list[npt.NDArray[np.intp]]:
+    """Return grid points (R,) each once, in the order they come."""
+    return list({tuple(p.tolist()): p for p in points}.values())
 
 
 def _schur_complement(square: FloatArray, first: int) -> FloatArray:
@@ -51,10 +66,10 @@ def _bounded_step(one: FloatArray, low: FloatArray, high: FloatArray) -> FloatAr
     return step
 
 
-def _best_single_run_step(square: FloatArray, low: FloatArray, high: FloatArray) -> npt.NDArray[np.intp]:
-    """Return the grid points (R,) for the best of the steps that single runs would take at a grid point."""
-    alone = (_costs(square, _bounded_step(one, low, high)) for one in square.reshape(-1, *square.shape[2:]))
-    return _first_least(min(alone, key=lambda costs: nine_digits(float(costs.min(axis=1).sum()))))
+def _single_run_steps(square: FloatArray, low: FloatArray, high: FloatArray) -> Iterator[FloatArray]:
+    """Yield the steps that single runs would take at a grid point, that of the least cost to all runs first."""
+    steps = [_bounded_step(one, low, high) for one in square.reshape(-1, *square.shape[2:])]
+    yield from sorted(steps, key=lambda step: nine_digits(float(_costs(square, step).min(axis=1).sum())))
 
 
 def _first_least(costs: FloatArray) -> npt.NDArray[np.intp]:

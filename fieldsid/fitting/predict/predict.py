@@ -11,9 +11,9 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.dynamics.assemble import fin_path
 from fieldsid.dynamics.free_run import effects_of, growing_hint
-from fieldsid.errors import DivergenceError
+from fieldsid.errors import DivergenceError, EffectError
 from fieldsid.fitting.initial.initial_state_prior import initial_state_prior
-from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
+from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
 from fieldsid.fitting.predict import command_timing, speed_correction
 from fieldsid.fitting.problem.parameters import Parameter, ParameterLayout, SpeedGroups, layout_of
 from fieldsid.fitting.problem.problem import Problem
@@ -26,6 +26,7 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import is_white
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.gram_least_squares import solve_normal_equations
 from fieldsid.rounding import nine_digits
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
@@ -193,7 +194,11 @@ def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
 
 
 def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
-    """Return starts with every per-run nuisance at the best points of its scan grid, and x itself, each once."""
+    """Return starts with every per-run nuisance at the best points of its scan grid, and x itself, each once.
+
+    The points are compared with the initial state that is best at each, to first order: a wrong point bends the start of a run,
+    and at that start the wrong point is the best.
+    """
     layout = problem.layout
     grids = {
         i: c.scan
@@ -205,12 +210,27 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
     }
     if not grids:
         return [x]
-    noise = white_noise_floor(problem.records)
-    scored = []
+    state = [i for i in range(layout.shared, x.size) if i not in grids]
+    noise, record = white_noise_floor(problem.records), problem.records[0]
+    weight = record.ok / np.array([[noise.angle], [noise.rate]])
+    columns = problem.linearise(x, 0, state)
+    slopes = (columns.sensitivity * weight).reshape(len(columns.columns), -1)
+    if not np.isfinite(slopes).all():
+        return [x]
+    gram, scored = slopes @ slopes.T, []
     for point in product(*grids.values()):
         trial = x.copy()
         trial[list(grids)] = point
-        scored.append((nine_digits(cost_of(problem, trial, noise)), tuple(point), trial))
+        try:
+            left = (problem.residual(trial, 0)[0] * weight).ravel()
+        except EffectError:
+            continue
+        if not np.isfinite(left).all():
+            continue
+        step = solve_normal_equations(gram, slopes @ left)
+        trial[list(columns.columns)] += step
+        left = left - step @ slopes
+        scored.append((nine_digits(float(left @ left)), tuple(point), np.clip(trial, layout.low, layout.high)))
     scored.sort(key=lambda item: item[:2])
     return [x, *(trial for _, _, trial in scored[:2] if not np.array_equal(trial, x))]
 

@@ -12,7 +12,7 @@ length, so that the residual of a wrong model has little weight. A speed that wa
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,8 @@ MAX_STD_ERRORS = 3.0
 """Errors of the measurement that a speed is moved by at most."""
 MAX_SPEED_ITERATIONS, CONVERGED_STD_ERRORS = 4, 0.02
 """Rounds, each with the weights of what the last one has left, and the change in errors of the measurement that ends them."""
+STEP_PARTS = (1.0, 0.5, 0.25)
+"""Parts of a step that are tried until the cost falls."""
 MIN_REPORTED_SHARE = 0.001
 SURPRISING_STD_ERRORS = 2.0
 """Standard errors from which on a speed that is off is a finding of its own."""
@@ -51,13 +53,11 @@ def correct_speed(problem: Problem, x: FloatArray, floor: Noise) -> tuple[Proble
         step = _step(moved, own, faster, floor)
         if step is None:
             return problem, x, 0.0
-        new = float(
-            np.clip(faster + step[-1], -MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR, MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR)
-        )
-        own = own.copy()
-        own[problem.layout.shared :] += step[:-1]
-        moved, change, faster = _at_speed_share(problem, new), new - faster, new
-        if abs(change) < CONVERGED_STD_ERRORS * MEASURED_SPEED_STD_ERROR:
+        better = _step_that_gains(moved, own, faster, step)
+        if better is None:
+            break
+        change, (moved, own, faster) = abs(better[2] - faster), better
+        if change < CONVERGED_STD_ERRORS * MEASURED_SPEED_STD_ERROR:
             break
     return moved, own, faster
 
@@ -94,13 +94,20 @@ def speed_note(record: Record, faster: float) -> Note | None:
 
 
 def _at_speed_share(problem: Problem, share: float) -> Problem:
-    groups = problem.layout.groups
-    speeds = (groups.run_speeds[0] * (1.0 + share),)
-    return replace(problem, layout=replace(problem.layout, groups=replace(groups, run_speeds=speeds)))
+    return replace(problem, layout=replace(problem.layout, groups=replace(problem.layout.groups, faster=share)))
 
 
-def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> FloatArray | None:
-    """Return the change of the run's nuisances and, last, of its speed correction; None where the motion diverges."""
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """The change of a run's nuisances and, last, of its speed correction; the channels' weights (2, 1), and the cost before."""
+
+    change: FloatArray
+    weight: FloatArray
+    cost: float
+
+
+def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> _Step | None:
+    """Return the step to the best correction to first order; None where the motion diverges."""
     record, shared = problem.records[0], problem.layout.shared
     result = problem.linearise(x, 0)
     if not np.isfinite(result.stack).all():
@@ -113,7 +120,27 @@ def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> Float
     gram, right = flat @ flat.T, flat @ left
     gram[-1, -1] += MEASURED_SPEED_STD_ERROR**-2
     right[-1] -= faster * MEASURED_SPEED_STD_ERROR**-2
-    return solve_normal_equations(gram, right)
+    cost = float(left @ left) + (faster / MEASURED_SPEED_STD_ERROR) ** 2
+    return _Step(solve_normal_equations(gram, right), weight, cost)
+
+
+def _step_that_gains(problem: Problem, x: FloatArray, faster: float, step: _Step) -> tuple[Problem, FloatArray, float] | None:
+    """Return the problem, x and share after the step, or after a part of it, that lowers the cost; None where none does.
+
+    An event of the run moves by no small step: its time goes to where the first order of it leads, which may be another event.
+    """
+    layout, most = problem.layout, MAX_STD_ERRORS * MEASURED_SPEED_STD_ERROR
+    for part in STEP_PARTS:
+        share = float(np.clip(faster + part * step.change[-1], -most, most))
+        own = x.copy()
+        own[layout.shared :] += part * step.change[:-1]
+        own = np.clip(own, layout.low, layout.high)
+        own[: layout.shared] = x[: layout.shared]
+        moved = _at_speed_share(problem, share)
+        left = moved.residual(own, 0)[0] * step.weight
+        if float(np.vdot(left, left)) + (share / MEASURED_SPEED_STD_ERROR) ** 2 < step.cost:
+            return moved, own, share
+    return None
 
 
 def _weights(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:

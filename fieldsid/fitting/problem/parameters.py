@@ -43,9 +43,10 @@ class Parameter:
 class SpeedGroups:
     """Speed groups: mean speed of each, group and speed of each run; `reference` is the group the law refers to.
 
-    `snapped`: runs count as flown at their group's speed. `trim_of_fin`: the trim moment scales with the authority. `by_law`: all
-    groups share one authority that scales with the square of the speed, else each has its own. `exponent`: the damping's power of
-    the speed where that is not a parameter.
+    `snapped`: runs count as flown at their group's speed, and what changes within a run is over that. `faster`: share by which
+    the runs were faster than they count as, where their speed is corrected. `trim_of_fin`: the trim moment scales with the
+    authority. `by_law`: all groups share one authority that scales with the square of the speed, else each has its own.
+    `exponent`: the damping's power of the speed where that is not a parameter.
     """
 
     speeds: tuple[float, ...]
@@ -56,10 +57,15 @@ class SpeedGroups:
     trim_of_fin: bool = False
     by_law: bool = False
     exponent: float = 1.0
+    faster: float = 0.0
+
+    def flown(self, run: int) -> float:
+        """Return the speed a run was flown at: the one it counts as, corrected."""
+        return self.run_speeds[run] * (1.0 + self.faster)
 
     def over_group(self, run: int) -> float:
         """Return a run's speed over the one its authority parameter belongs to."""
-        return self.run_speeds[run] / self.speeds[self.reference if self.by_law else self.of_run[run]]
+        return self.flown(run) / self.speeds[self.reference if self.by_law else self.of_run[run]]
 
     def over_reference(self, group: int) -> float:
         """Return a group's speed over the reference's."""

@@ -87,10 +87,14 @@ class Problem:
             layout.groups.trim_of_fin,
         )
 
+    def _counted(self, run: int) -> Record:
+        """Return a run's record at the speed that the run counts as, which what changes within it is over."""
+        return self.records[run].at_speed(self.layout.groups.run_speeds[run])
+
     def scales(self, run: int) -> tuple[float, float]:
         """Return speed over reference speed, and speed over the one that the run's authority parameter belongs to."""
         g = self.layout.groups
-        speed = g.run_speeds[run]
+        speed = g.flown(run)
         if not isfinite(speed) or not isfinite(g.speeds[g.reference]):
             return 1.0, 1.0
         return speed / g.speeds[g.reference], g.over_group(run)
@@ -117,14 +121,14 @@ class Problem:
 
     def _arrays(self, base: Base, values: Values, run: int) -> KernelInputs:
         """Return the kernel inputs of a run: those of the last call where nothing but the run's initial state has changed."""
-        key, record = (base, *(v for name, v in values.items() if name not in START_NAMES)), self.records[run]
+        key, record = (base, *(v for name, v in values.items() if name not in START_NAMES)), self._counted(run)
         make = partial(assemble, record, self.layout.effects, base, values, self.scales(run)[0])
         return self.cache.get(run, key, make) if len(record) <= MAX_CACHED_SAMPLES else make()
 
     def simulate(self, x: FloatArray, run: int) -> tuple[Motion, Base]:
         """Return one run's free run as the sensors would show it."""
         self.evaluations.add()
-        record, effects = self.records[run], self.layout.effects
+        record, effects = self._counted(run), self.layout.effects
         values = self.values_of(x, run)
         base, start = self._base(values, run), self._start_of(values, run)
         arrays = with_moments(record, self._arrays(base, values, run), effects, values, start)
@@ -160,7 +164,7 @@ class Problem:
         return slots, pushes.integrate_chunked(slots, length)
 
     def _sensitivities(self, x: FloatArray, run: int, free: Sequence[int] | None) -> tuple[tuple[int, ...], Sensitivities]:
-        record, layout = self.records[run], self.layout
+        record, layout = self._counted(run), self.layout
         values = self.values_of(x, run)
         base, start = self._base(values, run), self._start_of(values, run)
         wanted = range(len(x)) if free is None else set(free)
