@@ -157,7 +157,8 @@ def test_the_other_law_of_the_speed_is_asked_for_runs_of_several_speeds_only(mon
     records = [replace(record, speed=speed) for speed in speeds]
     groups = speed_groups(records)
     problem = SimpleNamespace(layout=SimpleNamespace(groups=groups), records=records)
-    h = SimpleNamespace(likelihood_fit=SimpleNamespace(fitted=SimpleNamespace(problem=problem, x=np.zeros(3))))
+    h = SimpleNamespace(likelihood_fit=SimpleNamespace(fitted=SimpleNamespace(problem=problem, x=np.zeros(3))), validation=())
+    monkeypatch.setattr(speed_law_search, "_snapped", lambda *_of, **_how: (None, None))
     monkeypatch.setattr(speed_law_search, "under_other_speed_law", lambda *_of: (None, None))
     monkeypatch.setattr(speed_law_search, "_better", lambda *_of: "asked")
     assert speed_law_search.other_speed_law(h, FLOOR, "disturbance", asks_for_more=True) == ("asked" if asks else None)

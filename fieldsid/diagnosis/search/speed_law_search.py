@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeVar
 
+import numpy as np
+
 from fieldsid.diagnosis.evidence.acceptance import leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
@@ -111,11 +113,9 @@ def _snapped(h: ScoredModel, *, snapped: bool) -> tuple[Problem, FloatArray]:
 def _speeds_scatter(h: ScoredModel) -> bool:
     """Whether a run, of the validation too, has another speed than the group it would count with, by more than is measured."""
     problem = h.likelihood_fit.fitted.problem
-    law = replace(
-        problem.layout.law(dict(zip(problem.layout.names, h.likelihood_fit.fitted.x, strict=False))), snap=GROUP_WIDTH_TRAINED
-    )
-    speeds = [r.speed for r in (*problem.records, *h.validation)]
-    return any(abs(law.effective(u) - u) > SPEED_SCATTER_SHARE * u for u in speeds)
+    speeds = np.array([r.speed for r in (*problem.records, *h.validation)])
+    off = np.abs(np.log(speeds[:, None] / np.array(problem.layout.groups.speeds))).min(axis=1)
+    return bool(((off > SPEED_SCATTER_SHARE) & (off <= GROUP_WIDTH_TRAINED)).any())
 
 
 @dataclass(slots=True)

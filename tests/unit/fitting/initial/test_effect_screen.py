@@ -10,7 +10,7 @@ import pytest
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.effects import pick_effect
-from fieldsid.fitting.initial.effect_screen import _orthonormal, linearise_at, screen_effect
+from fieldsid.fitting.initial.effect_screen import _orthonormal, backtrack, linearise_at, screen_effect
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.initial.joint_grid_search import _schur_complement
 from fieldsid.fitting.problem.parameters import layout_of
@@ -21,13 +21,15 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.noise.white_floor import white_noise_floor
 
 EVENTS, SIZE = (0.3, 1.0, 0.6), -0.005
+LASTING = (1.0, 1.0, 0.45, 0.0)
+"""Nothing in the first two runs, an event in the third, and the fourth flown after it."""
 
 
-def logged(seed, event):
-    """A run of 40 s under pulses with a change of the moment at an event, measured with noise; at 1 nothing happens."""
+def logged(seed, event, *, loss, size):
+    """A run of 40 s under pulses with a change of authority and moment at an event, with noise; at 1 nothing happens."""
     rng, time = np.random.default_rng(seed), np.arange(0.0, 40.0, 0.1)
     fin = 0.15 * np.repeat(rng.choice([-1.0, 0.0, 1.0], 20), 20)
-    values = {"a22": 1.0, "b2": -0.8, "C0": 0.01, "loss": 0.02, "moment_step": SIZE}
+    values = {"a22": 1.0, "b2": -0.8, "C0": 0.01, "loss": loss, "moment_step": size}
     model = Model(Axis.YAW, ("step_change",), values, {}, (), np.zeros((0, 0)), SpeedLaw(1.2), Noise(0.005, 0.005))
     record = command_record(Axis.YAW, time, fin, speed=1.2, name=f"run{seed}")
     motion = simulate(model, record, state=(0.1, 0.0, 0.0), nuisance={"event_time": event})
@@ -36,23 +38,34 @@ def logged(seed, event):
     return replace(record, angle=angle, rate=rate, angle_ok=ok, rate_ok=ok)
 
 
-def found_events(seed):
-    """Event times of the three runs, and the change's size, where the screen's start leads."""
-    records = tuple(logged(10 * seed + i, event) for i, event in enumerate(EVENTS))
+def found_events(seed, events, loss, size):
+    """Event times of the runs, and the change of authority and moment, where the screen's start leads."""
+    records = tuple(logged(10 * seed + i, event, loss=loss, size=size) for i, event in enumerate(events))
     layout = layout_of(records, Axis.YAW, ())
     base = fit_output_error(Problem(records, layout), equation_error_start(records, layout), white_noise_floor(records))
-    promise = screen_effect(linearise_at(base.problem, base.x, base.weights), pick_effect("step_change"))
+    linearisation = linearise_at(base.problem, base.x, base.weights)
+    promise = backtrack(linearisation, screen_effect(linearisation, pick_effect("step_change")))
     found = fit_output_error(promise.problem, promise.start, base.weights)
-    names, slots = found.problem.layout.names, found.problem.layout.parameters
-    return [x for s, x in zip(slots, found.x, strict=True) if s.name == "event_time"], found.x[names.index("moment_step")]
+    values = dict(zip(found.problem.layout.names, found.x, strict=False))
+    slots = found.problem.layout.parameters
+    times = [x for s, x in zip(slots, found.x, strict=True) if s.name == "event_time"]
+    return times, values["loss"], values["moment_step"]
 
 
 def test_a_run_without_an_event_is_not_given_one_of_another_size():
     right = 0
     for seed in range(1, 25):
-        times, size = found_events(seed)
+        times, _, size = found_events(seed, EVENTS, 0.02, SIZE)
         right += times == pytest.approx(EVENTS, abs=0.03) and size == pytest.approx(SIZE, rel=0.1)
     # 22 with one size for all runs, 13 where each run takes the event that suits it alone
+    assert right >= 20
+
+
+def test_a_loss_in_one_run_lasts_through_the_next_and_was_not_there_before():
+    right = 0
+    for seed in range(1, 25):
+        times, loss, _ = found_events(seed, LASTING, 0.06, 0.0)
+        right += times == pytest.approx(LASTING, abs=0.06) and loss == pytest.approx(0.06, rel=0.25)
     assert right >= 20
 
 

@@ -128,3 +128,34 @@ def test_speeds_are_found_better_than_they_were_measured_unless_gusts_say_more(g
     shares = MEASURED_SPEED_STD_ERROR * np.random.default_rng(5).standard_normal(12)
     found = np.array([predict(TRUE, logged(share, seed=i, gust=gust)).faster for i, share in enumerate(shares)])
     assert np.sqrt(np.mean((found - shares) ** 2)) < share_left * MEASURED_SPEED_STD_ERROR
+
+
+def test_a_run_flown_after_a_loss_is_predicted_with_the_loss_throughout():
+    values = {**TRUE.values, "loss": 0.07, "moment_step": 0.0}
+    model = replace(TRUE, effects=("step_change",), values=values)
+    lost = HULL._replace(authority=(1.0 - 0.07) * HULL.authority)
+    clock = Clock(0.05, 2600)
+    for seed in range(4):
+        log = flown(lost, clock, maneuvers.stairs(clock.time), angle_noise=ANGLE, rate_noise=RATE, seed=seed)
+        record = record_of(Run("run", log["time_s"], {k: v for k, v in log.items() if k != "time_s"}), Axis.YAW)
+        shown = predict(model, replace(record, speed=SPEED))
+        assert shown.nuisance["event_time"] < 0.08
+        assert (errors(shown) < 1.06).all()
+
+
+def test_a_step_that_raises_the_cost_is_not_taken(monkeypatch):
+    record = logged(0.006)
+    floor = white_noise_floor([record])
+    problem, x = frozen_problem(TRUE, record, ())
+    x = refit_nuisances(problem, x, 0, floor)
+    far = speed_correction._step
+
+    def wild(*of):
+        step = far(*of)
+        return replace(step, change=step.change * -50.0)
+
+    monkeypatch.setattr(speed_correction, "_step", wild)
+    moved, own, faster = correct_speed(problem, x, floor)
+    assert faster == 0.0
+    assert (own == x).all()
+    assert moved is problem
