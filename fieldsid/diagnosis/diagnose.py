@@ -25,7 +25,7 @@ from fieldsid.diagnosis.report.report_text import evidence, headline
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, residual_tests
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.thresholds import NOISELESS_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
+from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
 from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, probabilities, verdict_of, worsens
 from fieldsid.effects import all_effects, apart_from
 from fieldsid.errors import DataError, DivergenceError
@@ -77,8 +77,8 @@ def diagnose(
     work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
     work.base()
     if work.is_noiseless:
-        found = noiseless_search(work, lambda h: excess_explained(work, h) > NOISELESS_EXPLAINED_SHARE)
-        if found is not None and excess_explained(work, found) > NOISELESS_EXPLAINED_SHARE:
+        found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
+        if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
             ending = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
             return _diagnosis(ending, skipped, notes)
         work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)

@@ -70,6 +70,7 @@ SHARES_TO_EXPLAIN_FAR = ((0.97, 1e-6),)
 """The same where it leaves one above FAR_ERROR_RATIO: there, any effect that bends the response explains most of the excess."""
 MIN_EXPLAINED_SHARE = SHARES_TO_EXPLAIN[0][0]
 """The largest of those shares that is asked whatever the error."""
-NOISELESS_EXPLAINED_SHARE = 0.5
-"""Share of the excess error that effects must explain to be named from a log without noise: more than they leave. No p-value
+MAIN_EXPLAINED_SHARE = 0.5
+"""Share of the excess error that an effect explains at least where it explains more than it leaves. Asked where an error near the
+noise floor cannot fall to MAX_ERROR_RATIO while the base model leaves a visible one, and in a log without noise: no p-value
 decides there, since without noise whatever is left is significant."""

@@ -9,25 +9,36 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     EXPLAINED_ERROR_RATIO,
+    MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,
     MIN_TRAINING_GAIN,
 )
 from fieldsid.models.model import Noise
 
 
-def is_accepted(without: ScoredModel, with_: ScoredModel) -> bool:
-    """Whether an addition gains log evidence and lowers the error."""
-    return gains_evidence(without, with_) and lowers_error(without, with_)
+def is_accepted(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> bool:
+    """Whether an addition gains log evidence and lowers the error, see `lowers_error`."""
+    return gains_evidence(without, with_) and lowers_error(without, with_, floor)
 
 
-def lowers_error(without: ScoredModel, with_: ScoredModel) -> bool:
+def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> bool:
     """Whether an addition lowers the training or the validation error clearly, their product, and does not raise the latter.
 
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
-    a model without the effect is low where its other parameters are biased towards those runs.
+    a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, the addition
+    may explain instead more of what is left above it than it leaves: near the floor no effect lowers the whole error much.
     """
     unseen, fitted = with_.selection_errors.mean / without.selection_errors.mean, with_.train.mean / without.train.mean
-    return keeps_error(without, with_) and bool(min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0)
+    lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
+    return keeps_error(without, with_) and bool(lowers or (floor is not None and _explains_most(without, with_, floor)))
+
+
+def _explains_most(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
+    """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together."""
+    before, after = (
+        sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in (h.selection_errors, h.train)) for h in (without, with_)
+    )
+    return leaves_error(without, floor) and before - after > MAIN_EXPLAINED_SHARE * before
 
 
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:

@@ -19,11 +19,12 @@ from fieldsid.fitting.initial.effect_screen import (
     linearise_at,
     scan_points,
     screen_points,
+    shifts_time,
     with_effect,
 )
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
-from fieldsid.models.effect import Effect, Stage
+from fieldsid.models.effect import Effect
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -215,8 +216,3 @@ def advance_measurement(record: Record, late_s: float) -> Record:
         return np.interp(then, record.time[ok], values[ok]) if ok.any() else values
 
     return replace(record, angle=moved(record.angle, record.angle_ok), rate=moved(record.rate, record.rate_ok))
-
-
-def shifts_time(effect: Effect) -> bool:
-    """Whether an effect shifts the command against the measurement: outside the hull, with a scanned coefficient in s."""
-    return effect.stage is not Stage.HYDRODYNAMICS and any(c.unit == "s" and c.scan for c in effect.shared)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
-from fieldsid.diagnosis.evidence.acceptance import is_accepted, leaves_error
+from fieldsid.diagnosis.evidence.acceptance import is_accepted, leaves_error, lowers_error
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem, LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
@@ -24,6 +24,7 @@ from fieldsid.diagnosis.search.speed_law_search import (
     speed_laws,
 )
 from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
+from fieldsid.diagnosis.thresholds import SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.models.axis import Axis
@@ -151,14 +152,34 @@ class SearchState:
         return max(self.tried.values(), key=lambda h: h.log_evidence)
 
     def core_of(self, h: ScoredModel) -> frozenset[str]:
-        """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good."""
-        while idle := [w for w in self._less(h) if not is_accepted(w, h)]:
+        """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good.
+
+        An effect that gains evidence beside all else stays where it lowers the error, though it may gain none once a small one is
+        left out: what that leaves in fast samples, a disturbance takes up with the rest.
+        """
+        floor = self._floor_to_explain()
+        proven = {name for name, w in self._without_each(h) if is_accepted(w, h, floor)}
+        while idle := [
+            w
+            for name, w in self._without_each(h)
+            if not (is_accepted(w, h, floor) or (name in proven and lowers_error(w, h, floor)))
+        ]:
             h = max(idle, key=lambda w: w.log_evidence)
         return frozenset(h.names)
 
+    def _floor_to_explain(self) -> Noise | None:
+        """Return the noise floor above which what is left is to be explained; None where the base model is sufficient."""
+        base, floor = self.base(), sensor_noise(self.floor, self.tried.get(self.root))
+        return floor if max(base.selection_errors.over(floor), base.train.over(floor)) > SUFFICIENT_ERROR_RATIO else None
+
+    def _without_each(self, h: ScoredModel) -> list[tuple[str, ScoredModel]]:
+        """Return each effect of a model whose absence was tried, with the fitted model that lacks it."""
+        left = ((n, frozenset(h.names) - {n}) for n in h.names if n not in self.known)
+        return [(n, self.tried[k]) for n, k in left if k in self.tried]
+
     def _less(self, h: ScoredModel) -> list[ScoredModel]:
         """Return the fitted models that lack one of a model's effects."""
-        return [self.tried[k] for n in h.names if n not in self.known and (k := frozenset(h.names) - {n}) in self.tried]
+        return [w for _, w in self._without_each(h)]
 
     def evidences(self) -> dict[frozenset[str], float]:
         """Return the log evidence of each accepted set: log sum exp over the models whose accepted effects are that set."""

@@ -18,7 +18,7 @@ from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_mar
 from fieldsid.fitting.problem.parameters import ParameterLayout, SpeedGroups, group_name, layout_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Coefficient, Effect
+from fieldsid.models.effect import Coefficient, Effect, Stage
 from fieldsid.models.model import Noise
 from fieldsid.noise.whiten import whiten
 from fieldsid.numerics.arrays import FloatArray
@@ -30,7 +30,8 @@ MAX_BACKTRACKS = 4
 MAX_SETTLING_ITERATIONS, SETTLED_COST_SHARE = 4, 1e-3
 """Iterations in which all but an event moves to where the effect leads it, and the share of the cost that each must gain."""
 WEAK_START_SHARE = 0.03
-"""Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's."""
+"""Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's. So
+are lags and dead times: beside a dead band no first-order step from a long one leads back to one within a sample."""
 EVENT_UNIT, EVENT_REFINEMENT = "run", 7
 """Unit of a time that is a share of a run, and the points it is searched at between the neighbours of its best grid point."""
 MIN_COLUMN_NORM, MIN_INDEPENDENT_SHARE = 1e-9, 1e-8
@@ -196,8 +197,13 @@ def scan_points(linearisation: Linearisation, effect: Effect) -> list[dict[str, 
     points = [dict(zip([c.name for c in effect.shared], p, strict=True)) for p in product(*grids)]
     step = -(-len(points) // MAX_SCAN_POINTS)
     points = points[::step]
-    signed = {c.name for c in effect.shared if c.low < 0.0 < c.high and c.scan}
-    return points + [{n: WEAK_START_SHARE * v if n in signed else v for n, v in point.items()} for point in points if signed]
+    weak = {c.name for c in effect.shared if c.scan and (c.low < 0.0 < c.high or (c.low == 0.0 and shifts_time(effect)))}
+    return points + [{n: WEAK_START_SHARE * v if n in weak else v for n, v in point.items()} for point in points if weak]
+
+
+def shifts_time(effect: Effect) -> bool:
+    """Whether an effect shifts the command against the measurement: outside the hull, with a scanned coefficient in s."""
+    return effect.stage is not Stage.HYDRODYNAMICS and any(c.unit == "s" and c.scan for c in effect.shared)
 
 
 def _screen_value(c: Coefficient) -> float:
