@@ -25,23 +25,30 @@ from fieldsid.diagnosis.evidence.scored_model import (
 )
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO, MIN_BASE_ERROR_SHARE
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, linearise_at, screen_effect, transfer_parameters
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.models.effect import Effect
 
-MAX_EFFECTS_TRIED, BEAM_WIDTH, MAX_EFFECTS = 5, 2, 3
-MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 200, 1e-7
-"""Iterations of each output-error fit, and the share of its sum of squares that an iteration must gain: convergence is slow."""
+MAX_EFFECTS_TRIED, BEAM_WIDTH, MAX_EFFECTS = 8, 2, 3
+"""Effects followed from each model, in the order of their screen: that of a slow cross state says little before the fit."""
+FIRST_ITERATIONS, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 25, 200, 1e-7
+"""Iterations from each of two starts, those of the better one, and the share of its sum of squares that an iteration must gain:
+convergence is slow."""
 
 
 @dataclass(frozen=True, slots=True)
 class FreeRunFit:
-    """An output-error fit, its errors, and their ratio to the base model's."""
+    """An output-error fit, its errors, and their ratio to the base model's, larger by the charge for the runs' own numbers.
+
+    A number that each run has of its own, such as the time of an event, is fitted on the validation runs too: each must lower the
+    error as an effect must.
+    """
 
     output_error_fit: FittedProblem
     errors: Pair
     error_ratio: float
+    charge: float
 
 
 def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) -> ScoredModel | None:
@@ -52,14 +59,15 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     without one of its effects, are added to what the search has tried.
     """
     base = search.base()
-    best = start = FreeRunFit(base.reported_fit, base.errors, 1.0)
+    best = start = FreeRunFit(base.reported_fit, base.errors, 1.0, _charge(search, base.reported_fit))
     front, seen = [start], dict[frozenset[str], FreeRunFit]()
     for _ in range(MAX_EFFECTS):
         grown: dict[frozenset[str], FreeRunFit] = {}
         for current in front:
             for new in _forward_candidates(search, current.output_error_fit):
                 _keep(seen, new)
-                if _error_ratio(new.errors, current.errors) <= MAX_FREE_RUN_ERROR_RATIO:
+                charged = _error_ratio(search, new.errors, current.errors) * new.charge / current.charge
+                if charged <= MAX_FREE_RUN_ERROR_RATIO:
                     _keep(grown, new)
         front = sorted(grown.values(), key=lambda f: f.error_ratio)[:BEAM_WIDTH]
         if not front or front[0].error_ratio > MAX_FREE_RUN_ERROR_RATIO * best.error_ratio:
@@ -127,7 +135,16 @@ def _evaluate(search: Search, fitted: FittedProblem) -> FreeRunFit:
     base = search.base()
     flown = validation_fits(bare_model(fitted.problem, fitted.x, base.likelihood_fit.noise), fitted, search.validation)
     errors = Pair(training_errors(fitted), validation_errors(flown, search.validation))
-    return FreeRunFit(fitted, errors, _error_ratio(errors, base.errors))
+    charge = _charge(search, fitted)
+    return FreeRunFit(
+        fitted, errors, _error_ratio(search, errors, base.errors) * charge / _charge(search, base.reported_fit), charge
+    )
+
+
+def _charge(search: Search, fitted: FittedProblem) -> float:
+    """Return the factor on the error for the numbers that each run has of its own."""
+    own = sum(len(e.nuisance) for e in fitted.effects)
+    return float(MAX_FREE_RUN_ERROR_RATIO ** -(own * (len(search.records) + len(search.validation))))
 
 
 def _forward_candidates(search: Search, current: FittedProblem) -> list[FreeRunFit]:
@@ -138,34 +155,26 @@ def _forward_candidates(search: Search, current: FittedProblem) -> list[FreeRunF
 
     def followed(screened: ScreenResult) -> FreeRunFit:
         search.report("+".join((*current.names, screened.effect.name)))
-        from_screen = fit_output_error(
-            screened.problem,
-            backtrack(linearisation, screened).start,
-            current.weights,
-            MAX_FREE_RUN_ITERATIONS,
-            COST_TOLERANCE,
-        )
-        return _evaluate(
-            search, min((from_screen, _from_declared_start(screened, current)), key=lambda t: t.weights.angle * t.weights.rate)
-        )
+        problem = screened.problem
+        # the base may be biased: the equation-error start and declared start values know nothing of it
+        starts = (backtrack(linearisation, screened).start, equation_error_start(problem.records, problem.layout))
+        begun = (fit_output_error(problem, x, current.weights, FIRST_ITERATIONS, COST_TOLERANCE) for x in starts)
+        better = min(begun, key=lambda t: t.weights.angle * t.weights.rate)
+        return _evaluate(search, fit_output_error(problem, better.x, better.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE))
 
     return search.parallel.map(followed, screened_points[:MAX_EFFECTS_TRIED])
 
 
-def _from_declared_start(screened: ScreenResult, current: FittedProblem) -> FittedProblem:
-    """Return the output-error fit from the equation-error start and declared start values: the base may be biased."""
-    problem = screened.problem
-    return fit_output_error(
-        problem,
-        equation_error_start(problem.records, problem.layout),
-        current.weights,
-        MAX_FREE_RUN_ITERATIONS,
-        COST_TOLERANCE,
-    )
+def _error_ratio(search: Search, new: Pair, old: Pair) -> float:
+    """Return the ratio of two errors, on validation runs where there are any; 1 where it does not fall on training runs too.
 
-
-def _error_ratio(new: Pair, old: Pair) -> float:
-    """Return the ratio of two errors, the geometric mean over training and validation runs; 1 where either does not fall."""
-    unseen = np.isfinite(old.validation.mean)
-    sides = [new.train.mean / old.train.mean, *([new.validation.mean / old.validation.mean] if unseen else [])]
-    return float(np.exp(np.mean(np.log(sides)))) if max(sides) < 1.0 else 1.0
+    No evidence charges an effect for the room it has to follow the training runs: what it predicts decides. Errors are resolved
+    to a share of the base model's.
+    """
+    base = search.base().errors
+    sides = [
+        np.hypot(now.mean, least) / np.hypot(before.mean, least)
+        for now, before, whole in ((new.train, old.train, base.train), (new.validation, old.validation, base.validation))
+        if np.isfinite(least := MIN_BASE_ERROR_SHARE * whole.mean)
+    ]
+    return float(sides[-1]) if max(sides) < 1.0 else 1.0

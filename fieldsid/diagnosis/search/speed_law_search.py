@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import leaves_error
+from fieldsid.diagnosis.evidence.acceptance import keeps_error, leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
@@ -191,6 +191,9 @@ def other_trim_law(h: ScoredModel, resolution_floor: Noise) -> ScoredModel | Non
 def _better(
     h: ScoredModel, law: tuple[Problem, FloatArray], resolution_floor: Noise, noise_kind: str, worth: float
 ) -> ScoredModel | None:
-    """Return the scored model of a problem with the same effects, from x, where it gains that much evidence, None elsewhere."""
+    """Return the scored model of a problem with the same effects, from x, where it gains that much evidence, None elsewhere.
+
+    As another variant of an effect it may not raise the error on unseen runs: in a log without noise evidence tells little.
+    """
     other = score_model(fit_maximum_likelihood(*law, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation)
-    return other if other.log_evidence > h.log_evidence + worth else None
+    return other if other.log_evidence > h.log_evidence + worth and keeps_error(h, other) else None
