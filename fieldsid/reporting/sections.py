@@ -179,7 +179,7 @@ def _candidates(item: Item | None) -> list[dict[str, str]]:
             "fitted": _over(c["train"], floor),
             "unseen": _over(c["validation"], floor),
             "explained": "worse" if c.get("worse") else f"{100 * c['explained']:.0f} %" if "explained" in c else "",
-            "evidence": f"{c['log_evidence']:+.0f}" if "log_evidence" in c else "",
+            "evidence": f"{c['log_evidence']:+z.0f}" if "log_evidence" in c else "",
         }
         for c in [base, *body["candidates"][:MOST_CANDIDATES]]
     ]
