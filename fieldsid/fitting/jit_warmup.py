@@ -38,8 +38,6 @@ from fieldsid.runtime.worker_pool import fork_worker, job_queue
 
 Kernel = Callable[..., object]
 SAMPLES = 60
-COMPILING_THRESHOLD = 20_000
-"""New objects between two searches for garbage while numba compiles: at Python's own 700 they take a tenth of the time."""
 WHITE = Noise(0.01, 0.01)
 DISTURBED = Noise(0.01, 0.01, disturbance=0.01, disturbance_time=1.0)
 
@@ -193,13 +191,10 @@ def warming_up(tell: Callable[[str], None] = lambda _text: None, besides: Sequen
             idle.end()
         return
     tell("first run on this machine: compiling, about ten seconds, once")
-    usual = gc.get_threshold()
-    gc.set_threshold(COMPILING_THRESHOLD, *usual[1:])
     warmup, is_complete = Warmup(WARMUP_JOBS, besides), False
     try:
         yield warmup
     finally:
-        gc.set_threshold(*usual)
         is_complete = warmup.end()
     if is_complete:
         marker.parent.mkdir(parents=True, exist_ok=True)

@@ -42,8 +42,13 @@ def test_an_effect_that_is_named_is_added():
 
 
 @pytest.mark.parametrize(
-    ("codes", "says"), [([], "a part of them held back"), (["nothing_held_back"], "the same: too short to hold a part back")]
+    ("runs", "codes", "says"),
+    [
+        (["a", "b", "c"], [], "3 runs (a, b, c), one of them held back to judge by;"),
+        (["a", "b"], [], "2 runs (a, b), the last part of each held back to judge by;"),
+        (["a"], ["nothing_held_back"], "1 run fitted to (a), judged by the same: too short to hold a part back;"),
+    ],
 )
-def test_it_says_what_judged_where_no_run_was_given_for_it(codes, says):
-    alone = body("effect") | {"validation_runs": [], "notes": [{"code": code} for code in codes]}
-    assert f"judged by {says};" in of_diagnosis(alone, SEARCHED).rests_on
+def test_it_says_what_judged_where_no_run_was_given_for_it(runs, codes, says):
+    alone = body("effect") | {"runs": runs, "validation_runs": [], "notes": [{"code": code} for code in codes]}
+    assert of_diagnosis(alone, SEARCHED).rests_on.startswith(says)

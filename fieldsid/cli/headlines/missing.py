@@ -13,6 +13,8 @@ from fieldsid.cli.headlines.words import Body, counted, is_noise, named, times, 
 from fieldsid.rounding import probability
 
 MODELS = "models"
+LEAST_TO_SPARE_ONE = 3
+"""Runs from which a whole one is held back: see diagnosis/data/holdout_split.py."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,18 +36,20 @@ class Searched:
 def of_diagnosis(body: Body, searched: Searched) -> Headline:
     """Return the verdict with its numbers and probability."""
     sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
-    judged = named(body["validation_runs"]) if body["validation_runs"] else _held_back(body)
-    rests = (
-        f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
-        f"{counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
-    )
+    rests = f"{_judged(body)}; {counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
     return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
 
 
-def _held_back(body: Body) -> str:
-    """Return what judged where no run was given for it: short runs have no part to hold back."""
-    kept = not any(note["code"] == "nothing_held_back" for note in body["notes"])
-    return "a part of them held back" if kept else "the same: too short to hold a part back"
+def _judged(body: Body) -> str:
+    """Return the runs and what judged; without a run given for it one of three or more did, or the last part of each."""
+    runs, names = body["runs"], named(body["runs"])
+    fitted = f"{counted(len(runs), 'run')} fitted to ({names}), judged by"
+    if body["validation_runs"]:
+        return f"{fitted} {named(body['validation_runs'])}"
+    if any(note["code"] == "nothing_held_back" for note in body["notes"]):
+        return f"{fitted} the same: too short to hold a part back"
+    kept = "one of them" if len(runs) >= LEAST_TO_SPARE_ONE else "the last part of each"
+    return f"{counted(len(runs), 'run')} ({names}), {kept} held back to judge by"
 
 
 def _sure(body: Body) -> str:
