@@ -75,7 +75,7 @@ def _print_json(arguments: Sequence[str], code: int, what: str, found: str, hint
 
 def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageError:
     """Give an error of the option parser our three parts; its own sentence already names the option."""
-    words = error.format_message().strip().removesuffix(".")
+    words = error.format_message().strip().removesuffix(".").replace("Value error, ", "")  # pydantic's own words
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"sysid {arguments[0]}"
     return UsageError(words[:1].lower() + words[1:], found=shlex.join(["sysid", *arguments]), hint=f"see `{path} --help`")

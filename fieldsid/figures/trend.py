@@ -16,6 +16,10 @@ from fieldsid.batch.trend import Trend
 from fieldsid.figures import canvas
 
 DATES: Any = import_module("matplotlib.dates")  # its functions have no types
+FORMATS = ("%Y", "%b\n%Y", "%d %b", "%H:%M", "%H:%M", "%S.%f")
+"""How a tick is written that stands for a year, a month, a day, an hour, a minute, a second."""
+OF_FIRST = ("", "%b\n%Y", "%b\n%Y", "%d %b\n%Y", "%H:%M", "%H:%M")
+"""The same for the first of each: no tick beyond the axis is needed to know the year."""
 
 
 def figure(trends: Sequence[Trend], name: str) -> Figure:
@@ -27,7 +31,9 @@ def figure(trends: Sequence[Trend], name: str) -> Figure:
         draw(trend, ax)
     locator = DATES.AutoDateLocator()
     axes[-1].xaxis.set_major_locator(locator)
-    axes[-1].xaxis.set_major_formatter(DATES.ConciseDateFormatter(locator))
+    axes[-1].xaxis.set_major_formatter(
+        DATES.ConciseDateFormatter(locator, formats=FORMATS, zero_formats=OF_FIRST, show_offset=False)
+    )
     axes[-1].set_xlabel("start of the run, UTC")
     return sheet
 

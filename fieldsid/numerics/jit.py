@@ -24,7 +24,7 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
     if not HAS_NUMBA:
         return function
     numba: Any = import_module("numba")
-    return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy")(function))
+    return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:

@@ -17,6 +17,7 @@ from fieldsid.reporting import figures
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
 from fieldsid.rounding import in_unit, interval, number, probability, with_error
 from fieldsid.trial_folder.journal import Entry, made_by, relative_to
+from fieldsid.trial_folder.next_step import REPORT
 from fieldsid.trial_folder.state import FolderState, Item, Source
 
 DONE = (0, 1)
@@ -25,7 +26,7 @@ MOST_CANDIDATES = 12
 
 def context_of(material: Material) -> dict[str, Any]:
     """Return what the page's template shows of a report's material."""
-    state = material.state
+    state, (why, command) = material.state, material.next_step
     name = material.vehicle.name if material.vehicle is not None else state.folder.resolve().name
     return {
         "name": name,
@@ -33,7 +34,7 @@ def context_of(material: Material) -> dict[str, Any]:
         "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "tool": f"fieldsid {__version__}",
         "verdicts": [v for a in material.axes for v in _verdicts(a)] + _state_verdict(state),
-        "next": {"why": material.next_step[0], "command": material.next_step[1]},
+        "next": {"why": why, "command": "" if command == REPORT else command},  # this page is that report
         "runs": [_run(r) for r in material.runs],
         "axes": [_axis(a) for a in material.axes],
         "vehicle": _vehicle(material),
@@ -179,7 +180,7 @@ def _candidates(item: Item | None) -> list[dict[str, str]]:
             "fitted": _over(c["train"], floor),
             "unseen": _over(c["validation"], floor),
             "explained": "worse" if c.get("worse") else f"{100 * c['explained']:.0f} %" if "explained" in c else "",
-            "evidence": f"{c['log_evidence']:+.0f}" if "log_evidence" in c else "",
+            "evidence": f"{c['log_evidence']:+z.0f}" if "log_evidence" in c else "",
         }
         for c in [base, *body["candidates"][:MOST_CANDIDATES]]
     ]

@@ -16,6 +16,8 @@ from fieldsid.vehicle import find_vehicle
 DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 
+REPORT = "sysid report"
+
 
 def next_step(state: FolderState) -> tuple[str, str]:
     """Return why, and the command to run next, ready to paste in the folder; without one where nothing is left to do."""
@@ -135,7 +137,7 @@ def _use(state: FolderState) -> tuple[str, str] | None:
         known = "the gains are not verified" if is_trial(state.folder) else "no journal says that the gains are verified"
         return known, shlex.join(["sysid", "schedule", "verify", *_left_out(state, schedules[-1].path)])
     if is_trial(state.folder) and not any(e.command[1:2] == ("report",) and e.exit in DONE for e in state.entries):
-        return "there is no report yet", "sysid report"
+        return "there is no report yet", REPORT
     return None
 
 

@@ -148,7 +148,8 @@ class TurnPrediction(Plotted):
             elif m.held(self.rudder_max) and isnan(m.turn.entry_speed) and _to(rows, m.turn.side):
                 yield f"{m.turn.run} begins in the turn, so that its speed before it is not known: log the approach too"
         for fin, names in fins.items():
-            yield f"with `--rudder-max {fin}`, as they were turned with, {', '.join(names)} count as measured"
+            counted = f"{', '.join(names)} count{'s' * (len(names) == 1)} as measured"
+            yield f"with `--rudder-max {fin}`, the rudder of {'that turn' if len(names) == 1 else 'those turns'}, {counted}"
 
     def best(self, side: str) -> TurnRow | None:
         """Return the local minimum of the radius over speed that is farthest up, None where it only rises or falls."""

@@ -89,7 +89,7 @@ def candidate_row(c: Candidate) -> dict[str, Any]:
 def _row(c: Candidate, found: Diagnosis) -> tuple[str, ...]:
     floor = found.noise_floor
     errors = times(c.errors.train.over(floor)), times(c.errors.validation.over(floor))
-    return (c.effect, probability(c.probability), *errors, percent(c.explained), f"{c.score:+.0f}")
+    return (c.effect, probability(c.probability), *errors, percent(c.explained), f"{c.score:+z.0f}")
 
 
 VIEW = View("diagnosis", line, page, frames, lambda found: found.axis.value, figures)

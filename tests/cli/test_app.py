@@ -55,6 +55,20 @@ def test_python_m_fieldsid_is_the_same_program():
     assert done.stdout == f"fieldsid {__version__}\n"
 
 
+def test_a_value_that_is_none_of_the_choices_is_refused_in_words_of_the_program(run_cli):
+    answer = run_cli("identify", "run.csv", "--axis", "bogus")
+    assert answer.code == 2
+    assert answer.err.splitlines()[0] == "error: invalid value for '--axis': 'bogus' is not one of 'yaw', 'pitch'"
+
+
+def test_a_reader_that_goes_away_is_no_failure():
+    command = [sys.executable, "-m", "fieldsid", "effects", "list"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
+        program.stdout.close()  # as `| head -0` does
+        said = program.stderr.read()
+    assert (program.returncode, said) == (0, b"")
+
+
 def test_a_mistyped_command_is_refused_with_the_near_match(run_cli):
     answer = run_cli("efects")
     assert (answer.code, answer.out) == (2, "")

@@ -55,3 +55,11 @@ def test_a_folder_without_logs_is_said(run_cli, tmp_path):
     answer = run_cli("batch", tmp_path, "--axis", "yaw")
     assert answer.code == 2
     assert "there are no logs here" in answer.err
+
+
+def test_a_log_that_is_not_used_is_named_in_what_is_said_of_it(run_cli, tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.csv").write_text("time_s,yaw_rad\n0,1\n")
+    answer = run_cli("batch", tmp_path, "--axis", "yaw", "-o", tmp_path / "out", "--no-diagnose", "--workers", "1")
+    (line,) = (x for x in answer.out.splitlines() if x.startswith("not used"))
+    assert line == f"not used: `{tmp_path / 'one.csv'}` has too few samples; the same of 1 more"

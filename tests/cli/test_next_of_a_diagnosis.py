@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fieldsid.cli.headlines.missing import Searched, of_diagnosis
+from fieldsid.cli.headlines.missing import Searched, of_diagnosis, of_extension
 
 SEARCHED = Searched((Path("a.csv"), Path("b.csv")), (Path("c.csv"),), Path("m.yaml"), None, thorough=False)
 
@@ -42,8 +42,28 @@ def test_an_effect_that_is_named_is_added():
 
 
 @pytest.mark.parametrize(
-    ("codes", "says"), [([], "a part of them held back"), (["nothing_held_back"], "the same: too short to hold a part back")]
+    ("runs", "codes", "says"),
+    [
+        (["a", "b", "c"], [], "3 runs (a, b, c), one of them held back to judge by;"),
+        (["a", "b"], [], "2 runs (a, b), the last part of each held back to judge by;"),
+        (["a"], ["nothing_held_back"], "1 run fitted to (a), judged by the same: too short to hold a part back;"),
+    ],
 )
-def test_it_says_what_judged_where_no_run_was_given_for_it(codes, says):
-    alone = body("effect") | {"validation_runs": [], "notes": [{"code": code} for code in codes]}
-    assert f"judged by {says};" in of_diagnosis(alone, SEARCHED).rests_on
+def test_it_says_what_judged_where_no_run_was_given_for_it(runs, codes, says):
+    alone = body("effect") | {"runs": runs, "validation_runs": [], "notes": [{"code": code} for code in codes]}
+    assert of_diagnosis(alone, SEARCHED).rests_on.startswith(says)
+
+
+def test_an_extension_of_a_log_without_noise_is_told_in_units_as_its_diagnosis_was():
+    errors = {
+        w: {"validation": {"angle_rms_rad": a, "rate_rms_rad_s": r}}
+        for w, a, r in (("before", 0.11, 0.0051), ("after", 0.026, 0.0033))
+    }
+    extended = errors | {
+        "over_floor": {"before": 25650.0, "after": 6100.0}, "pays": True, "kept": True, "unseen": True, "added": ["current"],
+        "learned_on": ["a", "b"], "judged_on": ["c"], "next": "",
+    }  # fmt: skip
+    told = "current kept: the error on unseen data goes from 0.11 rad and 0.0051 rad/s to 0.026 rad and 0.0033 rad/s"
+    assert of_extension(extended).says == told
+    noisy = extended | {"over_floor": {"before": 3.2, "after": 1.04}}
+    assert of_extension(noisy).says.endswith("goes from 3.20 to 1.04 x the noise floor")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -82,6 +83,20 @@ def test_it_says_verdicts_first_and_then_every_part(made):
     assert {"Yaw: effects tried", "Turning radius", "Yaw: gains and margins"} <= set(heads)
     assert "&lt;swell&gt; &amp; &#34;salt&#34;" in text
     assert "sysid identify --axis yaw --joint --no-figures runs/pulses_1.0.parquet runs/pulses_1.4.parquet -o models" in text
+
+
+def test_the_page_does_not_name_itself_as_the_next_step(made):
+    from fieldsid.reporting.material import material_of
+    from fieldsid.reporting.sections import context_of
+    from fieldsid.trial_folder.next_step import REPORT
+    from fieldsid.trial_folder.state import state_of
+
+    material = material_of(state_of(made))
+    said = [
+        context_of(replace(material, next_step=("why", command)))["next"]["command"]
+        for command in (REPORT, "sysid schedule verify")
+    ]
+    assert said == ["", "sysid schedule verify"]
 
 
 def test_every_run_has_its_figure_without_a_script(made):
@@ -190,6 +205,8 @@ def test_the_script_zooms_reads_off_and_chooses_by_keyboard(made, tmp_path):
 @pytest.mark.parametrize("width", [390, 1000])
 def test_nothing_is_wider_than_the_page(made, tmp_path, width):
     script = """
+    const long = "models/joint_yaw" + "+speed_varying".repeat(6);
+    for (const select of document.querySelectorAll("select")) select.append(new Option(long, long));
     const wide = [...document.querySelectorAll("body *")].filter(e => !e.closest(".scroll") && !e.closest("svg")
         && e.getBoundingClientRect().right > innerWidth + 1).map(e => e.tagName + "." + e.className);
     const text = document.querySelector("svg.chart text"), size = text.getBoundingClientRect().height;

@@ -63,6 +63,11 @@ def test_text_fits_80_columns_and_says_what_would_settle_it(run_cli, tmp_path):
     assert max(map(len, trial.below(answer.out))) <= 80
     assert (tmp_path / "out" / "turn_radius.png").is_file()
     assert (tmp_path / "out" / "turn_radius.yaml").read_text().startswith("schema: fieldsid/turn-radius/1")
+    lines = answer.out.splitlines()
+    head = next(i for i, line in enumerate(lines) if line.startswith("side "))
+    rows = [line for line in lines[head + 1 :] if line.startswith(("port", "starboard"))]
+    assert lines[head + 1 : head + 1 + len(rows)] == rows  # no word of a row is folded
+    assert all(row.split()[-1] in {"measured", "identified", "extrapolated"} for row in rows)
 
 
 @pytest.mark.parametrize(("old", "new", "word"), [("-0.86", "0.86", "sign of b2"), ("1.11", "-1.11", "a22 <= 0")])

@@ -195,12 +195,12 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     bad = body["skipped_runs"]
     for t in body["trend"]:
         _render_trend(to, t)
-    why: dict[str, list[str]] = {}
+    why: dict[str, list[str]] = {}  # what was said, by that without the names of file and run
     for row in bad:
-        why.setdefault(row["what"].replace(row["file"], "LOG").replace(row["run"], "RUN"), []).append(row["run"])
-    for reason, runs in list(why.items())[:MOST_REASONS]:
-        more = f" and {len(runs) - 1} more" if len(runs) > 1 else ""
-        to.print(Text(f"not used: {runs[0]}{more}: {reason}"), soft_wrap=True)
+        why.setdefault(row["what"].replace(row["file"], "").replace(row["run"], ""), []).append(row["what"])
+    for said in list(why.values())[:MOST_REASONS]:
+        more = f"; the same of {len(said) - 1} more" if len(said) > 1 else ""
+        to.print(Text(f"not used: {said[0]}{more}"), soft_wrap=True)
     if len(why) > MOST_REASONS:
         to.print(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
     to.print(f"table: {body['table']} and {body['csv']}", soft_wrap=True)

@@ -105,7 +105,7 @@ def _tour(effect: str, output: Path | None, began: float, warmup: Warmup, *, for
 
 
 def _compile_loops() -> None:
-    from fieldsid.schedule.flown.closed_loop_kernel import compile_loops
+    from fieldsid.schedule.flown.jit_warmup import compile_loops
 
     compile_loops()
 

@@ -164,7 +164,7 @@ def _candidates(found: Diagnosis) -> Any:
             times(c.errors.train.over(floor)),
             times(c.errors.validation.over(floor)),
             "worse" if c.worse else f"{100 * c.explained:.0f} %",
-            f"{c.score:+.0f}",
+            f"{c.score:+z.0f}",
         )
         for c in found.candidates
     ]

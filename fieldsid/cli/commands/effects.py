@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from fieldsid.models.effect import Coefficient, Effect, Variant
 
-command = typer.Typer(help="List the physical effects, show one, start one of your own.")
+command = typer.Typer(help="List the physical effects, show one, start one of your own.\n\nExample: sysid effects show servo_lag")
 
 EffectName = Annotated[str, typer.Argument(metavar="NAME", help="Name of an effect, as in `sysid effects list`.")]
 OneAxis = Annotated[Axis | None, typer.Option("--axis", help="Only the effects of this plane.", show_default=False)]

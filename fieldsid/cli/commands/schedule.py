@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from fieldsid.schedule.record import Schedule
     from fieldsid.schedule.verify import Verification
 
-command = typer.Typer(help="Gains per speed: design them, verify them, write them for the vehicle's software.")
+command = typer.Typer(
+    help="Gains per speed: design them, verify them, write them for the vehicle's software.\n\n"
+    "Example: sysid schedule design models/*.yaml -o gains.yaml"
+)
 
 ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
 Controller = Annotated[

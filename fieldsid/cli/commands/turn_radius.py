@@ -181,14 +181,13 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
 
     times, angle = shown_in("rad")
     methods = ", ".join(sorted({r.method for r in prediction.rows}))
-    columns = ("side", "m/s", "radius m", "from", "to (95 %)", "model's", "deg/s", "180 deg s", "trust")
+    columns = ("side", "m/s", "radius m", "95 %", "model's", "deg/s", "u-turn s", "trust")
     rows = [
         (
             r.side,
             number(r.speed, 3),
             number(r.radius, 3),
-            number(r.interval95[0], 3),
-            number(r.interval95[1], 3),
+            f"{number(r.interval95[0], 3)} .. {number(r.interval95[1], 3)}",
             number(r.of_model, 3),
             number(r.yaw_rate_max * 57.29577951308232, 3),
             number(r.u_turn_time, 3),

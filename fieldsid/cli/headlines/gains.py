@@ -47,7 +47,7 @@ def of_turn(body: Body, models: Sequence[Path]) -> Headline:
     )
     speeds = sorted({float(r["speed_m_s"]) for r in rows})
     methods = ", ".join(sorted({str(r["method"]) for r in rows}))
-    circles = f"{counted(len(body['measured']), 'measured circle')}" if body["measured"] else "no measured circle"
+    circles = f"{counted(len(body['measured']), 'measured circle')}" if body["measured"] else "no circle given by `--measured`"
     times, unit = shown_in("rad")
     rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
     rests = f"{named([str(m) for m in models])}, {rudder}; {methods} at {counted(len(speeds), 'speed')}; {circles}"
@@ -88,7 +88,7 @@ def of_verification(body: Body, schedule: Path, models: Sequence[Path]) -> Headl
 
 def of_export(body: Body, schedule: Path) -> Headline:
     """Return what was written for the vehicle, to a file or to standard output."""
-    rests = "the gains as they were designed, not verified again"
+    rests = "the gains as they were designed; an export verifies nothing"
     if body["file"] is None:
         return Headline(
             f"{schedule} as {body['target']}, on standard output", rests, typed_with("-o", _named_after(schedule, body))
@@ -100,7 +100,7 @@ def of_export(body: Body, schedule: Path) -> Headline:
 def of_patch(body: Body, schedule: Path, key: str) -> Headline:
     """Return what the gains change, or have changed, in a file that exists."""
     changes = [line for line in str(body["difference"]).splitlines() if line[:1] == "+" and line[:3] != "+++"]
-    rests = f"{schedule}, its gains as they were designed, not verified again"
+    rests = f"{schedule}, its gains as they were designed; an export verifies nothing"
     if not changes:
         return Headline(f"{body['file']} holds these gains at {key} already", rests, pasted("status"))
     lines = counted(len(changes), "line")

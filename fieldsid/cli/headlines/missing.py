@@ -9,10 +9,13 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, is_noise, named, times, used
-from fieldsid.rounding import probability
+from fieldsid.cli.headlines.words import MANY, Body, counted, is_noise, named, times, used
+from fieldsid.cli.voice import shown_in
+from fieldsid.rounding import number, probability
 
 MODELS = "models"
+LEAST_TO_SPARE_ONE = 3
+"""Runs from which a whole one is held back: see diagnosis/data/holdout_split.py."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,18 +37,20 @@ class Searched:
 def of_diagnosis(body: Body, searched: Searched) -> Headline:
     """Return the verdict with its numbers and probability."""
     sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
-    judged = named(body["validation_runs"]) if body["validation_runs"] else _held_back(body)
-    rests = (
-        f"{counted(len(body['runs']), 'run')} fitted to ({named(body['runs'])}), judged by {judged}; "
-        f"{counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
-    )
+    rests = f"{_judged(body)}; {counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
     return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
 
 
-def _held_back(body: Body) -> str:
-    """Return what judged where no run was given for it: short runs have no part to hold back."""
-    kept = not any(note["code"] == "nothing_held_back" for note in body["notes"])
-    return "a part of them held back" if kept else "the same: too short to hold a part back"
+def _judged(body: Body) -> str:
+    """Return the runs and what judged; without a run given for it one of three or more did, or the last part of each."""
+    runs, names = body["runs"], named(body["runs"])
+    fitted = f"{counted(len(runs), 'run')} fitted to ({names}), judged by"
+    if body["validation_runs"]:
+        return f"{fitted} {named(body['validation_runs'])}"
+    if any(note["code"] == "nothing_held_back" for note in body["notes"]):
+        return f"{fitted} the same: too short to hold a part back"
+    kept = "one of them" if len(runs) >= LEAST_TO_SPARE_ONE else "the last part of each"
+    return f"{counted(len(runs), 'run')} ({names}), {kept} held back to judge by"
 
 
 def _sure(body: Body) -> str:
@@ -124,12 +129,26 @@ def _identified(runs: Sequence[Path], axis: str) -> Path | None:
 
 def of_extension(body: Body) -> Headline:
     """Return whether the addition is kept, and how the error fell."""
-    before, after = body["over_floor"]["before"], body["over_floor"]["after"]
     word = "kept" if body["pays"] else "kept because of --keep" if body["kept"] else "not kept"
     where = "unseen data" if body["unseen"] else "the runs fitted to"
-    says = f"{'+'.join(body['added'])} {word}: the error on {where} goes from {times(before)} to {times(after)} x the noise floor"
+    says = f"{'+'.join(body['added'])} {word}: the error on {where} goes from {_before_to_after(body)}"
     fitted = counted(len(body["learned_on"]), "run")
     return Headline(says, f"{fitted} fitted to ({named(body['learned_on'])}), judged by {named(body['judged_on'])}", body["next"])
+
+
+def _before_to_after(body: Body) -> str:
+    """Return the error over the noise floor; of a log without noise, whose floor is that of its digits, in its own units."""
+    before, after = body["over_floor"]["before"], body["over_floor"]["after"]
+    if before < MANY:
+        return f"{times(before)} to {times(after)} x the noise floor"
+    side = "validation" if body["unseen"] else "train"
+    return " to ".join(_rms(body[when][side]) for when in ("before", "after"))
+
+
+def _rms(errors: Body) -> str:
+    factor, angle = shown_in("rad")
+    parts = ((errors["angle_rms_rad"], angle), (errors["rate_rms_rad_s"], f"{angle}/s"))
+    return " and ".join(f"{number(factor * float(rms), 2)} {unit}" for rms, unit in parts if rms is not None and isfinite(rms))
 
 
 def of_undoing(body: Body) -> Headline:

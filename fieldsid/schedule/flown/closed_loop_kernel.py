@@ -147,9 +147,3 @@ def close_loop(
                 lost = u * u * (1.0 + row[21] * held * held) + row[22] * middle * middle
                 u = max(u + step * slowing * (speed * speed - lost), SLOWEST_SHARE * speed)
             fin = new
-
-
-def compile_loops() -> None:
-    """Call once, on a plant that does not move, what checking a schedule calls."""
-    still, none, out = np.zeros((1, PLANT_COLUMNS)), np.zeros((1, GAIN_COLUMNS)), np.zeros((1, 2, OUT_COLUMNS))
-    close_loop(still, none, 0.0, 0.0, 0.0, 1.0, 0.02, np.zeros(2), out)

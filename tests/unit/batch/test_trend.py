@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fieldsid.batch.trend import change_points, scatter_of, trends_of
+from fieldsid.figures.trend import figure
 from fieldsid.models.axis import Axis
 
 DAY = datetime(2026, 1, 1, tzinfo=UTC)
@@ -87,3 +88,15 @@ def test_runs_of_one_date_have_no_order_and_no_trend():
 
 def test_few_runs_have_no_trend():
     assert trends_of(archive(np.full(5, -1.2)), Axis.YAW) == ()
+
+
+def test_every_date_of_the_figure_is_whole_and_one_of_them_tells_the_year():
+    sheet = figure(trends_of(archive(np.r_[np.full(30, -1.2), np.full(25, -0.98)]), Axis.YAW), "yaw")
+    sheet.draw_without_rendering()
+    bottom = sheet.axes[-1].xaxis
+    assert bottom.get_offset_text().get_text() == ""
+    written = [t for t in bottom.get_ticklabels() if t.get_text()]
+    assert any("2026" in t.get_text() for t in written)
+    low, high = sheet.bbox.x0, sheet.bbox.x1
+    inside = [t.get_window_extent() for t in written]
+    assert all(low <= box.x0 and box.x1 <= high for box in inside if low <= box.x0 <= high)

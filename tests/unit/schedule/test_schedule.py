@@ -18,7 +18,9 @@ from fieldsid.plant.laws.axis_laws import save_laws
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
 from fieldsid.schedule.controller import KINDS, Gains, closed_poles, least_damping
 from fieldsid.schedule.design import Wish, design_gains
-from fieldsid.schedule.flown.closed_loop_kernel import close_loop, compile_loops
+from fieldsid.schedule.flown.closed_loop_kernel import close_loop
+from fieldsid.schedule.flown.hull_kernel import close_hull_loop
+from fieldsid.schedule.flown.jit_warmup import compile_loops
 from fieldsid.schedule.flown.response import (
     LIMIT_CYCLE_SHARE,
     depth_response,
@@ -468,3 +470,5 @@ def test_what_the_tour_compiles_ahead_is_what_a_step_and_a_dive_call():
     step_response(plant(), row, reference=0.1, seconds=1.0)
     depth_response(plant(), row, step=1.0, seconds=1.0, pitch_limit=0.3)
     assert len(close_loop.signatures) == 1
+    step_response(replace(plant(), hull=np.ones((1, 22))), row, reference=0.1, seconds=1.0)
+    assert len(close_hull_loop.signatures) == 1

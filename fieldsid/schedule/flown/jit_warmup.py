@@ -1,0 +1,23 @@
+"""The compile warm-up of turning and of flown schedules, left to the worker by a tour; see fitting/jit_warmup.py."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, PLANT_COLUMNS, close_loop
+from fieldsid.schedule.flown.hull_kernel import SETTINGS, close_hull_loop
+from fieldsid.turning.maneuvering.equations import settle, simulate
+
+COEFFICIENTS = 22
+STEP_S = 0.02
+
+
+def compile_loops() -> None:
+    """Call once, on vehicles of which every coefficient is one, what a turn, the gains and their check call."""
+    none, push, out = np.zeros((1, GAIN_COLUMNS)), np.zeros(2), np.zeros((1, 2, OUT_COLUMNS))
+    p, time = np.ones(COEFFICIENTS), np.array([0.0, STEP_S])
+    time.setflags(write=False)  # as that of a run is
+    simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2))
+    settle(p, 1.0, 0.0)
+    close_loop(np.zeros((1, PLANT_COLUMNS)), none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
+    close_hull_loop(np.ones((1, COEFFICIENTS)), np.ones((1, SETTINGS)), none, 0.0, 1.0, STEP_S, push, out)
