@@ -87,3 +87,14 @@ def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
     both, alone = hypothesis("speed_varying", "stall", gain=90.0, over=1.0), hypothesis("stall", gain=80.0, over=1.2)
     search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, alone)})
     assert added_effects(search, both) == ("stall", "speed_varying")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "counts"),
+    [((1.1, 1.04), (1.02, 1.0), True), ((1.1, 1.04), (1.06, 1.03), False), ((1.01, 1.01), (1.0, 1.0), False)],
+)
+def test_near_the_floor_an_addition_counts_that_explains_more_than_it_leaves(before, after, counts):
+    base = hypothesis("servo_lag", over=before[0], train=before[1])
+    more = hypothesis("servo_lag", "stall", gain=50.0, over=after[0], train=after[1])
+    assert is_accepted(base, more, FLOOR) == counts
+    assert not is_accepted(base, more)

@@ -58,3 +58,11 @@ def test_an_effect_that_the_others_have_made_idle_is_left_out(work):
     assert set(best.output_error_fit.names) == {"servo_lag", "quadratic_damping"}
     assert len(less) == 2
     assert all(best.error_ratio <= MAX_FREE_RUN_ERROR_RATIO * f.error_ratio for f in less)
+
+
+def test_a_number_of_each_runs_own_is_charged_as_an_effect_is(work):
+    base = work.base().reported_fit
+    problem, x = with_effect(base.problem, base.x, pick_effect("wave"), {})
+    waved = _evaluate(work, fit_output_error(problem, x, base.weights))
+    assert waved.charge == pytest.approx(MAX_FREE_RUN_ERROR_RATIO**-3)  # a phase in each of three runs
+    assert _evaluate(work, base).charge == 1.0

@@ -102,3 +102,34 @@ def test_an_end_that_a_child_has_led_to_is_kept_where_unseen_runs_agree(base, ot
     base._refit_from_best_child(base.root)
     assert (base.tried[base.root] is not before) == kept
     base.tried[base.root] = before
+
+
+def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, monkeypatch):
+    def model(names, *, error, evidence):
+        errors = SimpleNamespace(mean=error, over=lambda _floor: error)
+        known = np.array([evidence])
+        effects = tuple(all_effects(Axis.YAW)[n] for n in names)
+        return SimpleNamespace(
+            names=names,
+            effects=effects,
+            log_evidence=evidence,
+            log_likelihood_by_run=known,
+            selection_errors=errors,
+            train=errors,
+        )
+
+    both, whole = ("stall", "current"), ("stall", "current", "delay")
+    tried = [
+        model(both[:1], error=2.0, evidence=60.0),
+        model(both, error=1.1, evidence=55.0),
+        model(("current",), error=3.0, evidence=9.0),
+    ]
+    tried += [
+        model(whole, error=1.05, evidence=120.0),
+        model(whole[::2], error=1.4, evidence=100.0),
+        model(whole[1:], error=2.0, evidence=90.0),
+    ]
+    work = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in tried}, _floor_to_explain=lambda: None)
+    work._without_each = lambda h: search_state.SearchState._without_each(work, h)
+    assert search_state.SearchState.core_of(work, tried[3]) == set(both)
+    assert search_state.SearchState.core_of(work, tried[1]) == {"stall"}

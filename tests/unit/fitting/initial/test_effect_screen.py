@@ -10,7 +10,7 @@ import pytest
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.effects import pick_effect
-from fieldsid.fitting.initial.effect_screen import _orthonormal, backtrack, linearise_at, screen_effect
+from fieldsid.fitting.initial.effect_screen import _orthonormal, backtrack, linearise_at, scan_points, screen_effect
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.initial.joint_grid_search import _schur_complement
 from fieldsid.fitting.problem.parameters import layout_of
@@ -88,3 +88,13 @@ def test_products_without_some_columns_are_those_of_what_is_left_once_they_are_p
     rest = _orthonormal(columns[:, 3:])
     left = columns[:, :3] - rest @ (rest.T @ columns[:, :3])
     np.testing.assert_allclose(_schur_complement(columns.T @ columns, 3), left.T @ left, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["delay", "servo_lag", "clock_offset"])
+def test_a_shift_in_time_is_tried_from_a_few_milliseconds(name):
+    record = logged(1, 1.0, loss=0.0, size=0.0)
+    layout = layout_of([record], Axis.YAW, ())
+    problem = Problem((record,), layout)
+    linearisation = linearise_at(problem, equation_error_start([record], layout), white_noise_floor([record]))
+    least = min(abs(v) for point in scan_points(linearisation, pick_effect(name)) for v in point.values())
+    assert 0.001 < least < 0.01

@@ -15,7 +15,7 @@ from fieldsid.fitting.optimise import chunked
 from fieldsid.fitting.optimise.levenberg_marquardt import GaussianPrior, cost_of, levenberg_marquardt, normal_equations
 from fieldsid.fitting.optimise.linear_white import linear_white
 from fieldsid.fitting.predict.predict import frozen_problem
-from fieldsid.fitting.problem.parameters import layout_of
+from fieldsid.fitting.problem.parameters import layout_of, speed_groups
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
@@ -233,3 +233,20 @@ def test_a_descent_that_ends_without_looking_is_as_low_as_it_says(effects, toler
     held = [(b.damping, b.stiffness) for b in (problem.base_of(start, run) for run in range(2))]
     assert found.converged
     assert found.cost == pytest.approx(cost_of(problem, found.x, noise, held), rel=tolerance)
+
+
+def test_runs_that_count_as_flown_at_one_speed_change_within_over_that():
+    one = record(YAW[0])
+    slowing = np.linspace(1.1, 0.9, len(one))
+    runs = [replace(one, speed=u, signals={**one.signals, "surge": 1.5 * slowing}) for u in (1.45, 1.55)]
+    effect = effect_named("speed_varying")
+    for snapped in (False, True):
+        layout = layout_of(runs, Axis.YAW, (effect,), speed_groups(runs, snapped=snapped))
+        problem = Problem(tuple(runs), layout)
+        x = equation_error_start(runs, layout)
+        motions = [problem.simulate(x, run)[0].rate for run in (0, 1)]
+        # by lift theory one fin in one flow turns the hull alike, whatever the run's median; without it only at one speed
+        x[layout.names.index("speed_share")] = 0.0
+        still = [problem.simulate(x, run)[0].rate for run in (0, 1)]
+        assert np.allclose(*motions, atol=1e-12)
+        assert np.allclose(*still, atol=1e-12) == snapped
