@@ -126,7 +126,7 @@ def _request(asked: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Ax
 
 
 def _course(text: str | None) -> float | None:
-    return None if text is None else angles.parse_angle(text, "--course", 2.0 * np.pi) % (2.0 * np.pi)
+    return None if text is None else angles.parse_angle(text, "--course", angles.TURN, angles.TURN) % angles.TURN
 
 
 def _with_circles(asked: PlanRequest) -> bool:
@@ -166,7 +166,7 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
         )
     rate = vehicle.fin_rate_rad_s if vehicle else None
     if limiting.fin_rate is not None:
-        rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE)
+        rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE, angles.FASTEST_FIN)
     return Envelope(
         fin=fin if fin is not None else own if own is not None else FIN_MAX,
         fin_rate=np.inf if rate is None else rate,
