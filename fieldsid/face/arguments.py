@@ -49,6 +49,12 @@ def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle | None:
     return find_vehicle(Path()) if vehicle is None else load_vehicle(Path(vehicle))
 
 
+def length_of(vehicle: Vehicle | File | None) -> float | None:
+    """Return the length in m of a vehicle as `vehicle_of` finds it, None where it is not stated; raises VehicleError."""
+    known = vehicle_of(vehicle)
+    return None if known is None else known.length_m
+
+
 def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
     """Return the fin limits of a vehicle in rad by signal, without those it does not state."""
     if vehicle is None:

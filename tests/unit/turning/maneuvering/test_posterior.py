@@ -37,6 +37,7 @@ def test_draws_have_the_spread_of_the_posterior_and_not_that_of_the_proposal():
     assert even / odd == pytest.approx(1.0, abs=0.3)  # the proposals' are 2.0
 
 
+@pytest.mark.forks
 def test_draws_do_not_depend_on_how_many_processes_share_the_chains(monkeypatch):
     known = Known(np.ones(SIZE), np.eye(SIZE))
     shared = draw_posterior(known, np.random.default_rng(4)).chains
