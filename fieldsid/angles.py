@@ -40,19 +40,17 @@ def parse_angle(text: str, option: str, most: float, largest: float = math.inf) 
             f"{text.strip()!r} is not an angle", found=f"{option} {text}", hint="write it like `15deg`, `0.26rad` or `0.26`"
         )
     possible = [u for u in UNITS if abs(value) * UNITS[u] <= largest]
-    if not possible or unit not in (None, *possible):
-        raise UsageError(
-            f"`{option} {text.strip()}` is more than can be meant",
-            found=f"{math.degrees(value * UNITS[unit]):.6g} deg" if unit else f"{value:g}",
-            hint=f"write at most `{option} {math.degrees(largest):.6g}deg`",
-        )
-    if unit is None and abs(value) > most:
-        other = f", or `{value:g}rad` where that is meant" if "rad" in possible else ""
+    at_most = f"write at most `{option} {math.degrees(largest):.6g}deg`"
+    if unit is not None and unit not in possible:
+        angle = math.degrees(value * UNITS[unit])
+        raise UsageError(f"`{option} {text.strip()}` is more than can be meant", found=f"{angle:.6g} deg", hint=at_most)
+    if unit is None and (value > most or "rad" not in possible):
+        readings = {"deg": f"write `{option} {value:g}deg`", "rad": f"or `{value:g}rad` where that is meant"}
         raise UsageError(
             f"`{option} {value:g}` is {value:g} deg or {value:g} rad?",
             found=f"{value:g} deg is {math.radians(value):.4g} rad, {value:g} rad is {math.degrees(value):.4g} deg; "
             f"a bare number is rad, at most {most:.4g}",
-            hint=f"write `{option} {value:g}deg`{other}",
+            hint=", ".join(readings[u] for u in possible) or at_most,
         )
     return value * UNITS[unit or "rad"]
 

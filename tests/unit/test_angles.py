@@ -36,7 +36,7 @@ def test_what_is_no_angle_is_refused(text):
         parse_angle(text, "--x", FIN)
 
 
-@pytest.mark.parametrize(("text", "most"), [("400deg", TURN), ("-7rad", TURN), ("400", TURN), ("46deg", FIN), ("-1rad", FIN)])
+@pytest.mark.parametrize(("text", "most"), [("400deg", TURN), ("-7rad", TURN), ("46deg", FIN), ("-1rad", FIN)])
 def test_what_cannot_be_meant_with_its_unit_is_refused_with_the_most_that_can(text, most):
     with pytest.raises(UsageError, match="more than can be meant") as caught:
         parse_angle(text, "--x", most, most)
@@ -48,6 +48,9 @@ def test_only_readings_that_can_be_meant_are_advised():
         parse_angle("-270", "--x", TURN, TURN)
     assert caught.value.hint == "write `--x -270deg`"
     assert parse_angle("-270deg", "--x", TURN, TURN) == pytest.approx(np.radians(-270.0))
+    with pytest.raises(UsageError, match="400 deg or 400 rad") as caught:
+        parse_angle("400", "--x", TURN, TURN)
+    assert caught.value.hint == "write at most `--x 360deg`"
 
 
 @pytest.mark.parametrize("text", ["-10", "-10deg", "181deg", "400", "4rad"])

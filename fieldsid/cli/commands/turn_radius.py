@@ -114,9 +114,10 @@ def _fin_zero(text: str) -> float:
     from fieldsid.angles import FIN, parse_angle
     from fieldsid.errors import UsageError
 
-    angle = parse_angle(text, "--fin-zero", FIN, FIN)
-    if angle < 0.0:
-        raise UsageError("a tolerance is not negative", found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
+    angle = parse_angle(text, "--fin-zero", FIN)
+    if not 0.0 <= angle <= FIN:
+        words = "the tolerance of a fin's zero lies in 0 .. 45 deg"
+        raise UsageError(words, found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
     return angle
 
 
