@@ -230,10 +230,24 @@ def inputs_of(path: Path) -> tuple[Path, ...]:
     """Return the files that a record says it was made from, those that are still there; none where it cannot be read."""
     try:
         inputs = read_yaml(path).get("inputs")
-        named = [Path(str(entry["path"])) for entry in inputs or ()]
+        named = [where_now(entry, path) for entry in inputs or ()]
     except (ArtifactError, TypeError, KeyError):
         return ()
     return tuple(p for p in dict.fromkeys(named) if p.exists())
+
+
+def where_now(entry: Mapping[str, Any], record: Path) -> Path:
+    """Return the path of a file that a record names with its SHA-256, as seen from the working folder.
+
+    What is not there is looked for from every folder above the record, and known by its hash: a record tells its files from the
+    folder where it was made.
+    """
+    path = Path(str(entry["path"]))
+    if path.is_absolute() or path.exists():
+        return path
+    above = (folder / path for folder in record.resolve().parents)
+    found = next((p for p in above if p.exists() and sha256_of(p) == entry.get("sha256")), None)
+    return path if found is None else Path(os.path.relpath(found))
 
 
 def to_yaml(body: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from fieldsid.artifacts import where_now
 from fieldsid.effects._user_folder import add_user_effects
 from fieldsid.errors import ArtifactError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
@@ -47,6 +48,12 @@ def vehicle_of(vehicle: Vehicle | File | None) -> Vehicle | None:
     if isinstance(vehicle, Vehicle):
         return vehicle
     return find_vehicle(Path()) if vehicle is None else load_vehicle(Path(vehicle))
+
+
+def length_of(vehicle: Vehicle | File | None) -> float | None:
+    """Return the length in m of a vehicle as `vehicle_of` finds it, None where it is not stated; raises VehicleError."""
+    known = vehicle_of(vehicle)
+    return None if known is None else known.length_m
 
 
 def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
@@ -122,7 +129,7 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
 
 def designed_from(schedule: Schedule, name: str) -> list[Path]:
     """Return the files of the models a schedule was designed from; raises ArtifactError where they are not there any more."""
-    named = [Path(str(m["path"])) for m in schedule.provenance.get("models", [])]
+    named = [where_now(m, Path(name)) for m in schedule.provenance.get("models", [])]
     missing = [p for p in named if not p.is_file()]
     if not named or missing:
         raise ArtifactError(

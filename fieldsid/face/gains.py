@@ -7,7 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fieldsid.face.arguments import File, designed_from, fin_limits_of, own_effects, rudder_of, run_files, runs_behind, vehicle_of
+from fieldsid.face.arguments import (
+    File,
+    designed_from,
+    fin_limits_of,
+    length_of,
+    own_effects,
+    rudder_of,
+    run_files,
+    runs_behind,
+    vehicle_of,
+)
 from fieldsid.face.models import Models, source_of
 from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.speeds import speeds_of
@@ -67,7 +77,7 @@ def turn_radius(
         measured=runs_mapped(measured, mapping),
         method=method,
         fin_zero=fin_zero,
-        length=None if known is None else known.length_m,
+        length=length_of(known),
     )
 
 
@@ -110,6 +120,7 @@ def design_schedule(
         limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
         runs=runs_behind(source, _say),
+        length=length_of(known),
     )
 
 

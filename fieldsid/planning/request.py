@@ -21,7 +21,7 @@ from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
 from fieldsid.planning.discriminate.separating_plan import LONGEST_WINDOW_S, separating_plan
 from fieldsid.planning.flight.excitation import Window
 from fieldsid.planning.output.plan_file import plan_body
-from fieldsid.planning.safety.envelope import Envelope
+from fieldsid.planning.safety.envelope import LARGEST_FIN, MOST_TURNS, Envelope
 from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
 from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
@@ -126,7 +126,7 @@ def _request(asked: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Ax
 
 
 def _course(text: str | None) -> float | None:
-    return None if text is None else angles.parse_angle(text, "--course", 2.0 * np.pi) % (2.0 * np.pi)
+    return None if text is None else angles.parse_angle(text, "--course", angles.TURN, angles.TURN) % angles.TURN
 
 
 def _with_circles(asked: PlanRequest) -> bool:
@@ -157,7 +157,7 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
     area = parse_area(limiting.area) or (None, None)
     band = parse_band(limiting.depth_band) or (None, None)
     own = None if vehicle is None else vehicle.fin_max_rad(axis.value)
-    fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN)
+    fin = None if limiting.fin is None else angles.parse_angle(limiting.fin, "--fin-max", angles.FIN, LARGEST_FIN)
     if fin is not None and own is not None and fin > own:
         raise UsageError(
             f"a fin of {fin:g} rad is more than the vehicle has",
@@ -166,27 +166,32 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
         )
     rate = vehicle.fin_rate_rad_s if vehicle else None
     if limiting.fin_rate is not None:
-        rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE)
+        rate = angles.parse_angle(limiting.fin_rate, "--fin-rate", angles.FIN_RATE, angles.FASTEST_FIN)
     return Envelope(
         fin=fin if fin is not None else own if own is not None else FIN_MAX,
         fin_rate=np.inf if rate is None else rate,
-        heading=_limit(limiting.heading, "--max-heading", angles.HEADING, HEADING_MAX if axis is Axis.YAW else None),
+        heading=_limit(
+            limiting.heading,
+            "--max-heading",
+            (angles.HEADING, MOST_TURNS * angles.TURN),
+            HEADING_MAX if axis is Axis.YAW else None,
+        ),
         track=limiting.track,
         depth_low=band[0],
         depth_high=band[1],
-        pitch=_limit(limiting.pitch, "--max-pitch", angles.TILT, PITCH_MAX if axis is Axis.PITCH else None),
-        roll=_limit(limiting.roll, "--max-roll", angles.TILT),
+        pitch=_limit(limiting.pitch, "--max-pitch", (angles.TILT, angles.TILT), PITCH_MAX if axis is Axis.PITCH else None),
+        roll=_limit(limiting.roll, "--max-roll", (angles.TILT, angles.TILT)),
         area_length=area[0],
         area_width=area[1],
         share=limiting.share,
     )
 
 
-def _limit(text: str | None, option: str, most: float, default: float | None = None) -> float | None:
-    """Return the limit that was typed, None for `none`, the default where nothing was."""
+def _limit(text: str | None, option: str, most: tuple[float, float], default: float | None = None) -> float | None:
+    """Return the limit that was typed, None for `none`, the default where nothing was; `most` bare and with a unit, rad."""
     if text is None:
         return default
-    return None if text.strip().lower() == NONE else angles.parse_angle(text, option, most)
+    return None if text.strip().lower() == NONE else angles.parse_angle(text, option, *most)
 
 
 def _separating(asked: PlanRequest, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import read_yaml
+from fieldsid.artifacts import read_yaml, where_now
 from fieldsid.display import Brief
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import DataError, UsageError
@@ -334,9 +334,9 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
 
 def logs_of(paths: Sequence[Path]) -> tuple[Path, ...]:
     """Return the logs that model files, or a fit file's models, name as what they were made from, each once."""
-    bodies = [read_yaml(p) for p in paths]
-    records = [r for b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
-    return tuple(dict.fromkeys(Path(str(i["path"])) for r in records for i in r.get("inputs", [])))
+    bodies = [(p, read_yaml(p)) for p in paths]
+    records = [(p, r) for p, b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
+    return tuple(dict.fromkeys(where_now(i, p) for p, r in records for i in r.get("inputs", [])))
 
 
 def _with_laws(

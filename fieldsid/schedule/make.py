@@ -10,7 +10,7 @@ import numpy as np
 from fieldsid._version import __version__
 from fieldsid.artifacts import sha256_of
 from fieldsid.errors import ModelError, UsageError
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
@@ -19,7 +19,7 @@ from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import PROPORTIONAL, Wish, check_wish, design_gains
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
 from fieldsid.schedule.margins import margins
-from fieldsid.schedule.plants import Plants, plants_of
+from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
 
 DESIGN_DRAWS = 24
@@ -42,10 +42,12 @@ def design_schedule(
     limits: FinLimits | None = None,
     depth: bool = False,
     runs: Sequence[Run] = (),
+    length: float | None = None,
 ) -> Schedule:
     """Return the schedule of a source's axis at its speeds (or those given, m/s), fin limited to +/-fin_limit rad.
 
-    runs are those the models came from: the vehicle in surge, sway and yaw is identified from them. Raises UsageError for what
+    runs are those the models came from: the vehicle in surge, sway and yaw, `length` m long where that is known, is identified
+    from them. Raises UsageError for what
     cannot be meant and ModelError where no gain holds the loop.
     """
     wish, limits = wish or Wish(), limits or FinLimits()
@@ -59,14 +61,14 @@ def design_schedule(
         raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
-    plants, refused = plants_of(source, limits, runs), False
+    plants, refused = plants_of(source, limits, runs, length), False
     try:
         rows = _rows(plants, knots, fin_limit, wish, depth=depth)
-    except ModelError:
+    except ModelError as error:
         if plants.belief is None or wish.kind in PROPORTIONAL:
             raise  # nothing but a rate holds what may be unstable
         # what pulses say of an unstable hull's sway may be further off than each speed's own model, which holds near its pulses
-        plants, refused = plants.without_belief(), True
+        plants, refused = models_plants(source, limits, runs, _took_no_gains(error)), True
         rows = _rows(plants, knots, fin_limit, wish, depth=depth)
     return Schedule(
         axis=source.axis,
@@ -76,9 +78,18 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=actuator_of(source, limits),
-        provenance=_provenance(source, wish, plants.says, knots) | {"belief_refused": refused},
+        provenance=_provenance(source, wish, plants.says, knots) | {"belief_refused": refused, "length_m": length},
         stated=limits.record(),
+        notes=() if plants.note is None else (plants.note,),
     )
+
+
+def _took_no_gains(error: ModelError) -> Note:
+    words = (
+        f"the vehicle that all runs together make believe in takes no gains ({error.what}: {error.found}); they are for each "
+        "speed's own model: fly a zig-zag, which tells the sway, and identify again"
+    )
+    return Note("belief_refused", words)
 
 
 def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fieldsid.errors import ModelError
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule.believed_plant import believed_plant
 from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at, plants_at
-from fieldsid.turning.maneuvering.belief import Belief, believe
+from fieldsid.turning.maneuvering.belief import Belief, believe, like_no_vehicle, not_fitted
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
 BELIEVED = "speed lost in the turn, sway and drag as all runs together have them"
@@ -23,12 +23,16 @@ BELIEVED = "speed lost in the turn, sway and drag as all runs together have them
 
 @dataclass(frozen=True, slots=True)
 class Plants:
-    """A source's plants, their fin's limits, and how a vehicle loses speed: by a belief, else as `surge` has it."""
+    """A source's plants, their fin's limits, and how a vehicle loses speed: by a belief, else as `surge` has it.
+
+    `note` says why the belief is not taken where one was asked for.
+    """
 
     source: ParameterSource
     limits: FinLimits
     surge: SurgeModel | None
     belief: Belief | None
+    note: Note | None = None
 
     def at(self, speed: float, fin_limit: float, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
         """Return the plants next to a speed (m/s), `draws` of the errors of each, with weights that sum to one."""
@@ -52,29 +56,31 @@ class Plants:
         nearest, _ = max(self.source.near(speed), key=lambda at: at[1])
         return self.source.models[nearest].noise
 
-    def without_belief(self) -> Plants:
-        """Return the models' own plants, one for each of their speeds."""
-        return replace(self, belief=None)
-
     @property
     def says(self) -> str:
         """Where the loss of speed comes from, in words."""
         return BELIEVED if self.belief is not None else speed_kept_said(self.source.axis, self.surge)
 
 
-def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run]) -> Plants:
-    """Return the plants of a source; runs are those its models came from.
+def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], length: float | None) -> Plants:
+    """Return the plants of a source; runs are those its models came from, `length` the vehicle's in m where it is known.
 
     A belief is formed of yaw models with effects whose runs have a fin, a turn and a speed, as a turning radius is; where the
-    fit of it fails, or lies where no vehicle does, the models' own plants are taken, one for each of their speeds.
+    fit of it fails, or lies where no vehicle does, the models' own plants are taken, one for each of their speeds, with a note.
     """
-    if source.axis is not Axis.YAW or not runs:
-        return Plants(source, limits, None, None)
-    belief = None
-    if any(model.effects for model in source.models):
-        try:
-            belief = believe(runs, source.models, None)
-        except ModelError:
-            belief = None
-    usual = belief is not None and belief.fitted.is_usual
-    return Plants(source, limits, fit_surge(runs), belief if usual else None)
+    if source.axis is not Axis.YAW or not any(model.effects for model in source.models):
+        return models_plants(source, limits, runs)
+    try:
+        belief = believe(runs, source.models, length)
+    except ModelError as error:
+        return models_plants(source, limits, runs, not_fitted(error, runs))
+    if belief is None:
+        return models_plants(source, limits, runs)
+    if not belief.fitted.is_usual:
+        return models_plants(source, limits, runs, like_no_vehicle(belief.fitted, length))
+    return Plants(source, limits, None, belief)
+
+
+def models_plants(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], note: Note | None = None) -> Plants:
+    """Return the models' own plants, one for each of their speeds; `note` says why they are taken and no belief."""
+    return Plants(source, limits, fit_surge(runs) if source.axis is Axis.YAW else None, None, note)

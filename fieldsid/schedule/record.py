@@ -13,6 +13,7 @@ import numpy as np
 from fieldsid.artifacts import load_record, save_record
 from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
+from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import finite_number
@@ -70,7 +71,8 @@ class Row(Displayed):
 class Schedule(Plotted):
     """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions).
 
-    actuator is the fin's lag, delay and rate that the design counted with, stated those of them that were said, not modelled.
+    actuator is the fin's lag, delay and rate that the design counted with, stated those of them that were said, not modelled;
+    notes are what was said of the vehicle it was designed for.
     """
 
     axis: Axis
@@ -82,6 +84,7 @@ class Schedule(Plotted):
     actuator: Mapping[str, float | None]
     provenance: Mapping[str, Any] = field(default_factory=dict)
     stated: Mapping[str, float | None] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
 
     @property
     def speeds(self) -> tuple[float, ...]:
@@ -129,6 +132,7 @@ def body_of(schedule: Schedule) -> dict[str, Any]:
         "stated": dict(schedule.stated),
         "rows": [r.record() for r in schedule.rows],
         "provenance": dict(schedule.provenance),
+        "warnings": [{"code": n.code, "message": n.message} for n in schedule.notes],
     }
 
 
@@ -155,6 +159,7 @@ def load_schedule(path: Path) -> Schedule:
             actuator=_limits(body["actuator"]),
             provenance=_provenance(body),
             stated=_limits(body["stated"]),
+            notes=tuple(Note(str(n["code"]), str(n["message"])) for n in body.get("warnings", ())),
         )
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise ArtifactError(

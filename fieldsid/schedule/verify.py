@@ -32,7 +32,7 @@ from fieldsid.schedule.flown.response import (
 from fieldsid.schedule.flown.straight_leg import straight_leg
 from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
 from fieldsid.schedule.margins import control_margins, margins, worst_of
-from fieldsid.schedule.plants import plants_of
+from fieldsid.schedule.plants import models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
 
 VERIFY_DRAWS = 60
@@ -229,9 +229,10 @@ def verify_schedule(
     runs are those the models came from: the vehicle in surge, sway and yaw is identified from them, unless that took no gains.
     """
     limits = limits or stated_limits(schedule)
-    of = plants_of(source, limits, runs)
     if schedule.provenance.get("belief_refused", False):
-        of = of.without_belief()
+        of = models_plants(source, limits, runs)
+    else:
+        of = plants_of(source, limits, runs, schedule.provenance.get("length_m"))
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
     constant = best_constant(schedule, plants, step=STEP_ANGLE_RAD[schedule.axis], seconds=STEP_DURATION_S)

@@ -16,7 +16,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import damping_that_holds, in_radians, wider_fin
 from fieldsid.turning.believed_rows import believed_rows, doubts_of_draws
 from fieldsid.turning.flown_circles import against_rudder, circles_of, compared_with, turned_against, with_measurement
-from fieldsid.turning.maneuvering.belief import Belief, believe
+from fieldsid.turning.maneuvering.belief import Belief, believe, not_fitted
 from fieldsid.turning.model_error import DataCoverage, data_coverage, model_error, model_error_draws
 from fieldsid.turning.paper_formulas import (
     FIN_ZERO_TOLERANCE,
@@ -107,8 +107,7 @@ def _beliefs(
             if method == "maneuvering":
                 raise
             before = belief = None
-            words = f"{error.what}: {error.found}; each speed's own model is simulated instead"
-            notes.append(Note("maneuvering_not_fitted", words, {"runs": [run.name for run in runs]}))
+            notes.append(not_fitted(error, runs))
     if method == "maneuvering" and belief is None:
         raise UsageError(
             "surge, sway and yaw cannot be fitted without runs that have a speed, a fin and a turn", found=f"{len(runs)} runs",

@@ -38,8 +38,16 @@ OPTIONS = (
 def test_a_bare_number_that_cannot_be_rad_is_refused_with_both_readings(run_cli, asked, option):
     answer = run_cli(*asked[option], "60")
     assert (answer.code, answer.out) == (2, "")
-    assert "60deg`, or `60rad` where that is meant" in answer.err
+    assert "60 deg or 60 rad?" in answer.err
     assert "60 deg is 1.047 rad, 60 rad is 3438 deg" in answer.err
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_what_cannot_be_meant_with_its_unit_is_refused_too(run_cli, asked, option):
+    answer = run_cli(*asked[option], "5000deg")
+    assert (answer.code, answer.out) == (2, "")
+    assert "5000" in answer.err
+    assert "if it is in degrees" not in answer.err
 
 
 def test_degrees_and_radians_mean_the_same(run_cli, asked):
@@ -61,7 +69,7 @@ def test_an_angle_inside_a_maneuver_is_typed_the_same_way(run_cli, tmp_path):
 
 
 def test_a_negative_tolerance_is_refused(run_cli, asked):
-    assert "a tolerance is not negative" in run_cli(*asked["--fin-zero"], "-1deg").err
+    assert "lies in 0 .. 45 deg" in run_cli(*asked["--fin-zero"], "-1deg").err
 
 
 def test_a_margin_is_typed_with_its_unit_or_in_deg_and_never_guessed(run_cli, asked):
@@ -79,7 +87,8 @@ def test_a_margin_is_typed_with_its_unit_or_in_deg_and_never_guessed(run_cli, as
 def test_a_course_and_a_fin_rate_take_the_same_angles(run_cli, asked):
     answer = run_cli(*asked["--max-heading"], "60deg", "--course", "90")
     assert answer.code == 2
-    assert "90deg`, or `90rad` where that is meant" in answer.err
+    assert "write `--course 90deg`\n" in answer.err
+    assert "write at most `--course 360deg`" in run_cli(*asked["--max-heading"], "60deg", "--course", "400deg").err
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fieldsid.angles import FIN, FIN_RATE, HEADING, TILT, parse_angle, said
+from fieldsid.angles import FIN, FIN_RATE, HEADING, TILT, TURN, parse_angle, parse_margin, said
 from fieldsid.errors import UsageError
 
 
@@ -34,6 +34,29 @@ def test_a_bare_number_that_cannot_be_rad_is_refused_with_both_readings(text, mo
 def test_what_is_no_angle_is_refused(text):
     with pytest.raises(UsageError, match="is not an angle"):
         parse_angle(text, "--x", FIN)
+
+
+@pytest.mark.parametrize(("text", "most"), [("400deg", TURN), ("-7rad", TURN), ("46deg", FIN), ("-1rad", FIN)])
+def test_what_cannot_be_meant_with_its_unit_is_refused_with_the_most_that_can(text, most):
+    with pytest.raises(UsageError, match="more than can be meant") as caught:
+        parse_angle(text, "--x", most, most)
+    assert parse_angle(caught.value.hint.split("--x ")[1].rstrip("`"), "--x", most, most) == pytest.approx(most)
+
+
+def test_only_readings_that_can_be_meant_are_advised():
+    with pytest.raises(UsageError, match="-270 deg or -270 rad") as caught:
+        parse_angle("-270", "--x", TURN, TURN)
+    assert caught.value.hint == "write `--x -270deg`"
+    assert parse_angle("-270deg", "--x", TURN, TURN) == pytest.approx(np.radians(-270.0))
+    with pytest.raises(UsageError, match="400 deg or 400 rad") as caught:
+        parse_angle("400", "--x", TURN, TURN)
+    assert caught.value.hint == "write at most `--x 360deg`"
+
+
+@pytest.mark.parametrize("text", ["-10", "-10deg", "181deg", "400", "4rad"])
+def test_a_margin_is_between_nil_and_half_a_turn(text):
+    with pytest.raises(UsageError):
+        parse_margin(text, "--x")
 
 
 def test_an_angle_is_said_in_both_units():

@@ -123,9 +123,9 @@ def design(
 
     Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
     """
-    from fieldsid.angles import FIN, FIN_RATE, parse_angle, parse_margin
+    from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import runs_behind
+    from fieldsid.face.arguments import length_of, runs_behind
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.schedule.design import Wish
@@ -135,7 +135,7 @@ def design(
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
-    fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE)
+    fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
     source = load_parameter_source(models, laws=law or ())
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
@@ -148,13 +148,20 @@ def design(
         limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
         runs=runs_behind(source, say),
+        length=length_of(vehicle),
     )
     body: dict[str, Any] = {"schema": "fieldsid/schedule/1", **body_of(schedule), "file": None}
     if output is not None:
         inputs = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
     headline = of_design(body, models)
-    return emit(body, as_json=as_json, render=lambda to: render_design(to, schedule, source, body), headline=headline)
+    return emit(
+        body,
+        as_json=as_json,
+        render=lambda to: render_design(to, schedule, source, body),
+        headline=headline,
+        notes=schedule.notes,
+    )
 
 
 @command.command("verify", short_help="Margins and steps over the identified set.")

@@ -92,7 +92,7 @@ def command(
 
 
 def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: float) -> Run:
-    from fieldsid.angles import FIN, parse_angle
+    from fieldsid.angles import FIN, TILT, parse_angle
     from fieldsid.maneuvers import Limits, Schedule, parse_spec
     from fieldsid.planning.flight.dry_run import dry_run
 
@@ -100,7 +100,7 @@ def _flown(model: Model, spec: str, speed: float | None, fin_max: str, rate: flo
         model,
         *parse_spec(spec),
         speed=model.law.reference if speed is None else speed,
-        limits=Limits(parse_angle(fin_max, "--fin-max", FIN)),
+        limits=Limits(parse_angle(fin_max, "--fin-max", FIN, TILT)),
         schedule=Schedule(rate_hz=rate),
     )
 

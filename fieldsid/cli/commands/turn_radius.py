@@ -80,6 +80,7 @@ def command(
     from fieldsid.cli.headlines.gains import of_turn
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
+    from fieldsid.face.arguments import length_of
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.turning.radius import turn_radius
@@ -97,7 +98,7 @@ def command(
         method=method,
         fin_zero=_fin_zero(fin_zero),
         unfit=skips.skip,
-        length=_length(vehicle),
+        length=length_of(vehicle),
     )
     body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
     body["skipped_runs"] = skips.records
@@ -114,8 +115,9 @@ def _fin_zero(text: str) -> float:
     from fieldsid.errors import UsageError
 
     angle = parse_angle(text, "--fin-zero", FIN)
-    if angle < 0.0:
-        raise UsageError("a tolerance is not negative", found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
+    if not 0.0 <= angle <= FIN:
+        words = "the tolerance of a fin's zero lies in 0 .. 45 deg"
+        raise UsageError(words, found=f"--fin-zero {text}", hint="`--fin-zero 0` counts every offset")
     return angle
 
 
@@ -124,14 +126,6 @@ def _rudder(given: float | None, vehicle: Path | None, source: ParameterSource) 
     from fieldsid.face.arguments import rudder_of, vehicle_of
 
     return given if given is not None else rudder_of(vehicle_of(vehicle), source, say)
-
-
-def _length(vehicle: Path | None) -> float | None:
-    """Return the vehicle's length in m where it is stated."""
-    from fieldsid.face.arguments import vehicle_of
-
-    known = vehicle_of(vehicle)
-    return None if known is None else known.length_m
 
 
 def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path | None, skips: Skips) -> Sequence[Run]:

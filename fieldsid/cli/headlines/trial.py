@@ -34,7 +34,9 @@ def of_plan(body: Body, model: Path | None) -> Headline:
         for name, e in hardest["expected"].items()
         if e["relative"]
     )
-    at = f" at {hardest['speed_m_s']:g} m/s, the least sure of {len(legs)} speeds" if len(legs) > 1 else ""
+    speeds = {leg["speed_m_s"] for leg in legs}
+    which = f", the least sure of {len(speeds)} speeds" if len(speeds) > 1 else f", by the least sure of {len(legs)} legs"
+    at = f" at {hardest['speed_m_s']:g} m/s{which}" if len(legs) > 1 else ""
     what = "minutes" if body["minutes"] != 1 else "minute"
     says = f"{counted(len(legs), 'leg')} of {body['minutes']:.1f} {what} buy {bought or 'what tells the effects apart'}{at}"
     known = str(model) if model is not None else f"the prior {body['prior']}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from fieldsid.dynamics.assemble import Base
 from fieldsid.dynamics.free_run import base_at, effects_of
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.effect import Core
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_file import load_prior
@@ -53,7 +55,7 @@ def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
         )
     held = _held(model)
     for speed in speeds:
-        growth = growth_of(base_at(model, speed))
+        growth = growth_of(base_at(model, speed), _core_at(model, speed))
         if growth > 0 and not held:
             names = NAMES[axis]
             raise ModelError(
@@ -64,11 +66,21 @@ def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
     return model
 
 
-def growth_of(base: Base) -> float:
-    """Return the growth rate (1/s) of the least stable motion; a free heading counts as neither stable nor unstable."""
-    roots = np.roots([1.0, base.damping, base.stiffness])
+def growth_of(base: Base, core: Core) -> float:
+    """Return the growth rate (1/s) of the least stable motion; a free heading counts as neither stable nor unstable.
+
+    y'' = -a y' - k y + x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another.
+    """
+    a, k, c = base.damping, base.stiffness, core.cross_damping
+    roots = np.roots([1.0, a + c, k + a * c + core.cross_rate, k * c])
     worst = float(np.max(roots.real))
     return worst if worst > 1e-6 else 0.0
+
+
+def _core_at(model: Model, speed: float) -> Core:
+    values = {"damping_exponent": model.law.damping_exponent} | dict(model.values)
+    parts = [e.core(values, model.law.scale(speed)) for e in effects_of(model) if e.core is not None]
+    return reduce(Core.plus, parts, Core())
 
 
 def _held(model: Model) -> bool:

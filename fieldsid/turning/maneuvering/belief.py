@@ -15,13 +15,13 @@ import numpy as np
 
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import ModelError
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.yaw_plant import steady_fins
 from fieldsid.turning.maneuvering.equations import coefficients, simulate
-from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
+from fieldsid.turning.maneuvering.fit import FARTHEST_PRIOR_COST, Fitted, fit_maneuvering
 from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
 from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
 from fieldsid.turning.model_error import STALL_LOG_SD
@@ -137,6 +137,24 @@ def believe(runs: Sequence[Run], models: Sequence[Model], length: float | None, 
             hint="look at these runs with `sysid check`, and leave out what no vehicle does",
         ) from error
     return Belief(fitted, posterior, tuple(models))
+
+
+def not_fitted(error: ModelError, runs: Sequence[Run]) -> Note:
+    """Return what is said where the fit to all runs fails and each speed's own model is taken."""
+    words = f"{error.what}: {error.found}; each speed's own model is taken instead: {error.hint}"
+    return Note("maneuvering_not_fitted", words, {"runs": [run.name for run in runs]})
+
+
+def like_no_vehicle(fitted: Fitted, length: float | None) -> Note:
+    """Return what is said where the fit lies where no vehicle does and each speed's own model is taken."""
+    away, runs = fitted.prior_cost(fitted.vector), [run.name for run in fitted.runs]
+    hint = "" if length is not None else "state `length_m` in vehicle.yaml, "
+    words = (
+        "what all runs together make of surge, sway and yaw lies where no vehicle does: "
+        f"{away:.0f} from the vehicles known, 999 of 1000 lie below {FARTHEST_PRIOR_COST:.0f} ({', '.join(runs)}); "
+        f"each speed's own model is taken instead: {hint}look at the runs with `sysid check`, or fly a zig-zag"
+    )
+    return Note("like_no_vehicle", words, {"runs": runs, "value": away, "limit": FARTHEST_PRIOR_COST})
 
 
 class _Known:

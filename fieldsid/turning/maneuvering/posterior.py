@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.runtime.worker_pool import parallel_map
 from fieldsid.turning.maneuvering.equations import coefficients, settle
 from fieldsid.turning.maneuvering.fit import Fitted
 
@@ -72,20 +73,22 @@ class _Gaussian:
 def _moved(
     cost: Callable[[FloatArray], float], about: _Gaussian, start: FloatArray, steps: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the chains (c, steps, 22) that go on from states (c, 22)."""
+    """Return the chains (c, steps, 22) that go on from states (c, 22), each by draws of its own: they are shared out."""
+    own = rng.spawn(start.shape[0])
 
     def rest(vector: FloatArray) -> float:
         away = vector - about.centre
         return -0.5 * (cost(vector) - float(away @ about.precision @ away))
 
-    out = np.empty((start.shape[0], steps, start.shape[1]))
-    for chain in range(start.shape[0]):
-        vector = start[chain]
+    def chain(number: int) -> FloatArray:
+        vector, out = start[number], np.empty((steps, start.shape[1]))
         height = rest(vector)
         for step in range(steps):
-            vector, height = _slice(rest, about, vector, height, rng)
-            out[chain, step] = vector
-    return out
+            vector, height = _slice(rest, about, vector, height, own[number])
+            out[step] = vector
+        return out
+
+    return np.stack(parallel_map(chain, range(start.shape[0])))
 
 
 def _slice(

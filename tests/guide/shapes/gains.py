@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from guide.shapes.common import AxisName, Headline, Number, Result, Shape, schema_field
+from guide.shapes.common import AxisName, Headline, Number, Remark, Result, Shape, schema_field
 
 
 class Row(Shape):
@@ -77,6 +77,8 @@ class Schedule(Result):
     """What was said of the fin when it was designed."""
     provenance: dict[str, Any]
     """Models, runs, sign convention, what holds between and outside the rows."""
+    warnings: list[Remark]
+    """Why the gains are for each speed's own model, and not for the vehicle that all runs together make believe in."""
     file: str | None
     """The file that was written."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -143,6 +145,22 @@ def test_an_unstable_prior_is_refused_and_one_held_by_quadratic_damping_is_not(t
     )
     (tmp_path / "held.yaml").write_text(held)
     assert checked_prior(load_believed(tmp_path / "held.yaml"), Axis.YAW, (1.4,)).effects == ("quadratic_damping",)
+
+
+@pytest.mark.parametrize(
+    ("a22", "cross_rate", "unstable"), [(-3.2, 20.0, False), (-3.2, 10.0, True), (1.1, 0.2, False), (1.1, -8.0, True)]
+)
+def test_a_prior_is_as_stable_as_it_is_with_its_sway(a22, cross_rate, unstable):
+    """By the textbook's two conditions of a cubic without its free heading: a + c > 0 and a c + c_r > 0."""
+    plain = named_prior("torpedo", Axis.YAW)
+    values = {**plain.values, "a22": a22, "cross_damping": 5.67, "cross_rate": cross_rate}
+    model = replace(plain, effects=("sway_coupling",), values=values, free=())
+    assert (a22 + 5.67 > 0.0 and 5.67 * a22 + cross_rate > 0.0) is not unstable
+    if not unstable:
+        assert checked_prior(model, Axis.YAW, (model.law.reference,)) is model
+        return
+    with pytest.raises(ModelError, match="unstable"):
+        checked_prior(model, Axis.YAW, (model.law.reference,))
 
 
 @pytest.mark.parametrize(

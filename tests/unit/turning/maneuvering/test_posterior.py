@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from fieldsid.runtime.worker_pool import IS_WORKER
 from fieldsid.turning.maneuvering.posterior import draw_posterior, effective_draws
 
 SIZE = 22
@@ -34,6 +35,16 @@ def test_draws_have_the_spread_of_the_posterior_and_not_that_of_the_proposal():
     assert np.sqrt(np.mean(vectors**2)) == pytest.approx(1.0, abs=0.12)
     odd, even = np.sqrt(np.mean(vectors[:, 1::2] ** 2)), np.sqrt(np.mean(vectors[:, ::2] ** 2))
     assert even / odd == pytest.approx(1.0, abs=0.3)  # the proposals' are 2.0
+
+
+@pytest.mark.forks
+def test_draws_do_not_depend_on_how_many_processes_share_the_chains(monkeypatch):
+    known = Known(np.ones(SIZE), np.eye(SIZE))
+    shared = draw_posterior(known, np.random.default_rng(4)).chains
+    monkeypatch.setenv(IS_WORKER, "1")
+    alone = draw_posterior(known, np.random.default_rng(4)).chains
+    assert np.array_equal(shared, alone)
+    assert not np.array_equal(alone[0], alone[1])
 
 
 def test_independent_draws_are_worth_themselves_and_slow_ones_fewer():
