@@ -15,6 +15,7 @@ from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, ser
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
+from fieldsid.logs.mapping.true_north import true_north
 from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
@@ -106,6 +107,7 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         body["frame"] = REP103
     if samples is not None:
         notes += _by_numbers(samples, signals, inventory)
+        notes += [] if "frame" in body else true_north(samples, names, signals)
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
     return body, notes
