@@ -14,6 +14,7 @@ from fieldsid.artifacts import plain, to_yaml, write_text
 from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
+from fieldsid.logs.convert.conditioning import MAIN
 from fieldsid.logs.mapping.propose import Proposal, propose
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.run import Note, Run
@@ -91,16 +92,16 @@ def inspect_log(
     options = replace(options, progress=progress or options.progress)
     inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
-    needs_none = reader.own_map(path, options) is not None
+    own = reader.own_map(path, options)
+    needs_none = own is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own.sources.keys()
     run = proposal.run
     if mapping is not None or needs_none:
         run = load_run(path, mapping, msg_path=msg_path, salvage=True, max_gap_s=math.inf)
     proposed = [] if needs_none or mapping is not None else list(proposal.notes)
     notes = [*inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
-        notes.append(
-            Note("not_importable", proposal.problem.what, {"found": proposal.problem.found, "hint": proposal.problem.hint})
-        )
+        what, found, hint = proposal.problem.what, proposal.problem.found, proposal.problem.hint
+        notes.append(Note("not_importable", f"{what}: {hint}" if hint else what, {"found": found, "hint": hint}))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
     chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))

@@ -31,6 +31,8 @@ GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
 """The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
 _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borientation\.[xyzw]$")
 """What columns are called that were written from messages, which are in the frames of REP 103."""
+PERCENT = frozenset({"percent", "percentage", "pct", "perc"})
+"""Words of a fin that is told in shares of its range, whose angle is not known."""
 TRIES = 6
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -60,12 +62,22 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
         except FieldsidError as error:
             signal = _at_fault(error, body)
             if signal is None:
+                _in_degrees_by_span(body["signals"], inventory)
                 return Proposal(body, problem=error, notes=tuple(notes))
             left = body["signals"].pop(signal)
             notes.append(Note("left_out", f"{signal} is not proposed from {_label(left)}: {error.what}", {"signal": signal}))
         else:
             return replace(done, notes=(*notes, *done.notes))
     return Proposal(body, notes=tuple(notes))
+
+
+def _in_degrees_by_span(signals: dict[str, Any], inventory: Inventory) -> None:
+    """Set degrees where a column's numbers say so, in a log that cannot be read as it is: what is left is the line it lacks."""
+    spans = {c.name: c.fields[0].span for c in inventory.channels if len(c.fields) == 1 and c.fields[0].span is not None}
+    for signal, item in signals.items():
+        span = spans.get(item.get("column", ""))
+        if span is not None and "unit" not in item and max(map(abs, span)) > _DEGREES.get(signal, float("inf")):
+            item["unit"] = "deg/s" if signal.endswith("_s") else "deg"
 
 
 def _at_fault(error: FieldsidError, body: dict[str, Any]) -> str | None:
@@ -201,6 +213,8 @@ def _as_counts(samples: Samples, signals: dict[str, Any]) -> None:
     for signal in COUNTED:
         item = signals.get(signal, {})
         values = samples.columns.get(item.get("column", ""))
+        if signal in FINS and "unit" not in item and PERCENT & set(words_of(str(item.get("column", "")))):
+            item["unit"], item["centre"] = COUNTS, 0
         servo = None if values is None or "unit" in item else servo_of(values) or _as_others(values, servos)
         if servo is not None:
             item["unit"], item["centre"] = COUNTS, servo.centre

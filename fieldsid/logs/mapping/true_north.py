@@ -99,7 +99,7 @@ def _is_named(signals: Mapping[str, Any]) -> bool:
 
 def _heading(samples: Samples, signals: Mapping[str, Any]) -> ComplexArray | None:
     item = signals.get("yaw_rad", {})
-    values = samples.columns.get(item.get("column", ""))
+    values = samples.columns.get(item["column"]) if "column" in item else None
     if values is None or "frame" in item or "sign" in item:
         return None
     return np.asarray(np.exp(1j * _radians(values, item.get("unit"))))
@@ -108,7 +108,7 @@ def _heading(samples: Samples, signals: Mapping[str, Any]) -> ComplexArray | Non
 def _position(samples: Samples, signals: Mapping[str, Any]) -> ComplexArray | None:
     """Return the way made (n,) by x and y, x real; None where they are not there or their frame is known."""
     items = [signals.get(s, {}) for s in ("x_m", "y_m")]
-    x, y = (samples.columns.get(item.get("column", "")) for item in items)
+    x, y = (samples.columns.get(item["column"]) if "column" in item else None for item in items)
     if x is None or y is None or any("frame" in item or "sign" in item for item in items):
         return None
     return _made(samples, x, y)

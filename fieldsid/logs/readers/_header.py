@@ -52,6 +52,8 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
     """Return a header line's names when it has one word for each column, else nothing."""
     bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
     names = cells(bare, separator)
+    if len(names) != width and bare != line:  # a program that writes a comment above its table parts it by blanks
+        names = bare.split()
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):
         return ()
     return () if _are_units(line, separator, width) else tuple(names)
