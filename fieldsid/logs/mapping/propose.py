@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -33,6 +34,12 @@ _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borient
 """What columns are called that were written from messages, which are in the frames of REP 103."""
 PERCENT = frozenset({"percent", "percentage", "pct", "perc"})
 """Words of a fin that is told in shares of its range, whose angle is not known."""
+OUTPUTS = frozenset({"servo", "servomotor", "actuator", "rcou", "outputs", "controls"})
+"""Words of what a vehicle's servos are told or say."""
+_OUTPUT = re.compile(r"^(value|servo\d+_raw|C\d+|(output|control|position)\[\d+\])$")
+"""Fields of these that are an angle or a pulse."""
+SHOWN = 8
+"""Outputs that a message names."""
 TRIES = 6
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -151,7 +158,23 @@ def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
     named = " ".join(c.name + c.kind for c in inventory.channels).lower()
     frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
     signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
+    notes += [] if set(FINS) & signals.keys() else _which_output(inventory)
     return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes
+
+
+def _which_output(inventory: Inventory) -> list[Note]:
+    """Say which outputs of a log's servos there are, and the line that is missing: which one moves which fin is the vehicle's."""
+    found = [(c.name, f.path) for c in inventory.channels for f in c.fields if OUTPUTS & set(words_of(f"{c.name} {f.path}"))]
+    found = [(topic, path) for topic, path in found if _OUTPUT.search(path)]
+    if not found:
+        return []
+    shown = ", ".join(f"{topic} {path}" for topic, path in found[:SHOWN]) + (", ..." if len(found) > SHOWN else "")
+    topic, path = found[0]
+    message = (
+        f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{topic: {json.dumps(topic)}, "
+        f"field: {json.dumps(path)}}}`, of: {shown}"
+    )
+    return [Note("which_output", message, {"signal": "rudder_rad", "others": [f"{t} {p}" for t, p in found]})]
 
 
 def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
