@@ -73,12 +73,11 @@ def _named(columns: Columns) -> Iterator[Source]:
             if i != weeks and any(of <= words for of in OF_WEEK):
                 yield Source(column=_place(columns, i), unit=columns.unit(i, TIME), week=_place(columns, weeks))
     dates = next((i for i, _, words in meanings if words & DATES and not words & {"time"}), None)
-    if weeks is None:
-        for i, _, words in meanings:
-            if any(of <= words for of in OF_WEEK):
-                yield _source(columns, i, None)
     for i in sorted((i for i, meaning, _ in meanings if meaning and meaning[0] == TIME), key=lambda i: -meanings[i][1][1]):  # type: ignore[index]
         yield _source(columns, i, dates)
+    for i, _, words in meanings if weeks is None else ():
+        if any(of <= words for of in OF_WEEK):
+            yield _source(columns, i, None)
 
 
 def _source(columns: Columns, index: int, dates: int | None) -> Source:

@@ -95,3 +95,17 @@ def test_a_table_of_which_only_a_part_is_canonical_needs_a_mapping_for_the_rest(
     assert found.run is not None
     same_flight(found.run)
     assert "no_motion" not in {n.code for n in found.notes}
+
+
+def test_a_comment_of_as_many_words_as_columns_is_no_header(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table("# recorded off Pandan", text(T, 1), H, FIN))
+    assert [c.name for c in inspect_log(path).inventory.channels] == ["0", "1", "2"]
+
+
+def test_a_time_is_taken_before_a_time_of_the_week(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table("tow,time,heading,rudder", text(np.floor(T), 0), text(T, 1), H, FIN))
+    found = inspect_log(path)
+    assert found.proposal.body["time"]["column"] == "time"
+    same_flight(found.run)
