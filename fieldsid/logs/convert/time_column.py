@@ -79,9 +79,27 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     size = float(cells[0])
     epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else "d" if _are_days(size, step) else ""
     seen = cells[np.isfinite(cells)]
+    if _are_digits_of_a_clock(seen):
+        return "hhmmss"
     if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
         return "s"
     return epoch or unit_of_step(step) or "s"
+
+
+def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
+    """Whether numbers (n,) are a clock's digits, as 142018.5: they jump at each full minute, and the clock does not."""
+    if float(seen.min(initial=0.0)) < 0.0 or float(seen.max(initial=0.0)) >= 240000.0:
+        return False
+    if bool((seen % 100.0 >= 60.0).any() or (np.floor(seen / 100.0) % 100.0 >= 60.0).any()):
+        return False
+    full = np.diff(np.floor(seen / 100.0)) != 0.0
+    clock, _ = going_on(clock_of_digits(seen.astype(np.float64)).seconds, DAY_S)
+    jumps, steps = np.abs(np.diff(seen))[full], np.diff(clock)
+    return bool(full.any() and (jumps >= 40.0).all() and (np.abs(steps[full]) <= FEW_STEPS * np.median(steps)).all())
+
+
+FEW_STEPS = 5.0
+"""Steps of a clock that may be missing at a full minute."""
 
 
 def _are_days(size: float, step: float) -> bool:

@@ -30,6 +30,12 @@ def table(head, *columns, separator=",", before=()):
     return "\n".join([*before, head, *(separator.join(row) for row in zip(*columns, strict=True))]) + "\n"
 
 
+def digits(seconds):
+    """The digits that a clock shows, as a number."""
+    s = np.round(seconds % 86400.0, 1)
+    return 1e4 * (s // 3600) + 1e2 * (s // 60 % 60) + s % 60
+
+
 FIN = text(RUDDER)
 H = text(HEADING)
 TABLES = {
@@ -40,6 +46,10 @@ TABLES = {
     "milliseconds behind a colon": table("Time,Heading,Rudder", [m[:-3] for m in moments("%H:%M:%S:%f")], H, FIN),
     "a time of the week that starts again": table("tow_s,heading,rudder", text((604740.0 + T) % 604800.0, 1), H, FIN),
     "whole ms of the week": table("itow,heading,rudder", [str(round(1e3 * (604740.0 + t)) % 604800000) for t in T], H, FIN),
+    "the digits of a clock": table(
+        "utc,heading,rudder", [m[:-4] for m in moments("%H%M%S.%f")], H, FIN,
+    ),
+    "the digits of a clock at midnight": table("utc,heading,rudder", text(digits(86370.0 + T), 1), H, FIN),
     "days of a spreadsheet": table("time,heading,rudder", text(46082.54 + T / 86400.0, 8), H, FIN),
     "days since year 0": table("datenum,heading,rudder", text(740042.54 + T / 86400.0, 9), H, FIN),
     "Julian days": table("time,heading,rudder", text(2461100.54 + T / 86400.0, 9), H, FIN),
@@ -109,3 +119,31 @@ def test_a_time_is_taken_before_a_time_of_the_week(tmp_path):
     found = inspect_log(path)
     assert found.proposal.body["time"]["column"] == "time"
     same_flight(found.run)
+
+
+def test_a_time_in_hours_that_nothing_says_is_found(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table("time,heading,rudder", text(T / 3600.0, 8), H, FIN))
+    (note,) = (n for n in inspect_log(path).notes if n.code == "time_unit")
+    assert "`unit: h`" in note.message
+    same_flight(
+        load_run(
+            path,
+            mapping_of(
+                {
+                    "time": {"column": "time", "unit": "h"},
+                    "signals": {
+                        "yaw_rad": {"column": "heading", "unit": "deg"},
+                        "rudder_rad": {"column": "rudder", "unit": "deg"},
+                    },
+                }
+            ),
+        )
+    )
+
+
+def test_seconds_with_a_hole_at_a_hundred_are_no_clock(tmp_path):
+    path = tmp_path / "log.csv"
+    seconds = np.where(T < 60.0, T, T + 47.3)
+    path.write_text(table("time,heading,rudder", text(seconds, 1), H, FIN))
+    assert inspect_log(path).proposal.body["time"] == {"column": "time", "unit": "s"}
