@@ -14,9 +14,11 @@ from fieldsid.artifacts import plain, to_yaml, write_text
 from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
+from fieldsid.logs.convert.conditioning import MAIN
 from fieldsid.logs.mapping.propose import Proposal, propose
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.run import Note, Run
+from fieldsid.logs.way_in import WayIn, way_in
 
 SCHEMA = "fieldsid/inspection/1"
 _COLUMN_EXAMPLE = """# columns are counted from 0:
@@ -40,6 +42,7 @@ class Inspection(Brief):
     run: Run | None
     notes: tuple[Note, ...]
     needs_none: bool
+    way_in: WayIn
 
     def yaml(self) -> str:
         """Return the proposed mapping as the text of a mapping.yaml."""
@@ -67,6 +70,7 @@ class Inspection(Brief):
             "mapping_needed": not self.needs_none,
             "mapping": plain(self.proposal.body),
             "mapping_file": None if written is None else str(written),
+            "import_options": list(self.way_in.options),
             "signals": [] if run is None else [s for s in run.signals if run.has(s)],
             "problem": None if self.proposal.problem is None else str(self.proposal.problem),
             "findings": [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in self.notes],
@@ -81,27 +85,33 @@ def inspect_log(
     Raises LogError when it cannot be read at all, MappingError for a mapping that does not fit.
     """
     from fieldsid.logs.load import load_run
-    from fieldsid.logs.mapping.mapping_file import load_mapping
+    from fieldsid.logs.mapping.mapping_file import load_mapping, mapping_of
 
     given = None if mapping is None else load_mapping(mapping)
     reader, options = reader_of(path), ReadOptions(msg_path, salvage=True, clock=None if given is None else given.time)
     options = replace(options, progress=progress or options.progress)
     inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
-    needs_none = reader.own_map(path, options) is not None
+    own = reader.own_map(path, options)
+    needs_none = own is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own.sources.keys()
     run = proposal.run
     if mapping is not None or needs_none:
         run = load_run(path, mapping, msg_path=msg_path, salvage=True, max_gap_s=math.inf)
     proposed = [] if needs_none or mapping is not None else list(proposal.notes)
     notes = [*inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
-        notes.append(
-            Note("not_importable", proposal.problem.what, {"found": proposal.problem.found, "hint": proposal.problem.hint})
-        )
+        what, found, hint = proposal.problem.what, proposal.problem.found, proposal.problem.hint
+        notes.append(Note("not_importable", f"{what}: {hint}" if hint else what, {"found": found, "hint": hint}))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
+    chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))
+    way = WayIn() if run is None else way_in(path, run, notes, chosen, msg_path)
+    if way.refusal is not None:
+        what, found, hint = way.refusal.what, way.refusal.found, way.refusal.hint
+        advice = f"import it with `{' '.join(way.options)}`" if way.options else hint
+        notes.append(Note("refused", f"refused as it is: {what} ({found}); {advice}", {"found": found, "hint": hint}))
     distinct = {(n.code, n.message): n for n in notes if n.code != "ignored_columns"}
-    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none)
+    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none, way)
 
 
 def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Path:

@@ -47,7 +47,8 @@ def load_run(
     path = Path(path)
     reader, options = reader_of(path), ReadOptions(msg_path, salvage)
     chosen, notes = map_for(path, reader, options, mapping, channels or {})
-    options = replace(options, command=_command(path, chosen, channels or {}, msg_path), progress=progress or options.progress)
+    command = _command(path, chosen, channels or {}, options)
+    options = replace(options, command=command, progress=progress or options.progress)
     raw = reader.read(path, chosen, options)
     run = assemble(raw, chosen, path, options, part=part, max_gap_s=max_gap_s)
     if raw.finished:
@@ -60,13 +61,14 @@ def load_run(
     )
 
 
-def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], msg_path: Path | None) -> str:
+def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], options: ReadOptions) -> str:
     """Return the command that imports a log as it is read here."""
     words = ["sysid", "import", str(path)]
     words += ["--mapping", str(mapping.origin)] if mapping.origin else []
     for signal, source in channels.items():
         words += ["--channel", f"{signal}={source.column}" + (f":{source.unit}" if source.unit else "")]
-    return shlex.join([*words, *(["--msg-path", str(msg_path)] if msg_path else [])])
+    words += ["--msg-path", str(options.msg_path)] if options.msg_path else []
+    return shlex.join([*words, *(["--salvage"] if options.salvage else [])])
 
 
 def map_for(

@@ -94,6 +94,15 @@ def there(name):
 IMPORT = "import log.csv --mapping m.yaml -o runs"
 CASES = {
     "a mapping without a time": (lambda: table(mapping={"signals": {"yaw_rad": YAW}}), IMPORT),
+    "a column that counts samples": (
+        lambda: table("sample,heading,rudder", [f"{i},{r.partition(',')[2]}" for i, r in enumerate(ROWS)],
+                      {"signals": {"yaw_rad": YAW}}),
+        IMPORT,
+    ),
+    "a rate beside a unit": (
+        lambda: table(mapping={"time": {"column": "t", "unit": "s", "rate": 10}, "signals": {"yaw_rad": YAW}}),
+        IMPORT,
+    ),
     "channels without a time": (table, "import log.csv --channel yaw_rad=heading:deg -o runs"),
     "a quaternion of two": (
         lambda: table("t,qx,qy,qz,qw", [f"{t:.1f},0,0,0,1" for t in TIME], columns(attitude={"columns": ["qx", "qy"]})),

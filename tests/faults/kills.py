@@ -128,7 +128,7 @@ def is_whole(path: Path) -> bool:
         return path.read_bytes().endswith(WHOLE_PNG)
     if path.suffix == ".parquet":
         return len(load_run(path)) > 10
-    if path.name == "config.yaml":
+    if path.name.startswith("config.yaml"):  # its backups too: `.bak`, `.bak2`
         return path.read_text().endswith("other: 1\n")
     readers = {"fieldsid/model/1": load_model, "fieldsid/fit/1": load_laws, "fieldsid/schedule/1": load_schedule}
     if path.suffix == ".yaml":

@@ -38,7 +38,9 @@ def _after(body: Body, mapping: Path | None) -> str:
     known = body["mapping_file"] or mapping
     if body["mapping_needed"] and known is None:
         return typed_with("--write-mapping", "mapping.yaml", *(("--force",) if Path("mapping.yaml").exists() else ()))
-    return pasted("import", body["path"], *(("--mapping", known) if known else ()), "-o", "runs/")
+    if not body["signals"]:  # an import is refused until somebody has said what the columns are
+        return pasted("guide", "trial")
+    return pasted("import", body["path"], *(("--mapping", known) if known else ()), *body["import_options"], "-o", "runs/")
 
 
 def of_import(body: Body) -> Headline:

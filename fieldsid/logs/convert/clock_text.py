@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 DAY_S, HOUR_S, WEEK_S = 86400.0, 3600.0, 604800.0
 FORMS = {"hh:mm:ss": DAY_S, "mm:ss": HOUR_S, "hh:mm": DAY_S, "hhmmss": DAY_S}
 """How a clock may be written where a mapping says so as the unit of time, and the seconds after which it starts again."""
-CLOCK = re.compile(r"(?:(\d{1,2}):)?(\d{1,3}):(\d{1,2}(?:[.,]\d*)?)\s*([AaPp])?[Mm]?")
+CLOCK = re.compile(r"(?:(\d{1,2}):)?(\d{1,3}):(\d{1,2}(?:[.,]\d*|:\d{3})?)\s*([AaPp])?[Mm]?")
 DATE = re.compile(r"(\d{1,4})([-/.])(\d{1,2}|[A-Za-z]{3})[-/.](\d{1,4})")
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 MOSTLY = 0.5
@@ -41,7 +41,8 @@ class Clock:
 def clock_of_text(cells: npt.NDArray[Any], form: str | None = None) -> Clock | None:
     """Return what a column of clock readings shows; None where less than half of the cells are readings."""
     parts = _texts(cells).str.extract(f"^{CLOCK.pattern}$")
-    first, second, third = (parts[i].str.replace(",", ".").astype("float64").to_numpy(na_value=np.nan) for i in range(3))
+    numbers = (parts[i].str.replace(r"[,:]", ".", regex=True) for i in range(3))
+    first, second, third = (n.astype("float64").to_numpy(na_value=np.nan) for n in numbers)
     if np.isfinite(third).mean() <= MOSTLY:
         return None
     if form == "hh:mm":

@@ -77,13 +77,40 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     if cells.dtype.kind not in "iuf" or not cells.size or not np.isfinite(cells[0]):
         return None
     size = float(cells[0])
-    epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else ""
+    epoch = "ns" if size > 1e17 else "us" if size > 1e14 else "ms" if size > 1e11 else "d" if _are_days(size, step) else ""
     seen = cells[np.isfinite(cells)]
+    if _are_digits_of_a_clock(seen):
+        return "hhmmss"
     if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
         return "s"
     return epoch or unit_of_step(step) or "s"
 
 
+def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
+    """Whether numbers (n,) are a clock's digits, as 142018.5: they jump at each full minute, and the clock does not."""
+    if float(seen.min(initial=0.0)) < 0.0 or float(seen.max(initial=0.0)) >= 240000.0:
+        return False
+    if bool((seen % 100.0 >= 60.0).any() or (np.floor(seen / 100.0) % 100.0 >= 60.0).any()):
+        return False
+    full = np.diff(np.floor(seen / 100.0)) != 0.0
+    clock, _ = going_on(clock_of_digits(seen.astype(np.float64)).seconds, DAY_S)
+    jumps, steps = np.abs(np.diff(seen))[full], np.diff(clock)
+    return bool(full.any() and (jumps >= 40.0).all() and (np.abs(steps[full]) <= FEW_STEPS * np.median(steps)).all())
+
+
+FEW_STEPS = 5.0
+"""Steps of a clock that may be missing at a full minute."""
+
+
+def _are_days(size: float, step: float) -> bool:
+    """Whether a time counts the days of a calendar: it is of this age, and its steps are those of a log in days alone."""
+    return any(low < size < high for low, high in DAYS) and 0.0 < step < FASTEST_S
+
+
+DAYS = ((2e4, 8e4), (7e5, 8e5), (2.4e6, 2.5e6))
+"""Days between 1954 and 2119 since 1900 as spreadsheets count them (from 1982 as astronomers do), since year 0, Julian days."""
+FASTEST_S = 1e-4
+"""A step shorter than this is no vehicle's log in seconds; one of 8 s is shorter in days."""
 YEARS_S = (946684800, 4102444800)
 """Seconds since 1970 between 2000 and 2100."""
 LATEST_S = 1e20
@@ -110,6 +137,8 @@ def _factor(unit: str | None) -> float:
 
 def _of_integers(values: npt.NDArray[np.int64], factor: float, name: str) -> tuple[FloatArray, list[Note]]:
     """Subtract the start before scaling, so that nanoseconds of an epoch keep every digit."""
+    if _starts_again(values, factor):
+        return _of_floats(values.astype(np.float64), factor, name, ReadOptions())
     start = int(values[0])
     time, notes = rebuilt((values - start).astype(np.float64), name)
     if start * factor <= EPOCH_FROM_S:
@@ -123,12 +152,26 @@ def _of_floats(values: FloatArray, factor: float, name: str, options: ReadOption
     if missing.size:
         notes.append(_no_times(missing, values, name, options))
         values = np.where(np.isin(np.arange(values.size), missing), np.nan, values)
+    if _starts_again(values[np.isfinite(values)], factor):
+        values, weeks = going_on(values, WEEK_S / factor)
+        notes.append(Note("weeks", f"`{name}` starts again with the week {weeks} time{'s' * (weeks != 1)}", {"count": weeks}))
     values, coarse = rebuilt(values, name)
     seen = values[np.isfinite(values)]
     start = float(seen[0]) if seen.size else 0.0
     if start * factor <= EPOCH_FROM_S:
         return _scaled(values, factor), [*notes, *coarse]
     return _scaled(values - start, factor), [*notes, *coarse, _origin(start * factor)]
+
+
+def _starts_again(values: npt.NDArray[Any], factor: float) -> bool:
+    """Whether a time of the week falls back by most of one, within a week's numbers: the next week has begun."""
+    if values.size < 2 or float(values.min()) < 0.0 or float(values.max()) * factor > WEEK_S:
+        return False
+    return bool((np.diff(values) * factor < -OF_A_WEEK * WEEK_S).any())
+
+
+OF_A_WEEK = 0.99
+"""Share of a week by which its time falls back when the next one begins."""
 
 
 def _scaled(values: FloatArray, factor: float) -> FloatArray:

@@ -44,7 +44,7 @@ _BY_DIMENSION: dict[str, dict[str, float]] = {
     "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1 / 3.6, "kn": KNOT, "ft/s": 0.3048},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "pressure": {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "mbar": 1e2, "dbar": 1e4, "bar": 1e5, "psi": 6894.757293168},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0},
     "ratio": {"1": 1.0, "%": 1e-2},
     "force": {"N": 1.0, "kN": 1e3, "kgf": 9.80665},
 }
@@ -55,7 +55,8 @@ _ALIASES = {
     "mps": "m/s", "m/sec": "m/s", "knot": "kn", "knots": "kn", "kt": "kn", "kts": "kn", "kmh": "km/h", "kph": "km/h",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "feet": "ft", "pascal": "Pa", "millibar": "mbar",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us", "nsec": "ns",
-    "minute": "min", "minutes": "min", "percent": "%", "-": "1", "ratio": "1", "newton": "N",
+    "minute": "min", "minutes": "min", "day": "d", "days": "d", "datenum": "d",
+    "percent": "%", "-": "1", "ratio": "1", "newton": "N",
 }  # fmt: skip
 
 UNITS: Mapping[str, Unit] = MappingProxyType(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
-from fieldsid.logs.convert.time_column import SLOW_S
+from fieldsid.logs.convert.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.course_findings import course_findings
 from fieldsid.logs.doctor.fin_findings import fin_findings
 from fieldsid.logs.doctor.pair_findings import pair_findings
@@ -52,6 +52,12 @@ def _sampling(run: Run, stated: Stated) -> list[Note]:
         advice = (likely_unit(median) if is_even else "") or "log faster"
         message = f"time goes on by {median:.3g} s a sample (limit {SLOW_S:g} s): {advice}"
         found.append(Note("time_unit", message, {"value": median, "limit": SLOW_S}))
+    if median < FASTEST_S:
+        message = (
+            f"time goes on by {median:.3g} s a sample (limit {FASTEST_S:g} s): no vehicle's log is so fast; set its unit, as "
+            "`unit: min`, `unit: h` or `unit: d`"
+        )
+        found.append(Note("time_unit", message, {"value": median, "limit": FASTEST_S}))
     wide = steps > GAP_FACTOR * median
     if wide.any():
         at = int(np.argmax(steps))

@@ -44,6 +44,7 @@ class _Time(StrictModel):
     unit: str | None = None
     date: Column | None = None
     week: Column | None = None
+    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
 
 
 class _Pressure(StrictModel):
@@ -157,7 +158,13 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
 
 
 def _time(time: _Time, place: str) -> Source:
-    """The unit of a time is one of time, or says how a clock is written."""
+    """The unit of a time is one of time, or says how a clock is written; one that counts samples has a rate, and no unit."""
+    if time.rate is not None and (time.unit, time.date, time.week) != (None, None, None):
+        raise MappingError(
+            f"{place}: a time with a `rate` counts samples, and has no unit, date or week",
+            found=f"rate {time.rate:g}",
+            hint=f"write `time: {{column: {time.column}, rate: {time.rate:g}}}`",
+        )
     if time.unit is not None and time.unit not in FORMS:
         found = find_unit(time.unit)
         if found is None or found.dimension != "time":
@@ -165,7 +172,9 @@ def _time(time: _Time, place: str) -> Source:
             raise MappingError(
                 f"{place}: time cannot be in {time.unit!r}", found=time.unit, hint=f"use one of: {', '.join(known)}"
             )
-    return Source(column=time.column, unit=time.unit, date=time.date, week=time.week)
+    return Source(
+        column=time.column, unit=time.unit, date=time.date, week=time.week, scale=1.0 / time.rate if time.rate else None
+    )
 
 
 def _source(signal: str, item: _Source | str | int, place: str) -> Source:

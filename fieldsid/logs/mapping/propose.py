@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, ser
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
+from fieldsid.logs.mapping.true_north import true_north
 from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
@@ -30,6 +32,14 @@ GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
 """The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
 _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borientation\.[xyzw]$")
 """What columns are called that were written from messages, which are in the frames of REP 103."""
+PERCENT = frozenset({"percent", "percentage", "pct", "perc"})
+"""Words of a fin that is told in shares of its range, whose angle is not known."""
+OUTPUTS = frozenset({"servo", "servomotor", "actuator", "rcou", "outputs", "controls"})
+"""Words of what a vehicle's servos are told or say."""
+_OUTPUT = re.compile(r"^(value|servo\d+_raw|C\d+|(output|control|position)\[\d+\])$")
+"""Fields of these that are an angle or a pulse."""
+SHOWN = 8
+"""Outputs that a message names."""
 TRIES = 6
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
@@ -59,12 +69,22 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
         except FieldsidError as error:
             signal = _at_fault(error, body)
             if signal is None:
+                _in_degrees_by_span(body["signals"], inventory)
                 return Proposal(body, problem=error, notes=tuple(notes))
             left = body["signals"].pop(signal)
             notes.append(Note("left_out", f"{signal} is not proposed from {_label(left)}: {error.what}", {"signal": signal}))
         else:
             return replace(done, notes=(*notes, *done.notes))
     return Proposal(body, notes=tuple(notes))
+
+
+def _in_degrees_by_span(signals: dict[str, Any], inventory: Inventory) -> None:
+    """Set degrees where a column's numbers say so, in a log that cannot be read as it is: what is left is the line it lacks."""
+    spans = {c.name: c.fields[0].span for c in inventory.channels if len(c.fields) == 1 and c.fields[0].span is not None}
+    for signal, item in signals.items():
+        span = spans.get(item.get("column", ""))
+        if span is not None and "unit" not in item and max(map(abs, span)) > _DEGREES.get(signal, float("inf")):
+            item["unit"] = "deg/s" if signal.endswith("_s") else "deg"
 
 
 def _at_fault(error: FieldsidError, body: dict[str, Any]) -> str | None:
@@ -106,6 +126,7 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         body["frame"] = REP103
     if samples is not None:
         notes += _by_numbers(samples, signals, inventory)
+        notes += [] if "frame" in body else true_north(samples, names, signals)
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
     return body, notes
@@ -137,7 +158,23 @@ def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
     named = " ".join(c.name + c.kind for c in inventory.channels).lower()
     frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
     signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
+    notes += [] if set(FINS) & signals.keys() else _which_output(inventory)
     return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes
+
+
+def _which_output(inventory: Inventory) -> list[Note]:
+    """Say which outputs of a log's servos there are, and the line that is missing: which one moves which fin is the vehicle's."""
+    found = [(c.name, f.path) for c in inventory.channels for f in c.fields if OUTPUTS & set(words_of(f"{c.name} {f.path}"))]
+    found = [(topic, path) for topic, path in found if _OUTPUT.search(path)]
+    if not found:
+        return []
+    shown = ", ".join(f"{topic} {path}" for topic, path in found[:SHOWN]) + (", ..." if len(found) > SHOWN else "")
+    topic, path = found[0]
+    message = (
+        f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{topic: {json.dumps(topic)}, "
+        f"field: {json.dumps(path)}}}`, of: {shown}"
+    )
+    return [Note("which_output", message, {"signal": "rudder_rad", "others": [f"{t} {p}" for t, p in found]})]
 
 
 def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
@@ -199,6 +236,8 @@ def _as_counts(samples: Samples, signals: dict[str, Any]) -> None:
     for signal in COUNTED:
         item = signals.get(signal, {})
         values = samples.columns.get(item.get("column", ""))
+        if signal in FINS and "unit" not in item and PERCENT & set(words_of(str(item.get("column", "")))):
+            item["unit"], item["centre"] = COUNTS, 0
         servo = None if values is None or "unit" in item else servo_of(values) or _as_others(values, servos)
         if servo is not None:
             item["unit"], item["centre"] = COUNTS, servo.centre

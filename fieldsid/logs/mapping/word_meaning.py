@@ -22,10 +22,12 @@ OF_ANOTHER = frozenset({
     "count",
 })  # fmt: skip
 """Words that make a name one of something else than the signal it also names."""
+OF_SPEED = frozenset({"v", "vel", "velocity", "speed", "acceleration", "accel", "acc"})
+"""Words of a speed or acceleration north or east, which is no place."""
 OF_ANOTHER_THERE: Mapping[str, frozenset[str]] = MappingProxyType(
     {"depth_m": frozenset({"rate", "water", "bottom", "column", "total"}), "roll_rad": frozenset({"fin", "rate"}),
      "yaw_rad": frozenset({"rate", "fin"}), "pitch_rad": frozenset({"rate", "fin"}), "surge_m_s": frozenset({"motor", "rate"}),
-     "rudder_rad": frozenset({"roll"})}
+     "rudder_rad": frozenset({"roll"}), "x_m": OF_SPEED, "y_m": OF_SPEED}
 )  # fmt: skip
 OVER_GROUND = frozenset({"gps", "gnss", "course", "cog", "sog", "ground", "track"})
 """Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
@@ -35,7 +37,7 @@ GLIDER = MappingProxyType({"m": "measured", "c": "commanded"})
 
 PHRASES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        TIME: ("time", "timestamp", "stamp", "utc", "seconds", "datetime", "epoch"),
+        TIME: ("time", "timestamp", "stamp", "utc", "seconds", "datetime", "epoch", "zeit", "uhrzeit", "datenum"),
         "yaw_rate_rad_s": (
             "yaw rate",
             "yawrate",
@@ -60,8 +62,8 @@ PHRASES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "heave_m_s": ("heave", "velocity z", "vel z", "vz"),
         LATITUDE: ("latitude", "lat"),
         LONGITUDE: ("longitude", "long", "lon", "lng"),
-        "x_m": ("north", "northing", "pos x", "position x"),
-        "y_m": ("east", "easting", "pos y", "position y"),
+        "x_m": ("north", "northing", "pos x", "position x", "utm y"),
+        "y_m": ("east", "easting", "pos y", "position y", "utm x"),
         "rudder_rad": ("rudder", "rud", "delta r", "deltar", "fin yaw", "fin", "drud", "delr"),
         "elevator_rad": (
             "elevator",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 
 from fieldsid.logs.convert.clock_text import CLOCK, DATE
@@ -17,8 +18,16 @@ COMMENTS = "#%"
 
 def cells(line: str, separator: str) -> list[str]:
     """Return a line's cells without blanks and quotes."""
-    parts = line.split() if separator == "whitespace" else line.split(separator)
+    parts = line.split() if separator == "whitespace" else _quoted(line, separator) if '"' in line else line.split(separator)
     return [p.strip().strip("\"'").strip() for p in parts]
+
+
+def _quoted(line: str, separator: str) -> list[str]:
+    """Return the parts of a line of which some are in quotes, and may hold the separator there."""
+    try:
+        return next(csv.reader([line], delimiter=separator, skipinitialspace=True), [""])
+    except csv.Error:  # a quote without its end, or too much between two
+        return line.split(separator)
 
 
 def is_row(row: list[str], decimal: str) -> bool:

@@ -16,7 +16,7 @@ from fieldsid.logs.convert.time_column import likely_time_unit, seconds_of
 from fieldsid.logs.mapping.canonical_names import TIME, unit_in_name
 from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._columns import Columns
+from fieldsid.logs.readers._columns import Columns, is_counter
 from fieldsid.numerics.arrays import FloatArray
 
 MOSTLY = 0.9
@@ -31,7 +31,7 @@ OF_WEEK = (
     frozenset({"week", "time"}),
 )
 WEEKS = frozenset({"week", "wn", "wk", "gwk", "gpsweek"})
-DATES = frozenset({"date", "day"})
+DATES = frozenset({"date", "day", "datum"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +75,9 @@ def _named(columns: Columns) -> Iterator[Source]:
     dates = next((i for i, _, words in meanings if words & DATES and not words & {"time"}), None)
     for i in sorted((i for i, meaning, _ in meanings if meaning and meaning[0] == TIME), key=lambda i: -meanings[i][1][1]):  # type: ignore[index]
         yield _source(columns, i, dates)
+    for i, _, words in meanings if weeks is None else ():
+        if any(of <= words for of in OF_WEEK):
+            yield _source(columns, i, None)
 
 
 def _source(columns: Columns, index: int, dates: int | None) -> Source:
@@ -112,6 +115,7 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
         time, _ = seconds_of(cells, unit, ReadOptions(salvage=True), name=columns.name(index), dates=beside[0], weeks=beside[1])
     except FieldsidError:  # what is no time is not taken for one
         return None
+    time = time if source.scale is None else time * source.scale
     steps = np.diff(time[np.isfinite(time)])
     return Clock(time, source) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
 
@@ -120,7 +124,8 @@ def _by_numbers(columns: Columns) -> Clock | None:
     """Return the first column that goes on by even steps, and is not named as something else."""
     for i in range(columns.width):
         cells = columns.take(i)
-        if (columns.names and meaning_of(columns.names[i]) is not None) or cells.dtype.kind not in "iuf" or cells.size < 3:
+        name = columns.names[i] if columns.names else ""
+        if meaning_of(name) is not None or is_counter(name) or cells.dtype.kind not in "iuf" or cells.size < 3:
             continue
         clock = _tried(columns, Source(column=_place(columns, i), unit=_unit_by_size(cells)))
         if clock is None:

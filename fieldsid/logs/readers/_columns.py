@@ -16,7 +16,7 @@ from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.time_column import seconds_of
 from fieldsid.logs.mapping.canonical_names import TIME, Canonical, canonical, stated_unit, unit_in_name
-from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
@@ -165,12 +165,28 @@ def _check_source(path: Path, signal: str, source: Source) -> None:
         )
 
 
+COUNTERS = frozenset(
+    {"sample", "samples", "index", "idx", "row", "frame", "no", "nr", "number", "count", "counter", "seq", "step"}
+)
+"""Words of a column that counts the rows of a table."""
+
+
+def is_counter(name: str) -> bool:
+    """Whether a column counts rows by its name: it tells no time, only their order."""
+    words = set(words_of(name))
+    return bool(words) and words <= COUNTERS
+
+
 def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
     if mapping.time is None or mapping.time.column is None:
         guessed = [name for name in columns.names if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
         likely = guessed[0] if guessed else "COLUMN" if columns.names else "0"
         # Without a file the mapping came from `--channel`.
         way = f"add `time: {{column: {likely}, unit: s}}` to {mapping.place}" if mapping.origin else ""
+        counter = None if guessed else next((name for name in columns.names if is_counter(name)), None)
+        if counter is not None:
+            way = f"`{counter}` counts samples: write how many there are a second at the top of the mapping, as "
+            way += f"`time: {{column: {counter}, rate: 10}}`"
         raise MappingError(
             f"`{columns.path}` has no time column: `{TIME}` is missing",
             found=columns.shown(),
@@ -179,7 +195,8 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
     index = columns.index(mapping.time.column, TIME)
     unit = mapping.time.unit or columns.unit(index, TIME)
     dates, weeks = (None if c is None else columns.take(columns.index(c, TIME)) for c in (mapping.time.date, mapping.time.week))
-    return seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
+    time, notes = seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
+    return time if mapping.time.scale is None else time * mapping.time.scale, notes
 
 
 def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns, list[Note]]:

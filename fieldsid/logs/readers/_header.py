@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fieldsid.logs.convert.units import find_unit
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.readers._cells import COMMENTS, cells, is_number_or_date
 
 OTHER_UNITS = frozenset({
@@ -52,9 +53,17 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
     """Return a header line's names when it has one word for each column, else nothing."""
     bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
     names = cells(bare, separator)
+    if len(names) != width and bare != line:
+        names = _by_blanks(bare)
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):
         return ()
     return () if _are_units(line, separator, width) else tuple(names)
+
+
+def _by_blanks(comment: str) -> list[str]:
+    """Return the words of a comment above a table, which its program parts by blanks, where they name signals or units."""
+    words = comment.split()
+    return words if _state_units(tuple(words)) or sum(meaning_of(w) is not None for w in words) > 1 else []
 
 
 def _are_units(line: str, separator: str, width: int) -> bool:

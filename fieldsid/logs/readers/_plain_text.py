@@ -17,10 +17,11 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, UnpackedRows
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 GZIP = b"\x1f\x8b"
-HEAD = 1 << 18
+HEAD = LONGEST_ROW
 """Bytes at the start of a table that tell how it is written."""
 PIECE_BYTES = 1 << 20
 _SMALL_PIECE = 512
@@ -47,14 +48,13 @@ class PlainText:
         return sum(len(self.stream.readline()) for _ in range(line))
 
     def last_line(self) -> tuple[int, bytes]:
-        """Return the byte behind the last line end, and what follows there."""
-        behind, last = self.size, b""
-        while behind > 0 and b"\n" not in last:
-            start = max(0, behind - HEAD)
-            last = self._piece(start, behind - start) + last
+        """Return the byte behind the last line end, and what follows there, up to a little more than the longest row."""
+        begin = behind = self.size
+        while begin == behind > 0:
+            start = max(0, behind - PIECE_BYTES)
+            begin = start + self._piece(start, behind - start).rfind(b"\n") + 1
             behind = start
-        end = last.rfind(b"\n") + 1
-        return behind + end, last[end:]
+        return begin, self._piece(begin, min(self.size - begin, LONGEST_ROW + 1))
 
     def count(self, what: bytes, begin: int, end: int) -> int:
         """Return how often a byte stands between two places."""
@@ -127,8 +127,11 @@ def plain_text(path: Path, asked: str | None = None, limit: int | None = None) -
 
 
 def _unzip(packed: IO[bytes], plain: IO[bytes], path: Path, limit: int | None) -> bool:
-    """Unpack gzip streams, as many as follow each other; return whether the last one ends early. Raises LogError for none."""
-    stream = zlib.decompressobj(wbits=31)
+    """Unpack gzip streams, as many as follow each other; return whether the last one ends early.
+
+    Raises LogError where nothing can be unpacked, and for what is no table.
+    """
+    stream, rows = zlib.decompressobj(wbits=31), UnpackedRows(path)
     piece = b""
     try:
         while piece := piece or packed.read(_SMALL_PIECE):
@@ -136,7 +139,9 @@ def _unzip(packed: IO[bytes], plain: IO[bytes], path: Path, limit: int | None) -
                 if not piece.startswith(GZIP[: len(piece)]):
                     return False
                 stream = zlib.decompressobj(wbits=31)
-            plain.write(stream.decompress(piece))
+            text = stream.decompress(piece)
+            plain.write(text)
+            rows.add(text, len(piece) - len(stream.unused_data))
             piece = stream.unused_data
             if limit is not None and plain.tell() >= limit:
                 return False

@@ -62,7 +62,8 @@ def form_of(text: str, asked: TableForm, path: Path) -> Form:
 
 def _try(lines: list[str], first: int, separator: str, asked: TableForm) -> tuple[Form | None, Score]:
     """Return the form by one separator, and its score."""
-    decimals = [asked.decimal] if asked.decimal else ["."] if separator == "," else [".", ","]
+    only_points = separator == "," and not any('"' in line for line in lines[first:])
+    decimals = [asked.decimal] if asked.decimal else ["."] if only_points else [".", ","]
     best: tuple[Form | None, Score] = (None, (0, 0.0, 0))
     for decimal in decimals:
         for at in range(first, len(lines)):

@@ -22,6 +22,7 @@ from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, 
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
 from fieldsid.logs.readers._text import Form, form_of
+from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, refuse_endless
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, is_text
 
@@ -73,11 +74,7 @@ def _head_of(path: Path, text: PlainText) -> str:
     """Return the start of a text, by which it is known how it is written; raises LogError where not even a line ends in it."""
     head = text.head()
     if "\n" not in head and text.size >= HEAD:
-        raise LogError(
-            f"`{path}` is no table that can be read: its first line has no end",
-            found=f"none in the first {HEAD} bytes of {text.size}, which begin {head[:40]!r}",
-            hint="write a line for each sample, with the columns that are needed",
-        )
+        refuse_endless(path, text.size, head[:40])
     return head
 
 
@@ -120,8 +117,8 @@ class _Table:
     def _drop_half_a_line(self) -> None:
         """A plain file that was cut off ends in a line with too few cells."""
         begin, line = self.text.last_line()
-        if len(line) > HEAD:  # no row that was cut: what it is the parser says
-            return
+        if len(line) > LONGEST_ROW:
+            refuse_endless(self.path, self.text.size - begin, line[:40].decode("latin-1"))
         last = line.decode(self.text.encoding, errors="replace")
         if begin > self.begin and last.strip() and len(cells(last, self.form.separator)) < self.form.width:
             self.end = begin

@@ -15,6 +15,7 @@ from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.readers._clock import clock_of
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
+from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.run import SIGNALS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -75,6 +76,7 @@ def _table(path: Path) -> Any:
     try:
         # read_table refuses a file in which two columns have one name
         with import_module("pyarrow.parquet").ParquetFile(path) as file:
+            refuse_repeated(path, file.metadata.num_rows, path.stat().st_size)
             return file.read()
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error

@@ -185,6 +185,8 @@ class Inspection(Result):
     """The signals that the mapping gives."""
     problem: str | None
     """Why no run can be made of it, where none can."""
+    import_options: list[str]
+    """What an import must be asked for, where it refuses the log as it is."""
     findings: list[RemarkWithData]
     """The import doctor's findings."""
 

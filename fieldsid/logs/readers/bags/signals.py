@@ -55,6 +55,13 @@ def check_not_empty(path: Path, collector: Collector) -> None:
     ):
         return
     topics = ", ".join(sorted(collector.connections)) or "no topics"
+    damage = [n.message for n in collector.notes if n.code in ("truncated", "damaged")]
+    if damage:
+        raise LogError(
+            f"`{path}` holds no message that can be read",
+            found=f"{damage[0]}; topics {topics}",
+            hint="copy it from the vehicle again",
+        )
     what = "has no messages" if collector.wanted is None else "has no messages on the mapped topics"
     raise LogError(
         f"`{path}` {what}",

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from bags import KINDS, write_bag
+from binary_logs import write_lsf
+from ruamel.yaml import YAML
 
 from fieldsid.errors import ArtifactError
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log, write_proposal
 from fieldsid.logs.mapping.guesses import of_topic
+from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ChannelInfo, FieldInfo
 
@@ -165,3 +168,15 @@ def test_an_estimated_position_comes_before_that_of_a_receiver_which_hears_nothi
     for name, signal in (("lat", "latitude"), ("lon", "longitude")):
         assert meaning_of(name)[0] == meaning_of(f"{name}_gps")[0] == signal
         assert meaning_of(name)[1] > meaning_of(f"{name}_gps")[1]
+
+
+def test_the_servos_of_a_log_that_does_not_say_which_moves_what_are_named_with_the_line_that_is_missing(tmp_path):
+    time = 0.1 * np.arange(300)
+    path = write_lsf(tmp_path / "Data.lsf", time, {"psi": np.sin(time), "r": np.cos(time), "rudder_rad": 0.1 * np.sin(3 * time)})
+    found = inspect_log(path)
+    (note,) = (n for n in found.notes if n.code == "which_output")
+    assert "SetServomotorPosition[2] value" in note.message
+    line = note.message.split("`")[1].replace("[1]", "[2]")
+    body = {**found.proposal.body, "signals": found.proposal.body["signals"] | YAML(typ="safe").load(line)}
+    run = load_run(path, mapping_of(body))
+    np.testing.assert_allclose(run["rudder_rad"], 0.1 * np.sin(3 * time), atol=1e-9)

@@ -14,41 +14,46 @@ from typing import Any
 from fieldsid.logs.readers.bags.packets import UnknownFormError
 
 PIECE_BYTES = 1 << 20
+LARGEST = 1 << 30
+"""Bytes of a chunk or message that is one: recorders write some 1e6, and a few packed bytes may claim any number."""
 KNOWN = ("", "none", "bz2", "lz4", "zstd")
 
 
-def unpacked(data: bytes, compression: str) -> bytes | None:
+def unpacked(data: bytes, compression: str, size: int) -> bytes | None:
     """Return the plain bytes, or those of the blocks that are whole; None where the data are damaged.
 
+    `size` is the number of bytes that they should be: of more no more than one is unpacked, and none where so many are too many.
     Raises UnknownFormError for a compression that is not one of KNOWN.
     """
     if compression in ("", "none"):
         return data
+    if compression in KNOWN and size > LARGEST:
+        return None
     try:
         if compression == "bz2":
-            return bz2.BZ2Decompressor().decompress(data)
+            return bz2.BZ2Decompressor().decompress(data, size + 1)
         if compression == "lz4":
-            return _decompressed(import_module("lz4.frame").LZ4FrameDecompressor(), data)
+            return _decompressed(import_module("lz4.frame").LZ4FrameDecompressor(), data, size + 1)
     except (OSError, RuntimeError, EOFError, ValueError):
         return None
     if compression == "zstd":
-        return unzstd(data)
+        return unzstd(data, size)
     raise UnknownFormError(
         f"the bag is compressed with {compression!r}", found=compression, hint="record or convert it with zstd or lz4"
     )
 
 
-def unzstd(data: bytes) -> bytes | None:
-    """Return what zstd data hold, up to where they end; None where they are damaged."""
+def unzstd(data: bytes, size: int = LARGEST) -> bytes | None:
+    """Return what zstd data hold, up to where they end and to one byte more than `size`; None where they are damaged."""
     module = _zstd()
     try:
-        return _decompressed(module.ZstdDecompressor(), data)
+        return _decompressed(module.ZstdDecompressor(), data, size + 1)
     except (module.ZstdError, EOFError):
         return None
 
 
-def _decompressed(decompressor: Any, data: bytes) -> bytes:
-    plain: bytes = decompressor.decompress(data)
+def _decompressed(decompressor: Any, data: bytes, most: int) -> bytes:
+    plain: bytes = decompressor.decompress(data, most)
     return plain
 
 
@@ -62,7 +67,9 @@ def unpack_file(packed: Path, plain: Path) -> str | None:
                 while piece:
                     if decompressor.eof:
                         decompressor = module.ZstdDecompressor()
-                    target.write(decompressor.decompress(piece))
+                    target.write(decompressor.decompress(piece, PIECE_BYTES))
+                    while not (decompressor.eof or decompressor.needs_input):
+                        target.write(decompressor.decompress(b"", PIECE_BYTES))
                     piece = decompressor.unused_data
         except module.ZstdError:
             return "damaged"

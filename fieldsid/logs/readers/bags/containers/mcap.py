@@ -218,7 +218,7 @@ class _Records:
 
     def _packed_chunk(self, data: Bytes, stop: int, head: _ChunkHead, place: _Place) -> int:
         """Read a compressed chunk as far as it is whole, or leave it out; return its bytes."""
-        plain = unpacked(bytes(data[head.start : stop]), head.compression)
+        plain = unpacked(bytes(data[head.start : stop]), head.compression, head.size)
         if plain is None or (not place.is_cut and (len(plain) != head.size or _is_wrong(plain, head.crc))):
             self.collector.damaged_at(f"a compressed chunk of {head.seconds:.2f} s", place.chunk)
             return 0

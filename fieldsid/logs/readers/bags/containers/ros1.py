@@ -252,7 +252,7 @@ class _Records:
         place = _Place(pos, is_packed=compression != "none", is_cut=stop < whole)
         got = stop - body
         if place.is_packed:
-            plain = unpacked(bytes(data[body:stop]), compression)
+            plain = unpacked(bytes(data[body:stop]), compression, size)
             if plain is None or (not place.is_cut and len(plain) != size):
                 self.collector.damaged_at(f"a compressed chunk of {size} bytes", pos)
                 return

@@ -1,5 +1,8 @@
 """Damage inside a bag: no wrong number comes in, little is lost beside it, and both the place and the share are said."""
 
+import sqlite3
+from contextlib import closing
+
 import numpy as np
 import pytest
 from bags import EPOCH_NS, KINDS, MAPPING, BagWriter, float64_rows, write_bag, write_mcap
@@ -232,3 +235,17 @@ def test_records_must_follow_each_other_behind_damage():
     assert resumed([5, 20], ends.get, 50) == 20
     assert resumed([5, 47], ends.get, 50) == 47
     assert resumed([5], ends.get, 50) is None
+
+
+def test_a_db3_bag_whose_tree_is_cut_off_is_not_said_to_be_empty(tmp_path):
+    log = file_of(numbers(tmp_path / "a", "db3"))
+    with closing(sqlite3.connect(log)) as base, base:
+        many = [(i, 1, EPOCH_NS + i * 10**8, bytes(2500)) for i in range(100, 3000)]
+        base.executemany("INSERT INTO messages (id, topic_id, timestamp, data) VALUES (?, ?, ?, ?)", many)
+    whole = log.read_bytes()
+    cut = tmp_path / "cut.db3"
+    cut.write_bytes(whole[: int(0.12 * len(whole))])  # the page that names those before it comes behind
+    with pytest.raises(LogError, match="holds no message that can be read") as error:
+        load_run(cut, HEADINGS)
+    assert "cut off at byte" in error.value.found
+    assert "recorder" not in error.value.hint

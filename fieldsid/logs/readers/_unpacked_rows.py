@@ -1,0 +1,58 @@
+"""Rows of a packed table as they come out: refused where they repeat one another, or a line has no end.
+
+Such a file is small on the disk and would take any amount of memory.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fieldsid.errors import LogError
+
+LEAST_BYTES = 1.0
+"""Packed bytes that a row must have: with a clock of its own and constants beside it one takes 2.1 to 2.6 at the best that gzip
+can, nine forms of stamps over 3e5 rows; the noise of a sensor comes on top."""
+MANY = 1_000_000
+"""Rows from which on that is asked: fewer take little memory, whatever is in them."""
+LONGEST_ROW = 1 << 18
+"""Bytes of a line that is a row; also those at the start of a table that tell how it is written."""
+LINE_ENDS = (b"\n", b"\r")
+
+
+def refuse_repeated(path: Path, rows: int, packed: int) -> None:
+    """Raise LogError where rows are packed into fewer bytes than those of a log whose time goes on can be."""
+    if rows > MANY and packed < LEAST_BYTES * rows:
+        raise LogError(
+            f"`{path}` is no log: its rows repeat one another",
+            found=f"at least {rows} rows in {packed} packed bytes; one with a time of its own takes two or more",
+            hint="write the table again from what the vehicle recorded, and pack that",
+        )
+
+
+def refuse_endless(path: Path, size: int, start: str) -> None:
+    """Raise LogError for a line that is longer than a row can be, which starts so."""
+    raise LogError(
+        f"`{path}` is no table that can be read: a line of it has no end",
+        found=f"none in {size} bytes, which begin {start!r}",
+        hint="write a line for each sample, with the columns that are needed",
+    )
+
+
+class UnpackedRows:
+    """Counts the rows of a text that is unpacked piece by piece; what is no table is refused as soon as that shows."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows = 0
+        self._packed = 0
+        self._line = 0
+
+    def add(self, text: bytes, packed: int) -> None:
+        """Count a piece of text that so many packed bytes gave. Raises LogError for rows that repeat, and a line without end."""
+        self.rows += max(text.count(end) for end in LINE_ENDS)
+        self._packed += packed
+        last = max(text.rfind(end) for end in LINE_ENDS)
+        self._line = len(text) - last - 1 if last >= 0 else self._line + len(text)
+        refuse_repeated(self.path, self.rows, self._packed)
+        if self._line > LONGEST_ROW:
+            refuse_endless(self.path, self._line, text[-40:].decode("latin-1"))
