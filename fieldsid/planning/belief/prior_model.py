@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import reduce
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import solve_banded
 
-from fieldsid.dynamics.assemble import Base
+from fieldsid.dynamics.assemble import Base, combined_core
 from fieldsid.dynamics.free_run import base_at, effects_of
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import NAMES, Axis
@@ -79,8 +78,7 @@ def growth_of(base: Base, core: Core) -> float:
 
 def _core_at(model: Model, speed: float) -> Core:
     values = {"damping_exponent": model.law.damping_exponent} | dict(model.values)
-    parts = [e.core(values, model.law.scale(speed)) for e in effects_of(model) if e.core is not None]
-    return reduce(Core.plus, parts, Core())
+    return combined_core(effects_of(model), values, model.law.scale(speed))
 
 
 def _held(model: Model) -> bool:
