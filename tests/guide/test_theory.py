@@ -31,6 +31,8 @@ NUMBERS = {
     "error over the floor beyond which no sea is taken for granted": thresholds.FAR_ERROR_RATIO,
     "unseen over fitted error beyond which none is": thresholds.MAX_VALIDATION_ERROR_RATIO,
     "share of the excess that an effect must explain": thresholds.MIN_EXPLAINED_SHARE,
+    "share of the excess that counts as most of it": thresholds.MAIN_EXPLAINED_SHARE,
+    "share that the error of a log without noise must fall to": thresholds.MAX_FREE_RUN_ERROR_RATIO,
     "log likelihood per number of a noise kind": reml.PENALTY_PER_PARAMETER,
     "p-value below which `auto` takes no residual for a disturbance": auto_method.MIN_P_VALUE,
     "free-run error of `pem` over that of output error, for `auto`, where a test rejects": auto_method.MAX_FREE_RUN_RATIO,
