@@ -153,7 +153,7 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
         (("--window", "7"), "--window"),
         (("--rate", "0"), "--rate"),
         (("--max-heading", "0.1deg"), "widen"),
-        (("--max-heading", "60"), "60deg`, or `60rad`"),
+        (("--max-heading", "60"), "60 deg is 1.047 rad, 60 rad is 3438 deg"),
         (("--radius", "--max-heading", "90deg"), "--max-heading"),
         (("--radius", "--open-loop"), "--open-loop"),
         (("--radius", "--max-track", "5"), "--max-track"),
