@@ -82,6 +82,9 @@ def simulate(
     parts = effects_of(model) if effects is None else effects
     values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
     values["damping_exponent"] = model.law.damping_exponent
+    for effect in parts:
+        if effect.stand_in is not None and record.measures(effect.needs):
+            values = {n: v for n, v in values.items() if n not in effect.stand_in.units}
     if state is None:
         state = (
             float(record.angle[np.argmax(record.angle_ok)]),

@@ -5,12 +5,22 @@ number (`rate_before` in fitting/problem/parameters.py). No motion within that r
 In its other forms it has a power of the speed of its own, and drag that grows with the square of the cross speed,
     x' = -cross_damping f x - (cross_quadratic / f) x|x| - cross_rate f^2 r + cross_fin f^3 delta
 With x = -a21 v, a21 ~ f: the drag D v|v| becomes D/|a21| x|x|. Then the fin's own lift no longer drops out of the
-transfer function. Source: Prestero 2001, table of coefficients (the cross flow Yvv is most of a torpedo's sway drag).
+transfer function. Where the cross speed v is measured, its moment follows from that instead of a state,
+    p' += cross_moment v     or     p' += munk_moment u v
+and the model keeps the drift law of its runs, by which it is flown where v is not measured.
+Source: Prestero 2001, table of coefficients (the cross flow Yvv is most of a torpedo's sway drag); Fossen 2011, section 7.1.
 """
 
 from __future__ import annotations
 
-from fieldsid.models.effect import Coefficient, Core, Values, Variant
+from collections.abc import Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from fieldsid.models.effect import Coefficient, Core, StandIn, Terms, Values, Variant
+from fieldsid.models.helpers.drift_law import drift_law
+from fieldsid.models.record import Record
 
 
 def coefficients(cross: str, builds_up: str) -> tuple[Coefficient, ...]:
@@ -49,7 +59,43 @@ SQUARE = Coefficient(
 )
 OF_FIN = Coefficient("cross_fin", "1/s^3", -50.0, 50.0, 0.0, says="what the fin's own lift does to it")
 MUNK_POWER = Coefficient("munk_exponent", "1", -1.0, 6.0, 2.0, step=1e-3, says="power of the speed its moment goes with")
+OF_MEASURED = Coefficient("cross_moment", "rad/(m s)", -1e3, 1e3, 0.0, says="moment per m/s of the measured cross speed")
+OF_LIFT = Coefficient(
+    "munk_moment", "rad/m^2", -1e3, 1e3, 0.0, says="moment per m/s of speed and m/s of the measured cross speed"
+)
+STATE = ("cross_damping", "cross_rate")
+
+
+def drift_numbers(records: Sequence[Record], reference: float) -> dict[str, float]:
+    """Return the drift law of some runs, as the numbers that a model keeps of it."""
+    law = drift_law(records, reference)
+    return {
+        "drift_damping": 1.0 / law.time_constant,
+        "drift_per_rate": law.per_rate,
+        "drift_per_fin": law.per_fin,
+        "drift_speed": reference if np.isfinite(reference) else 1.0,
+    }
+
+
+STAND_IN = StandIn(
+    MappingProxyType({"drift_damping": "1/s", "drift_per_rate": "m", "drift_per_fin": "m/(s rad)", "drift_speed": "m/s"}),
+    drift_numbers,
+)
 FORMS = (
+    Variant(
+        "its moment is that of the measured cross speed",
+        (OF_MEASURED,),
+        needs=("cross",),
+        without=STATE,
+        stand_in=STAND_IN,
+    ),
+    Variant(
+        "its moment is that of the measured cross speed times the speed",
+        (OF_LIFT,),
+        needs=("cross", "surge"),
+        without=STATE,
+        stand_in=STAND_IN,
+    ),
     Variant("its moment has a power of the speed of its own", (MUNK_POWER,)),
     Variant("it has a power of the speed of its own", (OWN_POWER,)),
     Variant("its drag grows with the square of its speed", (SQUARE, OF_FIN)),
@@ -59,8 +105,21 @@ FORMS = (
 )
 
 
+def terms(values: Values, record: Record) -> Terms:
+    """Return the moment (n,) rad/s^2 of the measured cross speed, in a form that takes it and has no stand-in for it."""
+    if "drift_damping" in values:
+        return Terms()
+    if "cross_moment" in values:
+        return Terms(moment=values["cross_moment"] * record["cross"])
+    if "munk_moment" in values:
+        return Terms(moment=values["munk_moment"] * record["surge"] * record["cross"])
+    return Terms()
+
+
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients at `scale` times the reference speed; p is the damping's where it has none of its own."""
+    if "cross_damping" not in values:
+        return _drift_core(values, scale)
     lift = scale ** values.get("cross_exponent", values.get("damping_exponent", 1.0))
     coupling = scale ** values["munk_exponent"] if "munk_exponent" in values else lift**2
     return Core(
@@ -68,4 +127,17 @@ def core(values: Values, scale: float) -> Core:
         cross_rate=values["cross_rate"] * coupling,
         cross_fin=values.get("cross_fin", 0.0) * lift**3,
         cross_quadratic=values.get("cross_quadratic", 0.0) / lift,
+    )
+
+
+def _drift_core(values: Values, scale: float) -> Core:
+    """Return the cross state that stands in for a measured cross speed, x = k v; none where that is measured."""
+    if "drift_damping" not in values:
+        return Core()
+    k = values.get("cross_moment", 0.0) + values.get("munk_moment", 0.0) * values["drift_speed"] * scale
+    damping = values["drift_damping"] * scale
+    return Core(
+        cross_damping=damping,
+        cross_rate=-k * damping * values["drift_per_rate"],
+        cross_fin=k * damping * values["drift_per_fin"] * scale,
     )

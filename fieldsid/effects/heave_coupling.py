@@ -8,7 +8,7 @@ Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the pa
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import FORMS, coefficients, core
+from fieldsid.effects._cross_state import FORMS, coefficients, core, terms
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect, Stage
 
@@ -25,5 +25,6 @@ EFFECT = Effect(
     source="Prestero 2001, chapter 6: the pitch model before heave is dropped",
     extra_states=("heave",),
     core=core,
+    terms=terms,
     variants=FORMS,
 )

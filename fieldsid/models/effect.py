@@ -73,12 +73,26 @@ class Coefficient:
 
 
 @dataclass(frozen=True, slots=True)
+class StandIn:
+    """Numbers that a model keeps of its runs, to be flown by in a plan or a turn: the hooks find them where nothing is measured.
+
+    `units` has the name and unit of each; numbers(records, reference) gives them from the runs that the model was fitted to and
+    the reference speed in m/s.
+    """
+
+    units: Mapping[str, str]
+    numbers: Callable[[Sequence[Record], float], dict[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
 class Variant:
     """A variant of an effect that is not the textbook's, in a few words, with the coefficients it takes besides the effect's.
 
     The effect's hooks compute the textbook's variant where the values lack these coefficients. `initial_guesses` gives start
     values of the shared ones as an effect's does, from the residuals of the textbook's variant, in place of their scan grids.
-    `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals.
+    `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals. `without` are
+    coefficients of the effect that it does without, and with them the effect's extra states. `stand_in` is
+    what a model is flown by in a plan or a turn, where no signal is measured.
     """
 
     says: str
@@ -86,6 +100,8 @@ class Variant:
     initial_guesses: InitialGuesses | None = None
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    stand_in: StandIn | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +190,8 @@ class Effect:
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
-    `variants` are other shapes, tried where the textbook's leaves something; `is_formed` where it is in one of them.
+    `variants` are other shapes, tried where the textbook's leaves something; `is_formed` where it is in one of them,
+    with that variant's `stand_in`.
     `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
@@ -205,6 +222,7 @@ class Effect:
     variants: tuple[Variant, ...] = ()
     log_prior_penalty: float = 0.0
     is_formed: bool = False
+    stand_in: StandIn | None = None
     origin: str = field(default="built in")
     definition: Definition | None = None
 
@@ -244,8 +262,16 @@ class Effect:
 
 
 def with_variant(effect: Effect, form: Variant) -> Effect:
-    """Return an effect with the coefficients of one of its forms among its own."""
-    return replace(effect, coefficients=(*effect.coefficients, *form.coefficients), variants=(), is_formed=True)
+    """Return an effect in one of its forms: with that form's coefficients among its own, without those it does without."""
+    return replace(
+        effect,
+        coefficients=(*(c for c in effect.coefficients if c.name not in form.without), *form.coefficients),
+        needs=tuple(dict.fromkeys((*effect.needs, *form.needs))),
+        extra_states=() if form.without else effect.extra_states,
+        variants=(),
+        is_formed=True,
+        stand_in=form.stand_in,
+    )
 
 
 def variant_of(effect: Effect, known: Collection[str]) -> Variant | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -93,6 +93,10 @@ class Record(Brief):
     def __len__(self) -> int:
         return int(self.time.size)
 
+    def measures(self, roles: Iterable[str]) -> bool:
+        """Whether the helper signals of some roles were measured; in the record of a command alone none was."""
+        return bool(self.ok.any()) and all(role in self.signals for role in roles)
+
     def path_with_lead(self, early: FloatArray | None) -> FinPath:
         """Return the path of the fin with its held commands given so much before their samples, (n,) s."""
         if not self.fin_is_held:
@@ -122,7 +126,11 @@ class Record(Brief):
     def __getitem__(self, role: str) -> FloatArray:
         """Return a helper signal (n,); raises EffectError when the log has none."""
         if role not in self.signals:
-            raise EffectError(f"run {self.name!r} has no {role} signal", found=", ".join(sorted(self.signals)) or "none")
+            raise EffectError(
+                f"run {self.name!r} has no {role} signal, which the model was fitted with",
+                found=", ".join(sorted(self.signals)) or "none",
+                hint="map the signal on import, where the log has it, or identify without the effect that needs it",
+            )
         return self.signals[role]
 
 

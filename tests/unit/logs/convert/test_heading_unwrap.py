@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fieldsid.logs import load_run
@@ -58,6 +58,8 @@ def test_a_heading_interpolated_across_its_wrap_comes_back(
     rng = np.random.default_rng(seed)
     source = np.arange(-1.0, 41.0, 1 / source_hz)
     heading = turning(source, fast, slow, start)[0] + noise * rng.normal(size=source.size)
+    # Held at the seam within its own noise a heading goes round and back at every other sample: what is left tells no course.
+    assume(np.mean(np.abs(wrap(heading - lowest)) < 3.0 * noise) < 0.2)
     time = np.arange(shift / log_hz, 40.0, 1 / log_hz)
     _, rate = turning(time, fast, slow, start)
     found, _ = recovered(time, np.interp(time, source, wrap(heading, lowest)), rate if measured else None)

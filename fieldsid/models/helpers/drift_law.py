@@ -1,0 +1,73 @@
+"""How a hull's measured sway or heave follows its turning and its fin, from all runs together.
+
+    T v' + v = x r + y delta at the reference speed; at f times that speed T falls with 1/f and y grows with f
+v in m/s, r in rad/s, delta in rad; a start, a constant and what the sensor adds are each run's own.
+Source: Fossen 2011, section 7.1 (the linear sway mode of manoeuvring: lift on hull and fin).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from fieldsid.models.helpers.cross_flow_speed import TIME_CONSTANTS_S
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.first_order_lag import first_order_lag, held_first_order_lag
+
+
+@dataclass(frozen=True, slots=True)
+class DriftLaw:
+    """T (s), x (m) and y (m/s per rad) at the reference speed."""
+
+    time_constant: float
+    per_rate: float
+    per_fin: float
+
+
+def drift_law(records: Sequence[Record], reference: float) -> DriftLaw:
+    """Return the drift law of runs with a measured cross speed; `reference` in m/s, NaN where no speed is known."""
+    lags = np.array([TIME_CONSTANTS_S[0], *TIME_CONSTANTS_S, TIME_CONSTANTS_S[-1]])
+    left = [_fitted(records, reference, lag)[2] for lag in TIME_CONSTANTS_S.tolist()]
+    near = int(np.argmin(left)) + 1
+    best = minimize_scalar(
+        lambda log_lag: _fitted(records, reference, float(np.exp(log_lag)))[2],
+        bounds=(float(np.log(lags[near - 1])), float(np.log(lags[near + 1]))),
+        method="bounded",
+    )
+    lag = float(np.exp(best.x)) if best.fun < left[near - 1] else float(lags[near])
+    per_rate, per_fin, _ = _fitted(records, reference, lag)
+    return DriftLaw(lag, per_rate, per_fin)
+
+
+def _fitted(records: Sequence[Record], reference: float, lag: float) -> tuple[float, float, float]:
+    """Return x, y and the sum of squares left for one T, each run's own columns projected out of all others."""
+    columns, values = zip(*(_without_own(r, reference, lag) for r in records), strict=True)
+    matrix, measured = np.concatenate(columns), np.concatenate(values)
+    size = np.linalg.norm(matrix, axis=0)
+    scale = np.where(size > 0.0, size, 1.0)
+    best = np.linalg.lstsq(matrix / scale, measured, rcond=1e-9)[0] / scale
+    return float(best[0]), float(best[1]), float(np.sum((measured - matrix @ best) ** 2))
+
+
+def _without_own(record: Record, reference: float, lag: float) -> tuple[FloatArray, FloatArray]:
+    """Return a run's columns of x and y, (n, 2), and its cross speed (n,), its own start and constant projected out."""
+    f = record.speed / reference if record.speed > 0.0 and reference > 0.0 else 1.0
+    time, own_lag = record.time, lag / f
+    rate = (
+        np.interp(time, time[record.rate_ok], record.rate[record.rate_ok])
+        if record.rate_ok.any()
+        else np.gradient(np.interp(time, time[record.angle_ok], record.angle[record.angle_ok]), time)
+    )
+    if record.fin_is_held:
+        fin = held_first_order_lag(record.fin[:-1], np.exp(-record.steps / own_lag), float(record.fin[0]))
+    else:
+        fin = first_order_lag(record.steps, record.fin, own_lag)
+    shared = np.column_stack([first_order_lag(record.steps, rate, own_lag), f * fin])
+    own = np.linalg.qr(np.column_stack([np.ones(time.size), np.exp(-(time - time[0]) / own_lag)]))[0]
+    out = np.column_stack([shared, record["cross"]])
+    out = out - own @ (own.T @ out)
+    return out[:, :2], out[:, 2]
