@@ -119,7 +119,7 @@ def test_the_first_of_grid_points_that_cost_the_same_is_taken(bits):
     assert _first_least(np.array([[3.0, *bits, 2.0], [1.0, 0.9, 0.9, 0.9]])).tolist() == [1, 1]
 
 
-@pytest.mark.parametrize("gained", [-0.4, -1e-12, 0.0, 1e-12, 0.4])
+@pytest.mark.parametrize("gained", [-5.9, -0.4, -1e-12, 0.0, 1e-12, 0.4, 5.9, 6.1, -6.1])
 @pytest.mark.parametrize(("lag", "other"), [(0.2, 0.9), (0.9, 0.2)])
 def test_of_two_starts_that_are_alike_the_smaller_effect_is_kept(monkeypatch, record, gained, lag, other):
     effect = pick_effect("servo_lag")
@@ -130,12 +130,21 @@ def test_of_two_starts_that_are_alike_the_smaller_effect_is_kept(monkeypatch, re
         x = np.zeros(place + 1)
         x[place] = value
         return SimpleNamespace(
-            fitted=SimpleNamespace(problem=problem, x=x), log_likelihood=likelihood, noise=None, floor=None, noise_kind=""
+            fitted=SimpleNamespace(problem=problem, x=x, effects=(effect,)),
+            log_likelihood=likelihood,
+            noise=None,
+            floor=None,
+            noise_kind="",
         )
 
-    monkeypatch.setattr(likelihood_fit, "equivalent_solution", lambda *_of: np.zeros(1))
+    def exchanged(_problem, x, _effect):
+        return np.where(x == lag, other, np.where(x == other, lag, x))
+
+    monkeypatch.setattr(likelihood_fit, "equivalent_solution", exchanged)
     monkeypatch.setattr(likelihood_fit, "fit_maximum_likelihood", lambda *_of: judged(other, 100.0 + gained))
-    assert likelihood_fit.prefer_smaller_equivalent(judged(lag, 100.0), effect).fitted.x[place] == min(lag, other)
+    kept = likelihood_fit.prefer_smaller_equivalent(judged(lag, 100.0), effect).fitted.x[place]
+    # beyond the prior odds against a servo slower than its hull the likelier one is
+    assert kept == (min(lag, other) if abs(gained) < 6.0 else (other if gained > 0.0 else lag))
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.initial.effect_screen import equivalent_solution
 from fieldsid.fitting.optimise.levenberg_marquardt import dynamics_of, levenberg_marquardt
@@ -31,8 +32,6 @@ MIN_LIKELIHOOD_GAIN = 0.5
 MAX_REMAINING_GAIN_RATIO = 10.0
 """Largest gain in log likelihood of all iterations to come, in gains of the last one."""
 MAX_OUTPUT_ERROR_ITERATIONS = 25
-EQUAL_LOG_LIKELIHOOD = 1.0
-"""Difference in log likelihood within which two solutions of one model are equally good."""
 OUTPUT_ERROR_COST_TOLERANCE, LIKELIHOOD_COST_TOLERANCE = 1e-4, 1e-5
 """Share of the sum of squares that an iteration must gain: of output error, whose errors are compared to a percent, and of
 generalised least squares, whose log likelihoods are compared to a half."""
@@ -114,7 +113,7 @@ def _noise_at(
 
 
 def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> LikelihoodFit:
-    """Return the likelier of a fit and its equivalent solution; of two equally likely ones, that with the smaller coefficient.
+    """Return the fit, or that from its equivalent solution where that is likelier, a priori the one of the smaller coefficient.
 
     The equivalent solution has the same response at one speed (see `Effect.equivalent_solution`).
     """
@@ -123,10 +122,23 @@ def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> Likeliho
     if other is None:
         return ml_fit
     twin = fit_maximum_likelihood(problem, other, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)
-    place = problem.layout.names.index(effect.coefficients[0].name)
-    if abs(twin.log_likelihood - ml_fit.log_likelihood) < EQUAL_LOG_LIKELIHOOD:
-        return min(ml_fit, twin, key=lambda j: nine_digits(j.fitted.x[place]))
-    return twin if twin.log_likelihood > ml_fit.log_likelihood else ml_fit
+    own, others = (j.log_likelihood - exchange_penalty(j) for j in (ml_fit, twin))
+    return twin if others > own else ml_fit
+
+
+def exchange_penalty(ml_fit: LikelihoodFit) -> float:
+    """Return the prior log odds against effects that are at the larger of two equivalent coefficients.
+
+    A servo slower than the hull it steers is as unusual as a variant other than the textbook's.
+    """
+    problem, x = ml_fit.fitted.problem, ml_fit.fitted.x
+    total = 0.0
+    for effect in ml_fit.fitted.effects:
+        other = equivalent_solution(problem, x, effect)
+        if other is not None:
+            place = problem.layout.names.index(effect.coefficients[0].name)
+            total += ALTERNATIVE_LOG_ODDS * (nine_digits(float(other[place])) < nine_digits(float(x[place])))
+    return total
 
 
 def likelihood_at(problem: Problem, x: FloatArray, ml_fit: LikelihoodFit) -> float:

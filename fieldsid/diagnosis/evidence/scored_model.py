@@ -18,6 +18,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
     FittedProblem,
     LikelihoodFit,
+    exchange_penalty,
     fit_maximum_likelihood,
     fit_output_error,
     likelihood_at,
@@ -239,7 +240,7 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     )
     for record in (*records, *validation):
         total += 0.5 * own * np.log(max(measured_count([record]), 2)) + hidden
-    return float(total)
+    return float(total) + exchange_penalty(ml_fit)
 
 
 def pooled_errors(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:

@@ -127,13 +127,15 @@ class Search(MoveEvaluation):
     def _drop_each(self) -> None:
         """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.
 
-        The others stay in their variants. The set without it may have been tried in other variants only.
+        The others stay in their variants. The set without it may have been tried in other variants only, or have ended at a
+        worse optimum than the one that the larger model has found.
         """
         best = self._most_evident()
         spec = ModelSpec.of(best)
-        if len(best.names) > len(self.known) + 1:
+        if len(best.names) > len(self.known) + 1 and spec not in self.tried.progress.thinned:
+            self.tried.progress.thinned.add(spec)
             for gone in best.effects:
-                if gone.name not in self.known and spec.without(gone.name) not in self.tried.models:
+                if gone.name not in self.known:
                     self._drop_effect(best, gone)
 
     def _switch_noise_or_trim(self) -> bool:

@@ -24,7 +24,7 @@ from fieldsid.diagnosis.search.speed_law_search import (
     speed_laws,
 )
 from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
-from fieldsid.diagnosis.thresholds import SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.models.axis import Axis
@@ -32,6 +32,9 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
+
+SAME_OPTIMUM = 1e-3
+"""Log likelihood within which two fits of the same effects have ended at the same optimum."""
 
 
 @dataclass(slots=True)
@@ -116,10 +119,19 @@ class SearchState:
             self.floor = lowered_noise_floor(self.floor, self.records, residuals_of(fitted.problem, fitted.x))
 
     def _keep(self, ml_fit: LikelihoodFit) -> ScoredModel:
-        """Keep a fit where it has more evidence than the one known of its effects: the likelier one may validate worse."""
+        """Keep a fit where it has more evidence than the one known of its effects.
+
+        The likelier one may validate worse: where two optima are about as likely after the training runs, as an event's at two
+        times, the validation runs decide.
+        """
         key = frozenset(ml_fit.fitted.names)
         known, cost = self.tried.get(key), bic_penalty(ml_fit, self.validation)
-        if known is None or ml_fit.log_likelihood - cost > known.likelihood_fit.log_likelihood - known.complexity_penalty + 1e-3:
+        lead = (
+            np.inf
+            if known is None
+            else ml_fit.log_likelihood - cost - known.likelihood_fit.log_likelihood + known.complexity_penalty
+        )
+        if lead > -RIVAL_LOG_ODDS and abs(lead) > SAME_OPTIMUM:
             found = score_model(ml_fit, self.validation)
             self.tried[key] = found if known is None or found.log_evidence > known.log_evidence else known
         return self.tried[key]
