@@ -57,6 +57,11 @@ class Plants:
         return self.source.models[nearest].noise
 
     @property
+    def tightest_flown(self) -> float:
+        """The largest curvature (1/m) that a run of the belief held; NaN where the plants are the models' own."""
+        return self.belief.largest_curvature if self.belief is not None else float("nan")
+
+    @property
     def says(self) -> str:
         """Where the loss of speed comes from, in words."""
         return BELIEVED if self.belief is not None else speed_kept_said(self.source.axis, self.surge)

@@ -161,9 +161,19 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             checked.speed_lost,
             heard,
             *([UNSTABLE] if checked.unstable else []),
+            *_extrapolated(checked),
             *lost(source),
         )
     )
+
+
+def _extrapolated(checked: Verification) -> list[str]:
+    """Return which steps turn tighter than the runs did: what such a turn meets was not measured."""
+    if checked.extrapolated is None:
+        return []
+    size, held = checked.extrapolated
+    step = f"a {degrees(size):.0f} deg step turns tighter than any run, which held {100 * held:.0f} % of its curvature"
+    return [f"{step}: how it settles is extrapolated until a zig-zag or a circle is flown"]
 
 
 def fin_of(actuator: Mapping[str, float | None]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from truth.maneuvering.hulls import draw_hull
@@ -11,8 +13,11 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import source_of_models
+from fieldsid.schedule.flown.response import Steps, tightest
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.record import load_schedule, save_schedule
+from fieldsid.schedule.verdict import rests_on
+from fieldsid.schedule.verify import STEPS_RAD, verify_schedule
 
 BELIEF = "fieldsid.turning.maneuvering.belief"
 
@@ -56,3 +61,28 @@ def test_gains_are_for_a_vehicle_of_the_length_that_is_stated(monkeypatch, trial
     made = design_schedule(source, 0.26, runs=runs, length=1.75)
     assert asked == [1.75]
     assert made.provenance["length_m"] == 1.75
+
+
+def test_the_curvature_of_a_step_is_that_of_its_first_case_held_for_a_second():
+    time = np.arange(0.0, 4.0, 0.02)
+    angle = np.interp(time, [0.0, 1.0, 1.1, 4.0], [0.0, 0.5, 0.5, 0.5])  # 0.5 rad/s for a second, at 2 m/s
+    steps = Steps(time, np.stack([angle, 9.0 * angle], axis=1), *(np.full((time.size, 2), v) for v in (0.0, 0.0, 2.0)))
+    assert tightest(steps) == pytest.approx(0.25, rel=0.01)
+
+
+def test_a_step_that_turns_tighter_than_any_run_is_said_to_be_extrapolated(trial):
+    source, runs = trial
+    made = design_schedule(source, 0.26, runs=runs, length=2.0)
+    checked = verify_schedule(made, source, draws=4, runs=runs)
+    turns = [tightest(step) for step in checked.flown[0].scheduled]
+    assert turns == sorted(turns)
+    held = replace(checked, tightest_flown=turns[-1])
+    assert held.extrapolated is None
+    assert "extrapolated" not in rests_on(held, made, source)
+    loose = replace(checked, tightest_flown=0.5 * turns[-1])
+    assert loose.extrapolated is not None
+    size, share = loose.extrapolated
+    assert size in STEPS_RAD[Axis.YAW]
+    assert share == pytest.approx(0.5, abs=0.3)
+    assert "how it settles is extrapolated until a zig-zag or a circle is flown" in rests_on(loose, made, source)
+    assert replace(checked, tightest_flown=float("nan")).extrapolated is None
