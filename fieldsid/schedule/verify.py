@@ -200,8 +200,10 @@ class Verification(Plotted):
     unstable: bool
     """Whether the hull alone is unstable at one of the speeds, and each speed has a model of its own: how it settles then hangs
     on what that leaves out."""
-    tightest_flown: float = float("nan")
+    tightest_flown: float
     """The largest curvature (1/m) that the runs held, NaN where each speed has a model of its own."""
+    actuator: Mapping[str, float | None]
+    """Lag (s), delay (s), rate limit (rad/s) and latency (s) that it was flown with."""
 
     @property
     def extrapolated(self) -> tuple[float, float] | None:
@@ -261,7 +263,9 @@ def verify_schedule(
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
     kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
     unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
-    return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable, of.tightest_flown)
+    return Verification(
+        schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable, of.tightest_flown, of.actuator
+    )
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
