@@ -24,10 +24,11 @@ FASTEST_FIN = 20.0 * math.pi
 UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
 
 
-def parse_angle(text: str, option: str, most: float, largest: float = math.inf) -> float:
+def parse_angle(text: str, option: str, most: float, largest: float = math.inf, beyond: str = "") -> float:
     """Read an angle, or an angle per second, as rad, to either side; raises UsageError.
 
-    `most` is the largest that a bare number can be in rad, `largest` (rad) the largest that can be meant at all.
+    `most` is the largest that a bare number can be in rad, `largest` (rad) the largest that can be meant at all, `beyond` the
+    hint for who wants more.
     """
     word = text.strip().lower().removesuffix("/s").strip()
     unit = next((u for u in UNITS if word.endswith(u)), None)
@@ -40,7 +41,7 @@ def parse_angle(text: str, option: str, most: float, largest: float = math.inf) 
             f"{text.strip()!r} is not an angle", found=f"{option} {text}", hint="write it like `15deg`, `0.26rad` or `0.26`"
         )
     possible = [u for u in UNITS if abs(value) * UNITS[u] <= largest]
-    at_most = f"write at most `{option} {math.degrees(largest):.6g}deg`"
+    at_most = f"write at most `{option} {math.degrees(largest):.6g}deg`" + (f", or {beyond}" if beyond else "")
     if unit is not None and unit not in possible:
         angle = math.degrees(value * UNITS[unit])
         raise UsageError(f"`{option} {text.strip()}` is more than can be meant", found=f"{angle:.6g} deg", hint=at_most)

@@ -21,7 +21,7 @@ from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named
 from fieldsid.planning.discriminate.separating_plan import LONGEST_WINDOW_S, separating_plan
 from fieldsid.planning.flight.excitation import Window
 from fieldsid.planning.output.plan_file import plan_body
-from fieldsid.planning.safety.envelope import LARGEST_FIN, MOST_TURNS, Envelope
+from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
 from fieldsid.planning.specify.accuracy_goals import parse_accuracy_goals
 from fieldsid.planning.specify.quantities import parse_area, parse_band, parse_speeds
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
@@ -173,8 +173,9 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
         heading=_limit(
             limiting.heading,
             "--max-heading",
-            (angles.HEADING, MOST_TURNS * angles.TURN),
+            (angles.HEADING, angles.TURN),
             HEADING_MAX if axis is Axis.YAW else None,
+            f"write `--max-heading {NONE}` to let circles in",
         ),
         track=limiting.track,
         depth_low=band[0],
@@ -187,11 +188,16 @@ def envelope_of(axis: Axis, limiting: EnvelopeLimits, vehicle: Vehicle | None) -
     )
 
 
-def _limit(text: str | None, option: str, most: tuple[float, float], default: float | None = None) -> float | None:
-    """Return the limit that was typed, None for `none`, the default where nothing was; `most` bare and with a unit, rad."""
+def _limit(
+    text: str | None, option: str, most: tuple[float, float], default: float | None = None, beyond: str = ""
+) -> float | None:
+    """Return the limit that was typed, None for `none`, the default where nothing was.
+
+    `most` is the largest bare and with a unit, rad; `beyond` is the hint for who wants more than can be meant.
+    """
     if text is None:
         return default
-    return None if text.strip().lower() == NONE else angles.parse_angle(text, option, *most)
+    return None if text.strip().lower() == NONE else angles.parse_angle(text, option, *most, beyond)
 
 
 def _separating(asked: PlanRequest, vehicle: Vehicle | None, step: Callable[[], None], ready: Callable[[], None]) -> Made:

@@ -77,7 +77,7 @@ def design_schedule(
         phase_margin_deg=wish.phase_margin_deg,
         depth=depth,
         rows=rows,
-        actuator=actuator_of(source, limits),
+        actuator=plants.actuator,
         provenance=_provenance(source, wish, plants.says, knots) | {"belief_refused": refused, "length_m": length},
         stated=limits.record(),
         notes=() if plants.note is None else (plants.note,),
@@ -135,15 +135,6 @@ def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: 
         found=f"limit {fin_limit:.4g} rad, offset {NAMES[source.axis].trim_fin} = {offsets[speed]:.4g} rad",
         hint=wider_fin("--fin-limit", abs(offsets[speed]), source),
     )
-
-
-def actuator_of(source: ParameterSource, limits: FinLimits) -> dict[str, float | None]:
-    """Return lag, delay and rate limit the design counted with: stated ones, else the worst of the models'."""
-    values = [m.values for m in source.models]
-    lag, delay = (max((v.get(n, 0.0) for v in values), default=0.0) for n in ("lag", "delay"))
-    rate = min((v["max_rate"] for v in values if "max_rate" in v), default=None)
-    own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate, "latency_s": 0.0}
-    return own | {name: value for name, value in limits.record().items() if value is not None}
 
 
 def _provenance(source: ParameterSource, wish: Wish, speed_lost: str, knots: Sequence[float]) -> dict[str, Any]:

@@ -12,10 +12,11 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
-from fieldsid.schedule.believed_plant import believed_plant
+from fieldsid.schedule.believed_plant import LAG, RATE, believed_plant
 from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at, plants_at
 from fieldsid.turning.maneuvering.belief import Belief, believe, like_no_vehicle, not_fitted
+from fieldsid.turning.maneuvering.equations import coefficients
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
 BELIEVED = "speed lost in the turn, sway and drag as all runs together have them"
@@ -55,6 +56,23 @@ class Plants:
             return None
         nearest, _ = max(self.source.near(speed), key=lambda at: at[1])
         return self.source.models[nearest].noise
+
+    @property
+    def actuator(self) -> dict[str, float | None]:
+        """Lag, delay and rate limit that are counted with: stated ones, else the likeliest of the belief or the models' worst."""
+        values = [m.values for m in self.source.models]
+        lag, delay = (max((v.get(n, 0.0) for v in values), default=0.0) for n in ("lag", "delay"))
+        rate = min((v["max_rate"] for v in values if "max_rate" in v), default=None)
+        if self.belief is not None:
+            likeliest = coefficients(self.belief.fitted.vector)
+            lag, rate = float(likeliest[LAG]), float(likeliest[RATE])
+        own = {"lag_s": lag, "delay_s": delay, "fin_rate_rad_s": rate, "latency_s": 0.0}
+        return own | {name: value for name, value in self.limits.record().items() if value is not None}
+
+    @property
+    def tightest_flown(self) -> float:
+        """The largest curvature (1/m) that a run of the belief held; NaN where the plants are the models' own."""
+        return self.belief.largest_curvature if self.belief is not None else float("nan")
 
     @property
     def says(self) -> str:

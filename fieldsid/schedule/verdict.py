@@ -11,7 +11,6 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.rounding import number
 from fieldsid.schedule.best_constant import MARGIN_ROUNDING_DEG, margin_kept
 from fieldsid.schedule.linear_plant import not_counted
-from fieldsid.schedule.make import actuator_of
 from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import (
@@ -21,7 +20,6 @@ from fieldsid.schedule.verify import (
     READ_OFF,
     STEP_ANGLE_RAD,
     Verification,
-    stated_limits,
 )
 
 MOST_NAMED = 3
@@ -157,13 +155,23 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
             errors,
             f"{len(speeds)} speeds, {number(min(speeds), 3)} .. {number(max(speeds), 3)} m/s"
             + (f", {beyond} of them beyond the data" if beyond else ""),
-            f"fin {limit} rad, {fin_of(actuator_of(source, stated_limits(schedule)))}",
+            f"fin {limit} rad, {fin_of(checked.actuator)}",
             checked.speed_lost,
             heard,
             *([UNSTABLE] if checked.unstable else []),
+            *_extrapolated(checked),
             *lost(source),
         )
     )
+
+
+def _extrapolated(checked: Verification) -> list[str]:
+    """Return which steps turn tighter than the runs did: what such a turn meets was not measured."""
+    if checked.extrapolated is None:
+        return []
+    size, held = checked.extrapolated
+    step = f"a {degrees(size):.0f} deg step turns tighter than any run, which held {100 * held:.0f} % of its curvature"
+    return [f"{step}: how it settles is extrapolated until a turn that tight is flown"]
 
 
 def fin_of(actuator: Mapping[str, float | None]) -> str:

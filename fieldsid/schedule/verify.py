@@ -28,12 +28,14 @@ from fieldsid.schedule.flown.response import (
     steady_error,
     step_response,
     swing,
+    tightest,
 )
 from fieldsid.schedule.flown.straight_leg import straight_leg
 from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
 from fieldsid.schedule.margins import control_margins, margins, worst_of
 from fieldsid.schedule.plants import models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
+from fieldsid.turning.model_error import MIN_COVERED_SHARE
 
 VERIFY_DRAWS = 60
 SEED = 77
@@ -198,6 +200,19 @@ class Verification(Plotted):
     unstable: bool
     """Whether the hull alone is unstable at one of the speeds, and each speed has a model of its own: how it settles then hangs
     on what that leaves out."""
+    tightest_flown: float
+    """The largest curvature (1/m) that the runs held, NaN where each speed has a model of its own."""
+    actuator: Mapping[str, float | None]
+    """Lag (s), delay (s), rate limit (rad/s) and latency (s) that it was flown with."""
+
+    @property
+    def extrapolated(self) -> tuple[float, float] | None:
+        """The smallest step (rad) that turns tighter than the runs did, and the least share of its curvature that they held."""
+        for i, size in enumerate(STEPS_RAD[self.schedule.axis]):
+            held = min(self.tightest_flown / max(tightest(flown.scheduled[i]), 1e-9) for flown in self.flown)
+            if held < MIN_COVERED_SHARE:
+                return size, held
+        return None
 
     @property
     def worst(self) -> dict[str, float]:
@@ -248,7 +263,9 @@ def verify_schedule(
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
     kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
     unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
-    return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable)
+    return Verification(
+        schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable, of.tightest_flown, of.actuator
+    )
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:

@@ -154,6 +154,7 @@ def test_every_limit_is_printed_and_what_has_none_is_named(run_cli):
         (("--rate", "0"), "--rate"),
         (("--max-heading", "0.1deg"), "widen"),
         (("--max-heading", "60"), "60 deg is 1.047 rad, 60 rad is 3438 deg"),
+        (("--max-heading", "400deg"), "at most `--max-heading 360deg`, or write `--max-heading none` to let circles in"),
         (("--radius", "--max-heading", "90deg"), "--max-heading"),
         (("--radius", "--open-loop"), "--open-loop"),
         (("--radius", "--max-track", "5"), "--max-track"),

@@ -1,7 +1,7 @@
 """Gains designed and verified on hulls nobody tuned to, flown on the hulls themselves: settling said and flown, by kind.
 
-Every hull is drawn, flown with sensor noise, identified from pulses, given a schedule, and steered by it at its speeds:
-    python tests/truth/gain_table.py --draws 14 --seed 7 [--controller pd] [--json rows.json]
+Every hull is drawn, flown with sensor noise, identified from a training set, given a schedule, and steered by it at its speeds:
+    python tests/truth/gain_table.py --draws 14 --seed 7 [--controller pd] [--set pulses+zigzag] [--json rows.json]
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import json
 import sys
 import time
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import STEPS_RAD, StepCheck, verify_schedule
 from truth.maneuvering.hulls import KINDS, Hull, draw_hull
 from truth.maneuvering.steered import steered
-from truth.maneuvering.trials import training
+from truth.maneuvering.trials import SETS, training
 
 EFFECTS = ("servo_lag", "sway_coupling", "quadratic_damping")
 WITHIN, AT_LEAST_S = 0.25, 0.5
@@ -62,6 +62,8 @@ class Outcome:
     overshoot: float
     margin: float
     refused: str = ""
+    extrapolated: bool = False
+    """Whether verify said that the step turns tighter than any run did."""
 
     @property
     def as_said(self) -> bool:
@@ -80,11 +82,11 @@ class Outcome:
         return not self.swing <= HUNTS
 
 
-def identified(hull: Hull, draw: int, seed: int) -> tuple[ParameterSource, list[Run]]:
-    """Return the models of a hull's pulses, one per speed, and the runs."""
-    logs = training(hull, "pulses", np.random.default_rng([seed, draw, 0]), sway=True)
+def identified(hull: Hull, draw: int, seed: int, which: str) -> tuple[ParameterSource, list[Run]]:
+    """Return the models of a hull's training set, one per speed by its pulses, and the runs."""
+    logs = training(hull, which, np.random.default_rng([seed, draw, SETS.index(which)]), sway=True)
     runs = [Run(log.name, log.time, log.columns) for log in logs]
-    models = [f.model for run in runs for f in identify([run], Axis.YAW, effects=EFFECTS)]
+    models = [f.model for run in runs if run.name.startswith("pulses") for f in identify([run], Axis.YAW, effects=EFFECTS)]
     return source_of_models(models, [f"m{i}" for i in range(len(models))]), runs
 
 
@@ -94,13 +96,13 @@ def law_of(schedule: Schedule) -> np.ndarray:
     return np.array([schedule.column(n) for n in names], dtype=float).T
 
 
-def evaluate(hull: Hull, draw: int, seed: int, kind: str) -> list[Outcome]:
+def evaluate(hull: Hull, draw: int, seed: int, kind: str, which: str) -> list[Outcome]:
     """Return the steps of one hull."""
     nan = float("nan")
     try:
-        source, runs = identified(hull, draw, seed)
+        source, runs = identified(hull, draw, seed, which)
         schedule = design_schedule(source, hull.rudder_limit, wish=Wish(kind), runs=runs)
-        checks = [c for c in verify_schedule(schedule, source, runs=runs).scheduled if c.knot]
+        found = verify_schedule(schedule, source, runs=runs)
     except FieldsidError as error:
         sizes = [np.degrees(s) for s in STEPS_RAD[Axis.YAW]]
         return [
@@ -108,10 +110,11 @@ def evaluate(hull: Hull, draw: int, seed: int, kind: str) -> list[Outcome]:
             for v in hull.speeds
             for size in sizes
         ]
-    rows = []
-    for check in checks:
+    rows, beyond = [], found.extrapolated[0] if found.extrapolated is not None else np.inf
+    for check in (c for c in found.scheduled if c.knot):
         for size, said in zip(STEPS_RAD[Axis.YAW], check.steps, strict=True):
-            rows.append(flown(hull, draw, law_of(schedule), check.speed, size, said, check.phase_least_deg))
+            row = flown(hull, draw, law_of(schedule), check.speed, size, said, check.phase_least_deg)
+            rows.append(replace(row, extrapolated=size >= beyond))
     return rows
 
 
@@ -151,6 +154,9 @@ def table(rows: list[Outcome]) -> list[str]:
     lines += [line(f"  {kind}", part) for kind in KINDS if (part := [r for r in rows if r.kind == kind])]
     sizes = sorted({r.step_deg for r in rows})
     lines += [line(f"  {size:.0f} deg", [r for r in rows if r.step_deg == size]) for size in sizes]
+    for said, beyond in (("turns the runs held", False), ("extrapolated, as verify says", True)):
+        if part := [r for r in rows if r.extrapolated == beyond]:
+            lines.append(line(f"  {said}", part))
     for said, stable in (("stable", True), ("unstable without a pilot", False)):
         if part := [r for r in rows if r.stable == stable]:
             lines.append(line(f"  {said}", part))
@@ -164,6 +170,7 @@ def main() -> None:
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--seed", type=int, default=7)
     asked.add_argument("--controller", default="pd")
+    asked.add_argument("--set", choices=SETS, default=SETS[0])
     asked.add_argument("--json", type=Path)
     given = asked.parse_args()
     rows: list[Outcome] = []
@@ -172,7 +179,7 @@ def main() -> None:
         hull = draw_hull(draw, given.seed)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            rows += evaluate(hull, draw, given.seed, given.controller)
+            rows += evaluate(hull, draw, given.seed, given.controller, given.set)
         print(f"{draw} {hull.kind} {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
         if given.json:
             given.json.write_text(json.dumps([asdict(r) for r in rows]))

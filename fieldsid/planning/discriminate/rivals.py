@@ -59,15 +59,15 @@ def rivals_from(path: Path, names: Sequence[str] = ()) -> tuple[Model, ...]:
             f"`{path}` is not a complete diagnosis", found=f"{type(error).__name__}: {error}", hint="diagnose again, with `-o`"
         ) from error
     if len(models) < 2:
-        known = ", ".join(str(c["effect"]) for c in candidates)
+        known = ", ".join(f"{c['effect']} with probability {float(c['probability']):.2g}" for c in candidates[:MOST_RIVALS])
         hint = "name two of them with `--separate A,B`"
-        raise UsageError("the diagnosis leaves no rivals to tell apart", found=known, hint=hint)
+        raise UsageError("the diagnosis leaves no rivals to tell apart", found=known or "no candidates", hint=hint)
     return models
 
 
 def _leading(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    likely = [c for c in candidates if float(c["probability"]) >= LEAST_PROBABILITY]
-    return (likely if len(likely) >= 2 else list(candidates[:2]))[:MOST_RIVALS]
+    """Return what is believed: a maneuver that tells it from what is not would be flown for nothing."""
+    return [c for c in candidates if float(c["probability"]) >= LEAST_PROBABILITY][:MOST_RIVALS]
 
 
 def _of_candidate(axis: Axis, candidate: Mapping[str, Any], body: Mapping[str, Any]) -> Model:

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
+from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
 from fieldsid.maneuvers import Autopilot, Limits
 from fieldsid.numerics.arrays import FloatArray
@@ -93,10 +94,10 @@ def respond(
     if moment is not None:
         clean[:, 2] += moment[:-1]
         clean[:, 3] += moment[1:]
-    for _ in range(ACTUATOR_ROUNDS if moving else 1):
+    for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
         drive = clean.copy() if moving else clean
         closed_loop(ready.steps, drive, ready.constants, ready.pieces, asked, off, ready.push, gains, bounds, command, out)
-        if moving:
+        if left:
             off = fin_offset(scene, ready.time, command)
     return Response(ready.time, command, out[:, 0], out[:, 1])
 
@@ -135,5 +136,5 @@ def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
 def fin_offset(scene: OperatingPoint, time: FloatArray, command: FloatArray) -> FloatArray:
     """Return the fin's angle less its command (n,) about trim at both ends of every interval, (n-1, 2)."""
     held = command[:-1] + scene.trim_fin
-    real = fin_path(scene.record(time, command + scene.trim_fin), scene.effects, scene.values)
+    real = fin_path(command_record(scene.axis, time, command + scene.trim_fin, speed=scene.speed), scene.effects, scene.values)
     return np.column_stack([real.start - held, real.end - held])

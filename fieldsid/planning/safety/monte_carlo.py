@@ -110,14 +110,15 @@ def _open_loop(crowd: Ensemble, asked: FloatArray, envelope: Envelope, autopilot
     gains = np.array([autopilot.angle_gain, autopilot.rate_gain, autopilot.fin])
     moving = any(e.fin is not None for s in crowd.scenes for e in s.effects)
     off, steps, out = plant.off, np.diff(time), np.empty((time.size, 3))
-    for _ in range(ACTUATOR_ROUNDS if moving else 1):
+    rounds = ACTUATOR_ROUNDS if moving else 1
+    for left in reversed(range(rounds)):
         for i in range(plant.size):
             closed_loop(
                 steps, plant.drive[i].copy(), plant.constants[i], plant.pieces, asked, off[i], plant.push[i], gains, limits[i],
                 command[i], out,
             )  # fmt: skip
             angle[i], rate[i] = out[:, 0], out[:, 1]
-        if moving:
+        if left:
             off = np.stack([fin_offset(s, time, command[i]) for i, s in enumerate(crowd.scenes)])
     return angle.T, rate.T
 

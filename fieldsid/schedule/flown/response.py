@@ -26,6 +26,8 @@ LIMIT_CYCLE_SHARE = 2.0 * SETTLING_BAND
 """Peak to peak over the step: what swings through the whole corridor of settling after 45 s does not settle."""
 
 
+HELD_S, LEAST_SPEED_M_S = 1.0, 0.05
+"""A curvature counts where it is held this long, as that of the runs does; speeds below this one are taken as it."""
 MOST_ERROR = 3.0
 """Steps of error at which a response counts as lost: what diverges is not later than that."""
 
@@ -72,6 +74,13 @@ def swing(values: FloatArray, size: float) -> FloatArray:
     gone: npt.NDArray[np.bool_] = np.asarray(~np.isfinite(tail).all(axis=0))
     steady = np.where(gone[None, :], 0.0, tail)
     return np.asarray(np.where(gone, np.inf, np.ptp(steady, axis=0) / abs(size)))
+
+
+def tightest(steps: Steps) -> float:
+    """Return the largest curvature (1/m) that the first case holds for HELD_S."""
+    width = max(1, round(HELD_S / float(steps.time[1] - steps.time[0])))
+    turned = np.abs(steps.angle[width:, 0] - steps.angle[:-width, 0]) / HELD_S
+    return float(np.max(turned / np.maximum(steps.speed[width:, 0], LEAST_SPEED_M_S)))
 
 
 def about_rest(values: FloatArray, size: float) -> FloatArray:

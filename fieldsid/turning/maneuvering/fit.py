@@ -98,9 +98,9 @@ def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
     if growth > 0.0:
         segment = min(segment, max(LONGEST_GROWTH / growth, SHORTEST_SEGMENT_S))
     whole = _problem(runs, segment, mean, precision)
-    # a noise taken from residuals of a vector that does not follow yet passes for one that hides what the run says
+    # a noise taken from what does not follow yet, vector or first states, passes for one that hides what the run says
     found = whole.solved(found.vector, found.noise, keep_noise=True)
-    found = whole.solved(found.vector, found.noise, keep_noise=False)
+    found = whole.solved(found.vector, found.noise, keep_noise=False, local=found.local)
     _refuse_not_finite(found)
     return found
 
@@ -133,8 +133,11 @@ class _Problem:
     mean: FloatArray
     precision: FloatArray
 
-    def solved(self, vector: FloatArray, noise: FloatArray, *, keep_noise: bool) -> Fitted:
-        local = [cut.first for cut in self.cuts]
+    def solved(
+        self, vector: FloatArray, noise: FloatArray, *, keep_noise: bool, local: Sequence[FloatArray] | None = None
+    ) -> Fitted:
+        """Return the fit that starts from a vector and the runs' nuisances, those measured where none are given."""
+        local = [cut.first for cut in self.cuts] if local is None else list(local)
         damping = 1e-2
         cost = self._cost(vector, local, noise)
         for _ in range(MAX_ITERATIONS):

@@ -124,6 +124,19 @@ def test_a_diagnosis_names_its_rivals(tmp_path):
     assert [m.effects for m in rivals_from(tmp_path / "diagnosis.yaml", ("stall", "delay"))] == [("delay",), ("stall",)]
 
 
+def test_what_a_diagnosis_does_not_believe_is_no_rival(tmp_path):
+    base = {"a22": 1.1, "b2": -0.9, "C0": 0.0}
+    sure = [
+        {"effect": "delay", "probability": 1.0, "parameters": base},
+        {"effect": "stall", "probability": 1e-127, "parameters": base},
+    ]
+    with pytest.raises(UsageError, match="no rivals") as caught:
+        rivals_from(diagnosis(tmp_path, candidates=sure))
+    assert caught.value.found == "delay with probability 1, stall with probability 1e-127"
+    named = rivals_from(tmp_path / "diagnosis.yaml", ("delay", "stall"))
+    assert [m.effects for m in named] == [("delay",), ("stall",)]
+
+
 @pytest.mark.parametrize(
     "changes", [{"candidates": []}, {"candidates": [{"effect": "delay"}]}, {"axis": "x"}, {"noise_floor": {}}]
 )
