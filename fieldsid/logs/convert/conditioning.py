@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.time_column import unit_of_step
+from fieldsid.logs.convert.times.time_column import unit_of_step
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray

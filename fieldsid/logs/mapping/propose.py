@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import FieldsidError, LogError
-from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap
+from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.mend import mended
@@ -117,8 +117,7 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
     samples = inventory.samples
     source = None if samples is None else samples.source
     if source is not None:
-        keys = {"column": _place(inventory, source.column), "unit": source.unit, "date": source.date, "week": source.week}
-        body["time"] = {k: v for k, v in keys.items() if v is not None}
+        body["time"] = _time(inventory, source)
     elif inventory.table is not None and not inventory.table.header:
         body["time"] = {"column": 0, "unit": "s"}
     signals = _combined(best, names, samples)
@@ -130,6 +129,19 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
     return body, notes
+
+
+def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
+    """Return a time as a mapping has it: one column or several, its unit, and the columns of its days or weeks."""
+    date = [_place(inventory, c) for c in source.date]
+    keys = {
+        "column": _place(inventory, source.column),
+        "columns": [_place(inventory, c) for c in source.columns] or None,
+        "unit": source.unit,
+        "date": date[0] if len(date) == 1 else date or None,
+        "week": _place(inventory, source.week),
+    }
+    return {key: value for key, value in keys.items() if value is not None}
 
 
 def _combined(best: dict[str, Guess], names: list[str], samples: Samples | None) -> dict[str, Any]:
@@ -207,7 +219,7 @@ def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory)
     columns = samples.columns
     known = {s: i["column"] for s, i in signals.items() if "column" in i}
     known = {s: c if c in columns else str(c) for s, c in known.items()}
-    used = {*known.values(), samples.source.column, *(c for i in signals.values() for c in i.get("columns", ()))}
+    used = {*known.values(), *samples.source.places, *(c for i in signals.values() for c in i.get("columns", ()))}
     named = inventory.table is None or inventory.table.header
     free = [c for c in columns if c not in used and not (named and _is_named(c))]
     if all(known.get(s) in columns for s in ("yaw_rad", "x_m", "y_m")):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import re
 
-from fieldsid.logs.convert.clock_text import CLOCK, DATE
+from fieldsid.logs.convert.times.clock_text import CLOCK
+from fieldsid.logs.convert.times.dates import DATE
 
 _NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 _COMMA_NUMBER = re.compile(r"^[+-]?(\d+,\d+|\d+)([eE][+-]?\d+)?$")

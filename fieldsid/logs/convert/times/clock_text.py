@@ -8,26 +8,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.convert.times.dates import days_of, texts
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
-if TYPE_CHECKING:
-    from pandas import Series
-
-DAY_S, HOUR_S, WEEK_S = 86400.0, 3600.0, 604800.0
+MINUTE_S, HOUR_S, DAY_S, WEEK_S = 60.0, 3600.0, 86400.0, 604800.0
 FORMS = {"hh:mm:ss": DAY_S, "mm:ss": HOUR_S, "hh:mm": DAY_S, "hhmmss": DAY_S}
 """How a clock may be written where a mapping says so as the unit of time, and the seconds after which it starts again."""
 CLOCK = re.compile(r"(?:(\d{1,2}):)?(\d{1,3}):(\d{1,2}(?:[.,]\d*|:\d{3})?)\s*([AaPp])?[Mm]?")
-DATE = re.compile(r"(\d{1,4})([-/.])(\d{1,2}|[A-Za-z]{3})[-/.](\d{1,4})")
-MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 MOSTLY = 0.5
 """Share of the cells that must be of a form for a column to be taken for it."""
-LONGEST_YEAR = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +35,7 @@ class Clock:
 
 def clock_of_text(cells: npt.NDArray[Any], form: str | None = None) -> Clock | None:
     """Return what a column of clock readings shows; None where less than half of the cells are readings."""
-    parts = _texts(cells).str.extract(f"^{CLOCK.pattern}$")
+    parts = texts(cells).str.extract(f"^{CLOCK.pattern}$")
     numbers = (parts[i].str.replace(r"[,:]", ".", regex=True) for i in range(3))
     first, second, third = (n.astype("float64").to_numpy(na_value=np.nan) for n in numbers)
     if np.isfinite(third).mean() <= MOSTLY:
@@ -65,61 +60,24 @@ def going_on(seconds: FloatArray, period_s: float) -> tuple[FloatArray, int]:
     seen = np.isfinite(seconds)
     steps = np.diff(seconds[seen], prepend=seconds[seen][:1])
     rounds = np.cumsum(steps < -0.5 * period_s)
+    if not rounds.size or not rounds[-1]:
+        return seconds, 0
     whole = seconds.copy()
     whole[seen] += period_s * rounds
-    return whole, int(rounds[-1]) if rounds.size else 0
-
-
-def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
-    """Return the days (n,) since 1970 of a column of dates, NaN where a cell is none; None where less than half are.
-
-    Year, month and day as ISO 8601 has them, day before month or month before day: of the two that which goes on with the
-    fewest days, and month first where both do.
-    """
-    parts = _texts(cells).str.extract(f"^{DATE.pattern}$")
-    if parts[0].notna().mean() <= MOSTLY:
-        return None
-    a, b, c = (_month_numbers(parts[i]) for i in (0, 2, 3))
-    named = parts[2].str.isalpha().fillna(value=False).any()
-    is_iso = bool((parts[0].str.len() == LONGEST_YEAR).any())
-    orders = [(a, b, c)] if is_iso else [(c, b, a)] if named else [(c, a, b), (c, b, a)]
-    found = [days for order in orders if np.isfinite(days := _days(*order)).any()]
-    return min(found, key=lambda d: (int(np.isnan(d).sum()), float(np.nanmax(d) - np.nanmin(d)))) if found else None
+    return whole, int(rounds[-1])
 
 
 def stamps_of_text(cells: npt.NDArray[Any]) -> FloatArray | None:
     """Return the seconds (n,) since 1970 of cells with a date and a clock in one; None where less than half are."""
-    parts = _texts(cells).str.split(r"[ T]+", n=1, regex=True, expand=True)
+    parts = texts(cells).str.split(r"[ T]+", n=1, regex=True, expand=True)
     if parts.shape[1] < 2:
         return None
     days, clock = days_of(parts[0].to_numpy(dtype=object)), clock_of_text(parts[1].to_numpy(dtype=object))
     return None if days is None or clock is None else DAY_S * days + clock.seconds
 
 
-def lost_hours(name: str, times: int) -> Note:
-    """Return the note that hours were added to a clock without them."""
-    again = f"; it starts again {times} time{'s' * (times != 1)}, each taken for the next hour" if times else ""
-    return Note("lost_hours", f"`{name}` counts minutes and seconds, the hour is not in it{again}", {"count": times})
-
-
-def _texts(cells: npt.NDArray[Any]) -> Series[str]:
-    import pandas as pd
-
-    return pd.Series(cells).astype("string").str.strip()
-
-
-def _month_numbers(texts: Series[str]) -> FloatArray:
-    """Return numbers (n,) of texts, a month's name as its number."""
-    import pandas as pd
-
-    named = texts.str.lower().map({name: i + 1.0 for i, name in enumerate(MONTHS)})
-    return np.asarray(pd.to_numeric(texts, errors="coerce").fillna(named).to_numpy(dtype=np.float64, na_value=np.nan))
-
-
-def _days(year: FloatArray, month: FloatArray, day: FloatArray) -> FloatArray:
-    import pandas as pd
-
-    full = np.where(year < 100.0, np.where(year < 70.0, 2000.0, 1900.0) + year, year)
-    stamps = pd.to_datetime(pd.DataFrame({"year": full, "month": month, "day": day}), errors="coerce")
-    days = stamps.to_numpy(dtype="datetime64[D]")
-    return np.where(np.isnat(days), np.nan, days.astype(np.int64).astype(np.float64))
+def lost_hours(name: str, times: int, period_s: float) -> Note:
+    """Return the note that hours, or minutes too, were added to a clock without them."""
+    counts, lacks = ("minutes and seconds", "hour") if period_s == HOUR_S else ("seconds", "minute")
+    again = f"; it starts again {times} time{'s' * (times != 1)}, each taken for the next {lacks}" if times else ""
+    return Note("lost_hours", f"`{name}` counts {counts}, the {lacks} is not in it{again}", {"count": times})
