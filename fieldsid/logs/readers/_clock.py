@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.errors import FieldsidError
+from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import Source
+from fieldsid.logs.convert.conditioning import in_order
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
 from fieldsid.logs.convert.times.time_column import likely_time_unit
 from fieldsid.logs.mapping.canonical_names import TIME, unit_in_name
@@ -64,6 +65,18 @@ def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     return next((clock for clock in named if clock is not None), None) or _by_numbers(columns)
 
 
+def why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
+    """Return the column that is surest called a time and why it is none, where it is none; None where no column is called so."""
+    for source in _named(columns):
+        first = columns.index(source.places[0], TIME)
+        try:
+            time, _ = time_of(columns, source, source.unit, ReadOptions())
+            in_order(time, f"column `{columns.name(first)}`", ReadOptions())
+        except FieldsidError as error:
+            return source, LogError(error.what, found=error.found, hint="check that this is the time, and how it is written")
+    return None
+
+
 def _named(columns: Columns) -> Iterator[Source]:
     """Yield the columns that are called a time, the surest first, with the dates or weeks beside them, and parts of one."""
     meanings = [(i, meaning_of(name), set(words_of(name))) for i, name in enumerate(columns.names)]
@@ -100,7 +113,8 @@ def _unit_by_size(cells: npt.NDArray[Any]) -> str | None:
     if cells.dtype.kind not in "iuf" or not cells.size:
         return None
     steps = np.diff(cells[np.isfinite(cells)].astype(np.float64))
-    return likely_time_unit(cells, float(np.median(steps)) if steps.size else 0.0)
+    ahead = steps[steps > 0.0]  # of stamps with too few digits most do not go on
+    return likely_time_unit(cells, float(np.median(ahead)) if ahead.size else 0.0)
 
 
 def _tried(columns: Columns, source: Source) -> Clock | None:
@@ -124,7 +138,9 @@ def _by_numbers(columns: Columns) -> Clock | None:
     for i in range(columns.width):
         cells = columns.take(i)
         name = columns.names[i] if columns.names else ""
-        if meaning_of(name) is not None or is_counter(name) or cells.dtype.kind not in "iuf" or cells.size < 3:
+        if meaning_of(name) is not None or cells.dtype.kind not in "iufM" or cells.size < 3:
+            continue
+        if is_counter(name) and cells.dtype.kind != "M":
             continue
         clock = _tried(columns, Source(column=columns.place(i), unit=_unit_by_size(cells)))
         if clock is None:

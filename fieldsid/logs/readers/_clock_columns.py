@@ -45,7 +45,7 @@ DATES = frozenset({"date", "datum", "day", "yyyymmdd", "ddmmyy", "ddmmyyyy", "yy
 """Words of a column of dates."""
 UPPERS = ("hhmm", "mm", "hh")
 """Parts that may count the rounds of those below."""
-UNITS_CALLED = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h"}
+UNITS_CALLED = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h", "yearday": "d"}
 """The unit of a column that is called as a part of a clock is, and goes on."""
 _BEHIND = re.compile(r"[\[(].*|[ _]of[ _].*", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")

@@ -27,12 +27,16 @@ YEARS = (1970.0, 2120.0)
 def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
     """Return the days (n,) since 1970 of a column of dates, NaN where a cell is none; None where less than half are.
 
-    Year, month and day as ISO 8601 has them, day before month or month before day, or eight or six digits: of the orders that
-    are dates the one which goes on with the fewest days, and month first where several do.
+    Year, month and day as ISO 8601 has them, day before month or month before day, eight or six digits, or by
+    week or day of the year: of the orders that are dates the one which goes on with the fewest days, and month first where
+    several do.
     """
     digits = _digits(cells)
     if digits is not None:
         return _of_digits(digits)
+    by_week = _of_weeks_or_days(cells)
+    if by_week is not None:
+        return by_week
     parts = texts(cells).str.extract(f"^{DATE.pattern}$")
     if parts[0].notna().mean() <= MOSTLY:
         return None
@@ -61,6 +65,17 @@ def texts(cells: npt.NDArray[Any]) -> Series[str]:
     import pandas as pd
 
     return pd.Series(cells).astype("string").str.strip()
+
+
+def _of_weeks_or_days(cells: npt.NDArray[Any]) -> FloatArray | None:
+    """Return the days (n,) since 1970 of 2024-W09-5 or of 2024-061, the 61st day of the year; None where less than half are."""
+    parts = texts(cells).str.extract(r"^(\d{4})-(?:W(\d\d)-(\d)|(\d{3}))$")
+    year, week, day, yearday = (parts[i].astype("float64").to_numpy(dtype=np.float64, na_value=np.nan) for i in range(4))
+    if np.isfinite(year).mean() <= MOSTLY:
+        return None
+    fourth = _days(np.asarray(year), np.ones(year.size), np.full(year.size, 4.0))  # of January, which is in the first week
+    monday = fourth - (fourth + 3.0) % 7.0
+    return np.where(np.isfinite(week), monday + 7.0 * (week - 1.0) + day - 1.0, fourth - 3.0 + yearday - 1.0)
 
 
 def _digits(cells: npt.NDArray[Any]) -> FloatArray | None:

@@ -15,9 +15,11 @@ from fieldsid.logs.convert.times.clock_text import (
     DAY_S,
     FORMS,
     HOUR_S,
+    STAMP,
     WEEK_S,
     Clock,
     clock_of_digits,
+    clock_of_stamps,
     clock_of_text,
     going_on,
     lost_hours,
@@ -50,7 +52,7 @@ def seconds_of(
     """Return a time column (n,) in s, and notes.
 
     Numbers are in `unit` (seconds when None); text is ISO 8601, taken as UTC, a date and a clock, or a clock, to which `dates`
-    are the days (one column, or year, month and day) and `unit` may say the form: `hh:mm:ss`, `mm:ss`, `hh:mm`, `hhmmss`.
+    are the days (one column, or year, month and day) and `unit` may say the form, see FORMS.
     `weeks` are GPS weeks beside the time of the week. A time that counts from an epoch or from midnight starts at zero, and the
     note `time_origin` keeps its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times
     become NaN when salvaging. Raises LogError for a cell that is no time, and MappingError for a unit that is not one of time.
@@ -107,6 +109,8 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     seen = cells[np.isfinite(cells)]
     if _are_digits_of_a_clock(seen):
         return "hhmmss"
+    if any(low <= size < high for low, high in STAMPS):
+        return STAMP
     if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
         return "s"
     return epoch or unit_of_step(step) or "s"
@@ -122,6 +126,10 @@ def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
     clock, _ = going_on(clock_of_digits(seen.astype(np.float64)).seconds, DAY_S)
     jumps, steps = np.abs(np.diff(seen))[full], np.diff(clock)
     return bool(full.any() and (jumps >= 40.0).all() and (np.abs(steps[full]) <= FEW_STEPS * np.median(steps)).all())
+
+
+STAMPS = ((1.97e13, 2.12e13), (1.97e16, 2.12e16))
+"""Dates and times of a log as one number, with milliseconds or without: ms and us since 1970 are of another size until 2500."""
 
 
 def _are_days(size: float, step: float) -> bool:
@@ -207,6 +215,8 @@ def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: Read
         if clock_of_text(cells) is not None:
             return _of_clock(cells, None, name, options, ())
     missing = np.flatnonzero(np.isnat(stamps))
+    if missing.size == cells.size and wrong.size < cells.size:
+        raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)
     notes = [_no_times(missing, cells, name, options)] if missing.size else []
     nanoseconds = stamps.astype(np.int64)
     start = int(nanoseconds[~np.isnat(stamps)][0]) if missing.size < cells.size else 0
@@ -235,7 +245,7 @@ def _going_on(
 def _clock(cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions) -> Clock:
     if form == "hhmmss":
         return clock_of_digits(as_numbers(cells)[0])
-    found = clock_of_text(cells, form)
+    found = clock_of_stamps(cells) if form == STAMP else clock_of_text(cells, form)
     if found is None:
         raise _refused(f"column `{name}` holds cells that are no clock", np.arange(cells.size), cells, options)
     return found
