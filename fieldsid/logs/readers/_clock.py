@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
 from fieldsid.logs.readers._columns import Columns, is_counter, time_of
+from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
 MOSTLY = 0.9
@@ -37,10 +38,11 @@ WEEKS = frozenset({"week", "wn", "wk", "gwk", "gpsweek"})
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The time of a table's rows (n,) in s, NaN where they have none, and the column it is from, with what reads it."""
+    """The time of a table's rows (n,) in s, NaN where they have none, the column it is from and how it is read, and notes."""
 
     time: FloatArray
     source: Source
+    notes: tuple[Note, ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -147,5 +149,10 @@ def _by_numbers(columns: Columns) -> Clock | None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])
         if float(np.std(steps)) < REGULAR * float(np.mean(steps)):
-            return clock
+            return replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
     return None
+
+
+def _guessed(name: str, unit: str | None) -> tuple[Note, ...]:
+    message = f"no column is called a time: `{name}` goes on by even steps, taken in {unit or 's'} by their size; check its unit"
+    return (Note("time_guessed", message, {"column": name, "unit": unit}),)

@@ -31,6 +31,8 @@ CALLED: Mapping[str, frozenset[str]] = MappingProxyType(
         "hh": frozenset({"hour", "hours", "hr", "hrs", "hh", "h", "stunde", "stunden"}),
         "mm": frozenset({"minute", "minutes", "min", "mins", "mn", "mi", "mm", "m", "minuten"}),
         "ss": frozenset({"second", "seconds", "sec", "secs", "ss", "s", "sekunde", "sekunden"}),
+        "ds": frozenset({"decisecond", "deciseconds", "tenth", "tenths"}),
+        "cs": frozenset({"centisecond", "centiseconds", "centi", "hundredth", "hundredths", "hsec", "csec"}),
         "ms": frozenset({"millisecond", "milliseconds", "millisec", "millis", "milli", "msec", "msecs", "ms"}),
         "us": frozenset({"microsecond", "microseconds", "microsec", "micros", "micro", "usec", "usecs", "us"}),
         "ns": frozenset({"nanosecond", "nanoseconds", "nanosec", "nanosecs", "nanos", "nano", "nsec", "nsecs", "ns"}),
@@ -39,10 +41,15 @@ CALLED: Mapping[str, frozenset[str]] = MappingProxyType(
     }
 )
 """What the parts of a date and a clock are called; a month and a minute may share a name."""
-BESIDE = frozenset({"time", "timestamp", "stamp", "header", "clock", "utc", "gps", "gnss", "gmt", "rtc", "local", "log", "pc"})
+BESIDE = frozenset({
+    "time", "timestamp", "stamp", "header", "clock", "utc", "gps", "gnss", "gmt", "rtc", "local", "log", "pc", "unix", "unixtime",
+    "epoch", "posix",
+})  # fmt: skip
 """Words that may stand beside the name of a part."""
 DATES = frozenset({"date", "datum", "day", "yyyymmdd", "ddmmyy", "ddmmyyyy", "yymmdd"})
 """Words of a column of dates."""
+FRACTIONS = ("ms", "us", "ns", "cs", "ds")
+"""Parts that may follow whole seconds."""
 UPPERS = ("hhmm", "mm", "hh")
 """Parts that may count the rounds of those below."""
 UNITS_CALLED = {"ss": "s", "ms": "ms", "us": "us", "ns": "ns", "mm": "min", "hh": "h", "yearday": "d"}
@@ -94,7 +101,7 @@ def _called(columns: Columns) -> dict[str, list[int]]:
     for i, name in enumerate(columns.names):
         words = {w.lower() for w in _WORD.findall(_BEHIND.sub("", name))} - BESIDE
         for part, called in CALLED.items():
-            if words and words <= called:
+            if words and (words <= called or (words - called == {"second"} and part in FRACTIONS)):
                 found[part].append(i)
     return found
 
@@ -126,7 +133,7 @@ def _downwards(columns: Columns, called: Mapping[str, list[int]], start: tuple[s
     seen = seconds[np.isfinite(seconds)]
     if bool((seen != np.round(seen)).any()):
         return [start]
-    for lower in ("ms", "us", "ns"):
+    for lower in FRACTIONS:
         for i in _nearest(called[lower], index):
             if carries(seconds, _seconds(columns, lower, i), PARTS[part].period_s, 1.0):
                 return [start, (lower, i)]

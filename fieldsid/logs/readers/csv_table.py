@@ -53,8 +53,9 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         )
         duration = clock.duration_s if clock else float("nan")
         samples = samples_of(columns, clock.time, clock.source) if clock else None
+        notes = (*table.notes, *(clock.notes if clock else ()))
         problem = why_no_clock(columns) if clock is None and options.clock is None else None
-        return Inventory(path, "text table", duration, channels, found, tuple(table.notes), samples, no_clock=problem)
+        return Inventory(path, "text table", duration, channels, found, notes, samples, no_clock=problem)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

@@ -48,8 +48,8 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist())),)))
     samples = samples_of(columns, clock.time, clock.source) if clock else None
     problem = why_no_clock(columns) if clock is None and options.clock is None else None
-    duration = clock.duration_s if clock else float("nan")
-    return Inventory(path, "Parquet table", duration, tuple(channels), samples=samples, no_clock=problem)
+    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
+    return Inventory(path, "Parquet table", duration, tuple(channels), notes=notes, samples=samples, no_clock=problem)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

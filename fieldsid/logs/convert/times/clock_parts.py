@@ -36,6 +36,8 @@ PARTS: Mapping[str, Part] = MappingProxyType(
         "mm": Part(MINUTE_S, HOUR_S),
         "ss": Part(1.0, MINUTE_S),
         "s": Part(1.0, np.inf),
+        "ds": Part(1e-1, 1.0),
+        "cs": Part(1e-2, 1.0),
         "ms": Part(1e-3, 1.0),
         "us": Part(1e-6, 1.0),
         "ns": Part(1e-9, 1.0),

@@ -37,6 +37,7 @@ def parts(rate):
         "0h": [f"{int(x):02d}" for x in hour], "0m": [f"{int(x):02d}" for x in minute], "0s": [f"{x:04.1f}" for x in second],
         "m.m": text(minute + second / 60.0, 6), "hhmm": [f"{int(h):02d}{int(m):02d}" for h, m in zip(hour, minute, strict=True)],
         "hhmmss": text(1e4 * hour + 1e2 * minute + whole), "ms": text(1e3 * part), "us": text(1e6 * part), "ns": text(1e9 * part),
+        "cs": text(1e2 * part), "ds": text(1e1 * part),
         "clock": [f"{int(h)}:{int(m):02d}:{int(x):02d}" for h, m, x in zip(hour, minute, whole, strict=True)],
         "epoch": text(epoch), "day_s": text(of_day, 1), "day_h": text(of_day / 3600.0, 8),
         "us32": text(np.round(1e6 * t + 2.0**32 - 9.05e7) % 2.0**32),
@@ -85,6 +86,9 @@ TABLES = {
     "hhmmss and ms": named("hhmmss ms", "hhmmss ms"),
     "sec and msec": named("sec msec", "s ms"),
     "h m s and ms": named("hour minute second millisecond", "h m s ms"),
+    "h m s and tenths": named("hh mm ss tenths", "h m s ds"),
+    "h m s and hundredths": named("Hour Minute Second CentiSecond", "h m s cs"),
+    "unix time": named("unixtime_s unixtime_ms", "epoch ms"),
     "a clock and ms": named("time ms", "clock ms"),
     "a stamp of a message": named("stamp_sec stamp_nanosec", "epoch ns"),
     "an epoch and us": named("time_sec time_usec", "epoch us"),
@@ -201,3 +205,30 @@ def test_two_logs_in_one_file_are_no_time_that_starts_again(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("".join([lines[0], *cut]))
     assert "starts_again" not in {n.code for n in inspect_log(path).notes}
+
+
+def test_a_salvage_that_would_keep_less_than_half_is_not_offered(tmp_path):
+    lines = table(10, [("seconds", "s.s")]).splitlines(keepends=True)
+    cut = [f"{0.1 * (i % 300):.1f},{line.partition(',')[2]}" for i, line in enumerate(lines[1:])]
+    path = tmp_path / "log.csv"
+    path.write_text("".join([lines[0], *cut]))
+    found = inspect_log(path)
+    assert not found.way_in.options
+    (refused,) = (n for n in found.notes if n.code == "refused")
+    assert "time goes backwards" in refused.message
+    assert "--salvage" not in refused.message
+
+
+def test_a_time_that_no_name_says_is_told_with_its_unit(tmp_path):
+    path = tmp_path / "log.csv"
+    lines = table(10, [("seconds", "s.s")]).splitlines(keepends=True)
+    cut = [f"{10000 * i},{line.partition(',')[2]}" for i, line in enumerate(lines[1:])]
+    path.write_text("".join(["tick" + lines[0].removeprefix("seconds"), *cut]))
+    (note,) = (n for n in inspect_log(path).notes if n.code == "time_guessed")
+    assert "`tick` goes on by even steps, taken in us" in note.message
+
+
+def test_a_clock_in_columns_without_names_is_listed(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table(10, TABLES["hour minute second"]).partition("\n")[2])
+    assert [n.code for n in inspect_log(path).notes] == ["nothing_recognised"]
