@@ -25,8 +25,9 @@ class Source:
 
     value = sign x (number in its unit, as SI), turned into our frames, + offset in SI. `stamp` None means the header's where
     the message has one. `unit` None means what the column's name or the message type says, else SI. Where the unit is
-    `counts`, `centre` is their number at zero, and `scale` the rad that one is worth. `date` and `week` are the columns of a
-    time's days, where the time is a clock, and of its GPS weeks; the `scale` of a time that counts samples is the s of one.
+    `counts`, `centre` is their number at zero, and `scale` the rad that one is worth. A time may be the sum of several columns,
+    whose parts the unit names. `date` and `week` are the columns of a time's days, where the time is a clock, and of its GPS
+    weeks; the `scale` of a time that counts samples is the s of one.
     """
 
     column: str | int | None = None
@@ -41,8 +42,13 @@ class Source:
     stamp: Stamp | None = None
     centre: float | None = None
     scale: float | None = None
-    date: str | int | None = None
+    date: tuple[str | int, ...] = ()
     week: str | int | None = None
+
+    @property
+    def places(self) -> tuple[str | int, ...]:
+        """Every column that is read."""
+        return tuple(c for c in (self.column, *self.columns, *self.date, self.week) if c is not None)
 
     @property
     def label(self) -> str:

@@ -29,6 +29,8 @@ _COLUMN_EXAMPLE = """# columns are counted from 0:
 _TOPIC_EXAMPLE = (
     "# signals:\n#   yaw_rad: {topic: /heading, field: data, unit: deg}\n#   rudder_rad: {topic: /rudder_cmd, field: data}\n"
 )
+SHORT = 120
+"""Letters up to which a finding tells what was found beside what is wrong."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
 _RESERVED = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false", "null"})
 
@@ -101,7 +103,8 @@ def inspect_log(
     notes = [*inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
         what, found, hint = proposal.problem.what, proposal.problem.found, proposal.problem.hint
-        notes.append(Note("not_importable", f"{what}: {hint}" if hint else what, {"found": found, "hint": hint}))
+        said = f"{what} ({found})" if len(found) <= SHORT else what
+        notes.append(Note("not_importable", f"{said}: {hint}" if hint else said, {"found": found, "hint": hint}))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
     chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))

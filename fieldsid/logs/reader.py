@@ -12,7 +12,7 @@ from typing import Any
 
 from fieldsid.artifacts import near_files
 from fieldsid.display import Brief
-from fieldsid.errors import LogError
+from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
@@ -93,7 +93,8 @@ class ChannelInfo:
 class Inventory(Brief):
     """What is in a log file; `table` says how a text table was understood, `samples` are a table's numbers.
 
-    `frame` is that of a log of topics whose format has one, `by_topic` whether it is such a log.
+    `frame` is that of a log of topics whose format has one, `by_topic` whether it is such a log. `no_clock` is the column of a
+    table that is called its time, and why it is none.
     """
 
     path: Path
@@ -104,6 +105,7 @@ class Inventory(Brief):
     notes: tuple[Note, ...] = ()
     samples: Samples | None = None
     frame: str | None = None
+    no_clock: tuple[Source, FieldsidError] | None = None
 
     @property
     def by_topic(self) -> bool:

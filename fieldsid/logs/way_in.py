@@ -10,6 +10,7 @@ from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import ChannelMap
 from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, gaps_in
 from fieldsid.logs.importing import Importer
+from fieldsid.logs.reader import WORTH_SALVAGING
 from fieldsid.logs.run import Note, Run
 
 LEFT_OUT = frozenset({"truncated", "bad_rows", "not_a_number", "no_time", "time_order"})
@@ -29,11 +30,13 @@ def way_in(path: Path, run: Run, notes: Iterable[Note], mapping: ChannelMap | No
 
     A log of which nothing was left out, and that has no long gap, is not read again: nothing of it is refused.
     """
+    notes = list(notes)
     longest = max((g.length_s for s in MAIN if run.has(s) for g in gaps_in(run.time, run[s])), default=0.0)
     if longest <= MAX_GAP_S and not any(n.code in LEFT_OUT for n in notes):
         return WayIn()
     refusal: FieldsidError | None = None
-    for options, importer in _ways(mapping, msg_path, round(longest + 0.1, 1)):
+    is_worth = _left(notes) >= WORTH_SALVAGING
+    for options, importer in _ways(mapping, msg_path, round(longest + 0.1, 1), salvaging=is_worth):
         try:
             importer.read(path)
         except FieldsidError as error:
@@ -43,8 +46,15 @@ def way_in(path: Path, run: Run, notes: Iterable[Note], mapping: ChannelMap | No
     return WayIn((), refusal)
 
 
-def _ways(mapping: ChannelMap | None, msg_path: Path | None, gap_s: float) -> Iterator[tuple[tuple[str, ...], Importer]]:
-    for salvage in (False, True):
+def _left(notes: Iterable[Note]) -> float:
+    """Return the least share of the log's samples that a reading kept whose time repeats or goes back."""
+    return min((1.0 - n.data["dropped"] / n.data["of"] for n in notes if n.code == "time_order"), default=1.0)
+
+
+def _ways(
+    mapping: ChannelMap | None, msg_path: Path | None, gap_s: float, *, salvaging: bool
+) -> Iterator[tuple[tuple[str, ...], Importer]]:
+    for salvage in (False, True) if salvaging else (False,):
         asked = ("--salvage",) if salvage else ()
         yield asked, Importer(mapping, msg_path=msg_path, salvage=salvage)
         yield (*asked, "--max-gap", f"{gap_s:g}"), Importer(mapping, msg_path=msg_path, salvage=salvage, max_gap_s=gap_s)

@@ -68,7 +68,7 @@ def test_a_spoilt_column_is_no_bug_and_no_noise_on_stderr(run_cli, tmp_path, row
 @pytest.mark.parametrize(
     ("column", "how", "hint"),
     [
-        ("time_s", "zero", "check that this is the time, and sort the samples by it"),
+        ("time_s", "zero", "check that this is the time; if it is, log it with more digits"),
         ("time_s", "negative", "check that this is the time, and sort the samples by it"),
         ("time_s", "words", "check which column is the time"),
         ("yaw_rad", "words", "map another column, or leave the signal out"),

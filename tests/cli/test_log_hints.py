@@ -103,6 +103,11 @@ CASES = {
         lambda: table(mapping={"time": {"column": "t", "unit": "s", "rate": 10}, "signals": {"yaw_rad": YAW}}),
         IMPORT,
     ),
+    "a time of columns without their parts": (
+        lambda: table("h,m,s,heading,rudder", [f"14,{3 + int(t // 60)},{t % 60:.1f},{40 + t},5" for t in TIME],
+                      {"time": {"columns": ["h", "m", "s"]}, "signals": {"yaw_rad": YAW}}),
+        IMPORT,
+    ),
     "channels without a time": (table, "import log.csv --channel yaw_rad=heading:deg -o runs"),
     "a quaternion of two": (
         lambda: table("t,qx,qy,qz,qw", [f"{t:.1f},0,0,0,1" for t in TIME], columns(attitude={"columns": ["qx", "qy"]})),

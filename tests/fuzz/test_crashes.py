@@ -320,6 +320,20 @@ def test_a_count_without_end_is_no_description_of_a_bag(tmp_path):
     assert any("no description of a bag" in n.message for n in inspect_log(path).notes)
 
 
+@pytest.mark.parametrize("length", [2**64 - 1, 2**40])
+def test_a_length_that_a_bag_of_another_compression_invents_is_refused(tmp_path, length):
+    path = bag("mcap", "storage")(tmp_path)
+    file = next(path.glob("*.mcap"))
+    data = bytearray(file.read_bytes())
+    at = data.index(b"zstd")
+    data[at : at + 4] = b"Qstd"
+    (summary,) = struct.unpack_from("<Q", data, len(data) - 28)
+    struct.pack_into("<Q", data, summary + 1, length)
+    file.write_bytes(data)
+    with pytest.raises(LogError, match="compressed with 'Qstd'"):
+        inspect_log(path)
+
+
 def test_a_record_shorter_than_a_controllers_window_has_none():
     random, n = np.random.default_rng(1), 60
     yaw, fin = np.cumsum(0.01 * random.standard_normal((2, n)), axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.time_column import unit_of_step
+from fieldsid.logs.convert.times.time_column import unit_of_step
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
@@ -104,6 +104,7 @@ def _disorder(stamps: FloatArray, label: str, options: ReadOptions, *, left: flo
         places = f"the first from {stamps[i]:.10g} to {stamps[i + 1]:.10g} s at sample {i + 2}"
         return LogError(f"time goes backwards in {label}", found=f"{back.size} of {steps.size} steps, {places}", hint=hint)
     i = int(repeated[0])
+    hint = options.salvaging("leave such samples out", left) or "check that this is the time; if it is, log it with more digits"
     return LogError(
         f"time repeats in {label}",
         found=f"{repeated.size} of {steps.size} steps, the first at {stamps[i]:.10g} s, samples {i + 1} and {i + 2}",

@@ -19,8 +19,12 @@ def as_numbers(cells: npt.NDArray[Any]) -> tuple[FloatArray, npt.NDArray[np.intp
     for i, cell in enumerate(cells):
         if cell is None or cell != cell:  # noqa: PLR0124 - NaN is the one value that differs from itself
             continue
+        text = str(cell)
+        if "_" in text:  # which Python takes for a mark between thousands
+            wrong.append(i)
+            continue
         try:
-            values[i] = float(str(cell).strip().replace("D", "E").replace("d", "e"))
+            values[i] = float(text.strip().replace("D", "E").replace("d", "e"))
         except ValueError:
             wrong.append(i)
     return values, np.asarray(wrong, dtype=np.intp)

@@ -32,7 +32,15 @@ class Unit:
 
 
 _BY_DIMENSION: dict[str, dict[str, float]] = {
-    "angle": {"rad": 1.0, "deg": DEGREE, "mrad": 1e-3, "rev": 2 * math.pi},
+    "angle": {
+        "rad": 1.0,
+        "deg": DEGREE,
+        "mrad": 1e-3,
+        "rev": 2 * math.pi,
+        "ddeg": DEGREE / 10,
+        "cdeg": DEGREE / 100,
+        "gon": math.pi / 200,
+    },
     "angle rate": {
         "rad/s": 1.0,
         "deg/s": DEGREE,
@@ -50,8 +58,9 @@ _BY_DIMENSION: dict[str, dict[str, float]] = {
 }
 
 _ALIASES = {
-    "radian": "rad", "radians": "rad", "degree": "deg", "degrees": "deg", "°": "deg", "rads": "rad/s", "rps": "rev/s",
-    "°/s": "deg/s", "dps": "deg/s", "deg/sec": "deg/s", "rad/sec": "rad/s", "1/min": "rpm", "rev/min": "rpm", "1/s": "rev/s",
+    "radian": "rad", "radians": "rad", "degree": "deg", "degrees": "deg", "grad": "deg", "°": "deg", "rads": "rad/s",
+    "rps": "rev/s", "°/s": "deg/s", "dps": "deg/s", "deg/sec": "deg/s", "rad/sec": "rad/s", "1/min": "rpm", "rev/min": "rpm",
+    "1/s": "rev/s",
     "mps": "m/s", "m/sec": "m/s", "knot": "kn", "knots": "kn", "kt": "kn", "kts": "kn", "kmh": "km/h", "kph": "km/h",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m", "feet": "ft", "pascal": "Pa", "millibar": "mbar",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us", "nsec": "ns",

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
-from fieldsid.logs.convert.time_column import FASTEST_S, SLOW_S
+from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.course_findings import course_findings
 from fieldsid.logs.doctor.fin_findings import fin_findings
 from fieldsid.logs.doctor.pair_findings import pair_findings

@@ -10,9 +10,10 @@ from pydantic import Field
 
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
-from fieldsid.logs.convert.clock_text import FORMS
 from fieldsid.logs.convert.frames import Body, Frame, World
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS
+from fieldsid.logs.convert.times.clock_parts import parts_of
+from fieldsid.logs.convert.times.clock_text import FORMS
 from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
 from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.run import SIGNALS
@@ -40,9 +41,10 @@ class _Source(StrictModel):
 
 
 class _Time(StrictModel):
-    column: Column
+    column: Column | None = None
+    columns: list[Column] | None = None
     unit: str | None = None
-    date: Column | None = None
+    date: Column | Annotated[list[Column], Field(min_length=1, max_length=3)] | None = None
     week: Column | None = None
     rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
 
@@ -159,21 +161,35 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
 
 def _time(time: _Time, place: str) -> Source:
     """The unit of a time is one of time, or says how a clock is written; one that counts samples has a rate, and no unit."""
-    if time.rate is not None and (time.unit, time.date, time.week) != (None, None, None):
+    if (time.column is None) == (not time.columns):
+        raise MappingError(
+            f"{place}: `time` needs one of `column`, `columns`",
+            found="both" if time.columns else "none of them",
+            hint="name one with `column`, or those that make it up with `columns`",
+        )
+    if time.rate is not None and (time.unit, time.date, time.week, time.columns) != (None, None, None, None):
         raise MappingError(
             f"{place}: a time with a `rate` counts samples, and has no unit, date or week",
             found=f"rate {time.rate:g}",
-            hint=f"write `time: {{column: {time.column}, rate: {time.rate:g}}}`",
+            hint=f"write `time: {{column: {time.column or 'NAME'}, rate: {time.rate:g}}}`",
         )
-    if time.unit is not None and time.unit not in FORMS:
+    if time.columns:
+        parts_of(time.unit, time.columns, place)
+    elif time.unit is not None and time.unit not in FORMS:
         found = find_unit(time.unit)
         if found is None or found.dimension != "time":
             known = [u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS)
             raise MappingError(
                 f"{place}: time cannot be in {time.unit!r}", found=time.unit, hint=f"use one of: {', '.join(known)}"
             )
+    dates = () if time.date is None else tuple(time.date) if isinstance(time.date, list) else (time.date,)
     return Source(
-        column=time.column, unit=time.unit, date=time.date, week=time.week, scale=1.0 / time.rate if time.rate else None
+        column=time.column,
+        columns=tuple(time.columns or ()),
+        unit=time.unit,
+        date=dates,
+        week=time.week,
+        scale=1.0 / time.rate if time.rate else None,
     )
 
 

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from fieldsid.errors import FieldsidError, LogError
-from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap
+from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
+from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.true_north import true_north
@@ -61,6 +62,9 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
     A signal that the log does not give after all is left out, and the reason said: a mapping that is proposed can be imported.
     """
     body, notes = _body(inventory)
+    if inventory.no_clock is not None:
+        _in_degrees_by_span(body["signals"], inventory)
+        return Proposal(body, problem=inventory.no_clock[1], notes=tuple(notes))
     for _ in range(TRIES):
         if not body["signals"]:
             break
@@ -115,10 +119,9 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
     _plane_pose(best)
     body: dict[str, Any] = {"schema": "fieldsid/mapping/1"}
     samples = inventory.samples
-    source = None if samples is None else samples.source
+    source = samples.source if samples is not None else inventory.no_clock[0] if inventory.no_clock is not None else None
     if source is not None:
-        keys = {"column": _place(inventory, source.column), "unit": source.unit, "date": source.date, "week": source.week}
-        body["time"] = {k: v for k, v in keys.items() if v is not None}
+        body["time"] = _time(inventory, source)
     elif inventory.table is not None and not inventory.table.header:
         body["time"] = {"column": 0, "unit": "s"}
     signals = _combined(best, names, samples)
@@ -130,6 +133,19 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
     return body, notes
+
+
+def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
+    """Return a time as a mapping has it: one column or several, its unit, and the columns of its days or weeks."""
+    date = [_place(inventory, c) for c in source.date]
+    keys = {
+        "column": _place(inventory, source.column),
+        "columns": [_place(inventory, c) for c in source.columns] or None,
+        "unit": source.unit,
+        "date": date[0] if len(date) == 1 else date or None,
+        "week": _place(inventory, source.week),
+    }
+    return {key: value for key, value in keys.items() if value is not None}
 
 
 def _combined(best: dict[str, Guess], names: list[str], samples: Samples | None) -> dict[str, Any]:
@@ -207,7 +223,7 @@ def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory)
     columns = samples.columns
     known = {s: i["column"] for s, i in signals.items() if "column" in i}
     known = {s: c if c in columns else str(c) for s, c in known.items()}
-    used = {*known.values(), samples.source.column, *(c for i in signals.values() for c in i.get("columns", ()))}
+    used = {*known.values(), *samples.source.places, *(c for i in signals.values() for c in i.get("columns", ()))}
     named = inventory.table is None or inventory.table.header
     free = [c for c in columns if c not in used and not (named and _is_named(c))]
     if all(known.get(s) in columns for s in ("yaw_rad", "x_m", "y_m")):
@@ -262,6 +278,8 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
     by_size = frozenset(s for s, v in raw.series.items() if _is_in_degrees(s, v, body["signals"].get(s, {})))
     for signal in by_size:
         body["signals"][signal]["unit"] = "deg/s" if signal.endswith("_s") else "deg"
+    if "yaw_rad" in by_size:
+        body["signals"]["yaw_rad"]["unit"] = unit_of_wraps(raw.series["yaw_rad"].values)
     _as_the_heading(raw, body["signals"])
     why: list[Note] = []
     for _ in range(MENDS):
@@ -272,6 +290,8 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
         why += set_now
         if not set_now:
             break
+    if "yaw_rad" in by_size and "unit" in body["signals"]["yaw_rad"]:
+        why += heading_in_doubt(raw.series["yaw_rad"].values, body["signals"])
     return Proposal(body, Run(run.name, run.time, run.signals, inventory.path, (*run.notes, *notes)), notes=tuple(why))
 
 

@@ -127,7 +127,7 @@ def _ways(scene: _Scene, known: Mapping[str, str | int]) -> list[list[Recognised
     headings = _with_rates(scene)
     for x, y in permutations(scene.free, 2):
         made = np.hypot(way[x], way[y])
-        if not float(np.nanmedian(made)) > 0.0:
+        if not np.isfinite(made).any() or not float(np.nanmedian(made)) > 0.0:
             continue
         for heading in headings:
             if heading not in (x, y):

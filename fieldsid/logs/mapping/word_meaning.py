@@ -37,7 +37,7 @@ GLIDER = MappingProxyType({"m": "measured", "c": "commanded"})
 
 PHRASES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        TIME: ("time", "timestamp", "stamp", "utc", "seconds", "datetime", "epoch", "zeit", "uhrzeit", "datenum"),
+        TIME: ("time", "timestamp", "stamp", "utc", "seconds", "datetime", "epoch", "zeit", "uhrzeit", "datenum", "elapsed"),
         "yaw_rate_rad_s": (
             "yaw rate",
             "yawrate",

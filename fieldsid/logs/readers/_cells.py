@@ -5,14 +5,23 @@ from __future__ import annotations
 import csv
 import re
 
-from fieldsid.logs.convert.clock_text import CLOCK, DATE
+from fieldsid.logs.convert.times.clock_text import CLOCK
+from fieldsid.logs.convert.times.dates import DATE
 
 _NUMBER = re.compile(r"^[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?$")
 _COMMA_NUMBER = re.compile(r"^[+-]?(\d+,\d+|\d+)([eE][+-]?\d+)?$")
 _DATE = re.compile(
     rf"^(\d{{4}}-\d\d-\d\d([T ]\d\d:\d\d(:\d\d(\.\d*)?)?)?(Z|[+-]\d\d:?\d\d)?|{DATE.pattern}|({DATE.pattern} )?{CLOCK.pattern})$"
 )
-MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "-nan", "infinity", "-"})
+ERRORS = re.compile(
+    rb"(?<![^,;\t|\n\" ])(?:#(?:N/A|VALUE!|DIV/0!|REF!|NAME\?|NUM!|NULL!)(?=[,;\t|\r\n\" ]|$)|#{3,}(?=\"? *[,;\t|])"
+    rb"|-?\d+\.#(?:QNAN|SNAN|IND|INF)\d*)"
+)
+"""Cells in which a spreadsheet or a C library says that there is no number, which are no comments."""
+MISSING = frozenset({
+    "", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "-nan", "infinity", "-", "--", "---", "nan(ind)", "-nan(ind)",
+    "nan(snan)", "#n/a", "#value!", "#div/0!", "#ref!", "#name?", "#num!", "#null!",
+})  # fmt: skip
 COMMENTS = "#%"
 
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.errors import FieldsidError
+from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import Source
-from fieldsid.logs.convert.clock_text import DAY_S, clock_of_text, days_of
-from fieldsid.logs.convert.time_column import likely_time_unit, seconds_of
+from fieldsid.logs.convert.conditioning import in_order
+from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
+from fieldsid.logs.convert.times.time_column import likely_time_unit
 from fieldsid.logs.mapping.canonical_names import TIME, unit_in_name
 from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
 from fieldsid.logs.reader import ReadOptions
-from fieldsid.logs.readers._columns import Columns, is_counter
+from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
+from fieldsid.logs.readers._columns import Columns, is_counter, time_of
+from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
 MOSTLY = 0.9
@@ -31,15 +34,15 @@ OF_WEEK = (
     frozenset({"week", "time"}),
 )
 WEEKS = frozenset({"week", "wn", "wk", "gwk", "gpsweek"})
-DATES = frozenset({"date", "day", "datum"})
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The time of a table's rows (n,) in s, NaN where they have none, and the column it is from, with what reads it."""
+    """The time of a table's rows (n,) in s, NaN where they have none, the column it is from and how it is read, and notes."""
 
     time: FloatArray
     source: Source
+    notes: tuple[Note, ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -58,35 +61,52 @@ class Clock:
 
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     """Return the clock of a table, by its mapping or by the names of its columns; None where no column goes on like time."""
-    if known is not None and known.column is not None:
+    if known is not None and known.places:
         return _tried(columns, known)
     named = (_tried(columns, source) for source in _named(columns))
     return next((clock for clock in named if clock is not None), None) or _by_numbers(columns)
 
 
+def why_no_clock(columns: Columns) -> tuple[Source, FieldsidError] | None:
+    """Return the column that is surest called a time and why it is none, where it is none; None where no column is called so."""
+    for source in _named(columns):
+        first = columns.index(source.places[0], TIME)
+        try:
+            time, _ = time_of(columns, source, source.unit, ReadOptions())
+            in_order(time, f"column `{columns.name(first)}`", ReadOptions())
+        except FieldsidError as error:
+            return source, LogError(error.what, found=error.found, hint="check that this is the time, and how it is written")
+    return None
+
+
 def _named(columns: Columns) -> Iterator[Source]:
-    """Yield the columns that are called a time, the surest first, with the dates or weeks beside them."""
+    """Yield the columns that are called a time, the surest first, with the dates or weeks beside them, and parts of one."""
     meanings = [(i, meaning_of(name), set(words_of(name))) for i, name in enumerate(columns.names)]
     weeks = next((i for i, _, words in meanings if words & WEEKS), None)
     if weeks is not None:
         for i, _, words in meanings:
             if i != weeks and any(of <= words for of in OF_WEEK):
-                yield Source(column=_place(columns, i), unit=columns.unit(i, TIME), week=_place(columns, weeks))
-    dates = next((i for i, _, words in meanings if words & DATES and not words & {"time"}), None)
-    for i in sorted((i for i, meaning, _ in meanings if meaning and meaning[0] == TIME), key=lambda i: -meanings[i][1][1]):  # type: ignore[index]
-        yield _source(columns, i, dates)
+                yield Source(column=columns.place(i), unit=columns.unit(i, TIME), week=columns.place(weeks))
+    surest = sorted((-meaning[1], i) for i, meaning, _ in meanings if meaning is not None and meaning[0] == TIME)
+    together = list(clocks_in_parts(columns))
+    parts = {columns.index(c, TIME) for source in together for c in source.columns}
+    yield from (_source(columns, i) for _, i in surest if i not in parts)
+    yield from together
+    yield from (_source(columns, i) for _, i in surest if i in parts)
     for i, _, words in meanings if weeks is None else ():
         if any(of <= words for of in OF_WEEK):
-            yield _source(columns, i, None)
+            yield _source(columns, i)
+    yield from (Source(column=columns.place(i), unit=unit) for i, unit in elapsed(columns))
 
 
-def _source(columns: Columns, index: int, dates: int | None) -> Source:
-    """Return how a column of time is read: its unit, or the column of its days where it is a clock that counts all of one."""
-    cells, place = columns.take(index), _place(columns, index)
-    if cells.dtype.kind == "O" and dates is not None:
+def _source(columns: Columns, index: int) -> Source:
+    """Return how a column of time is read: its unit, or the columns of its days where it is a clock that counts all of one."""
+    cells, place = columns.take(index), columns.place(index)
+    if cells.dtype.kind == "O":
         clock = clock_of_text(cells)
-        if clock is not None and clock.period_s == DAY_S and days_of(columns.take(dates)) is not None:
-            return Source(column=place, date=_place(columns, dates))
+        date = dates_beside(columns, (index,)) if clock is not None and clock.period_s == DAY_S else ()
+        if date:
+            return Source(column=place, date=tuple(map(columns.place, date)))
     unit = columns.unit(index, TIME) or _unit_by_size(cells)
     return Source(column=place, unit=unit)
 
@@ -95,24 +115,19 @@ def _unit_by_size(cells: npt.NDArray[Any]) -> str | None:
     if cells.dtype.kind not in "iuf" or not cells.size:
         return None
     steps = np.diff(cells[np.isfinite(cells)].astype(np.float64))
-    return likely_time_unit(cells, float(np.median(steps)) if steps.size else 0.0)
-
-
-def _place(columns: Columns, index: int) -> str | int:
-    """Return the name of a column, or its place where it has none of its own."""
-    name = columns.name(index)
-    return name if columns.names.count(name) == 1 else index
+    ahead = steps[steps > 0.0]  # of stamps with too few digits most do not go on
+    return likely_time_unit(cells, float(np.median(ahead)) if ahead.size else 0.0)
 
 
 def _tried(columns: Columns, source: Source) -> Clock | None:
-    index = columns.index(source.column if source.column is not None else 0, TIME)
-    cells = columns.take(index)
-    beside = [None if c is None else columns.take(columns.index(c, TIME)) for c in (source.date, source.week)]
+    """Return the clock that a source gives; None where it is no time, or does not go on."""
+    first = columns.index(source.places[0], TIME)
+    cells = columns.take(first)
     if not cells.size:
         return None
-    unit = source.unit or unit_in_name(columns.name(index), TIME) or _unit_by_size(cells)
+    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or _unit_by_size(cells)
     try:
-        time, _ = seconds_of(cells, unit, ReadOptions(salvage=True), name=columns.name(index), dates=beside[0], weeks=beside[1])
+        time, _ = time_of(columns, source, unit, ReadOptions(salvage=True))
     except FieldsidError:  # what is no time is not taken for one
         return None
     time = time if source.scale is None else time * source.scale
@@ -125,12 +140,19 @@ def _by_numbers(columns: Columns) -> Clock | None:
     for i in range(columns.width):
         cells = columns.take(i)
         name = columns.names[i] if columns.names else ""
-        if meaning_of(name) is not None or is_counter(name) or cells.dtype.kind not in "iuf" or cells.size < 3:
+        if meaning_of(name) is not None or cells.dtype.kind not in "iufM" or cells.size < 3:
             continue
-        clock = _tried(columns, Source(column=_place(columns, i), unit=_unit_by_size(cells)))
+        if is_counter(name) and cells.dtype.kind != "M":
+            continue
+        clock = _tried(columns, Source(column=columns.place(i), unit=_unit_by_size(cells)))
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])
         if float(np.std(steps)) < REGULAR * float(np.mean(steps)):
-            return clock
+            return replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
     return None
+
+
+def _guessed(name: str, unit: str | None) -> tuple[Note, ...]:
+    message = f"no column is called a time: `{name}` goes on by even steps, taken in {unit or 's'} by their size; check its unit"
+    return (Note("time_guessed", message, {"column": name, "unit": unit}),)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
-from fieldsid.logs.convert.time_column import seconds_of
+from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
 from fieldsid.logs.mapping.canonical_names import TIME, Canonical, canonical, stated_unit, unit_in_name
 from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
@@ -79,6 +79,11 @@ class Columns:
         """Return a column's name, or its index as text."""
         return self.names[index] if self.names else str(index)
 
+    def place(self, index: int) -> str | int:
+        """Return the name of a column, or its place where it has none of its own."""
+        name = self.name(index)
+        return name if self.names.count(name) == 1 else index
+
     def unit(self, index: int, signal: str) -> str | None:
         """Return the unit that a column states for a signal, in its name or in the row of units; None where none fits."""
         return unit_in_name(self.name(index), signal) or (stated_unit(self.units[index], signal) if self.units else None)
@@ -129,8 +134,7 @@ def own_map_of(names: Sequence[str]) -> ChannelMap | None:
 
 def used_by(mapping: ChannelMap, names: Sequence[str], width: int) -> set[int]:
     """Return the indexes of the columns that a mapping names, as far as a table has them."""
-    named = [c for s in mapping.sources.values() for c in (s.column, *s.columns)]
-    named += [mapping.time.column, mapping.time.date, mapping.time.week] if mapping.time else []
+    named = [c for s in (*mapping.sources.values(), *([mapping.time] if mapping.time else [])) for c in s.places]
     indexes = {c for c in named if isinstance(c, int) and 0 <= c < width}
     return indexes | {i for i, name in enumerate(names) if name in named}
 
@@ -178,7 +182,7 @@ def is_counter(name: str) -> bool:
 
 
 def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
-    if mapping.time is None or mapping.time.column is None:
+    if mapping.time is None or not mapping.time.places:
         guessed = [name for name in columns.names if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
         likely = guessed[0] if guessed else "COLUMN" if columns.names else "0"
         # Without a file the mapping came from `--channel`.
@@ -192,11 +196,26 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
             found=columns.shown(),
             hint=way or f"add `--channel {quote(f'time={likely}:s')}`",
         )
-    index = columns.index(mapping.time.column, TIME)
-    unit = mapping.time.unit or columns.unit(index, TIME)
-    dates, weeks = (None if c is None else columns.take(columns.index(c, TIME)) for c in (mapping.time.date, mapping.time.week))
-    time, notes = seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
+    time, notes = time_of(columns, mapping.time, mapping.time.unit, options)
     return time if mapping.time.scale is None else time * mapping.time.scale, notes
+
+
+def time_of(columns: Columns, source: Source, unit: str | None, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
+    """Return the time (n,) in s of a table's rows, from one column or put together from several, and notes.
+
+    Raises LogError and MappingError, see seconds_of.
+    """
+    dated = [columns.index(c, TIME) for c in source.date]
+    dates = [columns.take(i) for i in dated]
+    if source.columns:
+        places = [columns.index(c, TIME) for c in source.columns]
+        names, date_names = [columns.name(i) for i in places], [columns.name(i) for i in dated]
+        parts = [columns.take(i) for i in places]
+        return seconds_of_parts(parts, unit, options, names=names, dates=dates, date_names=date_names)
+    index = columns.index(source.column if source.column is not None else 0, TIME)
+    weeks = None if source.week is None else columns.take(columns.index(source.week, TIME))
+    unit = unit or columns.unit(index, TIME)
+    return seconds_of(columns.take(index), unit, options, name=columns.name(index), dates=dates, weeks=weeks)
 
 
 def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns, list[Note]]:
@@ -204,9 +223,9 @@ def _without_blank_rows(columns: Columns, mapping: ChannelMap) -> tuple[Columns,
 
     Such are a last line of separators alone, and what was written between the rows.
     """
-    if mapping.time is None or mapping.time.column is None:
+    if mapping.time is None or not mapping.time.places:
         return columns, []
-    place = columns.index(mapping.time.column, TIME)
+    place = columns.index(mapping.time.places[0], TIME)
     times = columns.take(place)
     if times.dtype.kind not in "fO" or not times.size:
         return columns, []
@@ -257,9 +276,8 @@ def _numbers(columns: Columns, index: int, signal: str, bad: list[Note], options
 
 
 def _ignored(columns: Columns, mapping: ChannelMap) -> list[Note]:
-    used = {s.column for s in mapping.sources.values()} | {c for s in mapping.sources.values() for c in s.columns}
-    used |= {mapping.time.column, mapping.time.date, mapping.time.week} if mapping.time else set()
-    extra = [name for i, name in enumerate(columns.names) if name not in used and i not in used]
+    used = used_by(mapping, columns.names, columns.width)
+    extra = [name for i, name in enumerate(columns.names) if i not in used]
     if not extra:
         return []
     shown = ", ".join(extra[:6]) + (", ..." if len(extra) > 6 else "")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from fieldsid.logs.convert.units import find_unit
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.readers._cells import COMMENTS, cells, is_number_or_date
@@ -14,6 +16,10 @@ OTHER_UNITS = frozenset({
 """Units of what is no signal here, as rows of units state them."""
 
 
+_RULE = re.compile(r"^[\s|+:=-]*[-=]{2,}[\s|+:=-]*$")
+"""A line drawn below the names."""
+
+
 def header_of(
     lines: list[str], at: int, first: int, separator: str, width: int, *, asked: bool | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -22,7 +28,7 @@ def header_of(
     if asked is False:
         return (), ()
     for i in range(at - 1, max(first, 0) - 1, -1):
-        if not lines[i].strip():
+        if not lines[i].strip() or _RULE.match(lines[i]):
             continue
         names = _names(lines[i], separator, width)
         if names and not units and _state_units(names) and any(_names(up, separator, width) for up in lines[max(first, 0) : i]):
@@ -53,6 +59,8 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
     """Return a header line's names when it has one word for each column, else nothing."""
     bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
     names = cells(bare, separator)
+    if len(names) != width and separator == "whitespace":
+        names = [n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())]  # names of several words, further apart than these
     if len(names) != width and bare != line:
         names = _by_blanks(bare)
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):

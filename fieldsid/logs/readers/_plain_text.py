@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import io
+import re
 import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -24,6 +25,8 @@ GZIP = b"\x1f\x8b"
 HEAD = LONGEST_ROW
 """Bytes at the start of a table that tell how it is written."""
 PIECE_BYTES = 1 << 20
+LONGEST_CELL = 64
+"""Bytes that a cell looked for may have before a piece of the text."""
 _SMALL_PIECE = 512
 """Bytes of a gzip stream that are unpacked at once: what a damaged one still gives is known to as many."""
 
@@ -59,6 +62,14 @@ class PlainText:
     def count(self, what: bytes, begin: int, end: int) -> int:
         """Return how often a byte stands between two places."""
         return sum(self._piece(at, min(PIECE_BYTES, end - at)).count(what) for at in range(begin, end, PIECE_BYTES))
+
+    def holds(self, what: re.Pattern[bytes], begin: int, end: int) -> bool:
+        """Whether a cell of an expression that begins with `#`, or holds one, stands between two places."""
+        pieces = (
+            self._piece(max(begin, at - LONGEST_CELL), min(PIECE_BYTES + LONGEST_CELL, end - at))
+            for at in range(begin, end, PIECE_BYTES)
+        )
+        return any(b"#" in piece and what.search(piece) is not None for piece in pieces)
 
     def is_blank(self) -> bool:
         """Whether there is nothing but white space."""

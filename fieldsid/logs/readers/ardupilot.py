@@ -10,7 +10,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.convert.time_column import YEARS_S
+from fieldsid.logs.convert.times.time_column import YEARS_S
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
 from fieldsid.logs.run import Note

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._cells import MISSING, cells, has_number, is_word
-from fieldsid.logs.readers._clock import Clock, clock_of
+from fieldsid.logs.readers._cells import ERRORS, MISSING, cells, has_number, is_word
+from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
@@ -53,7 +53,9 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         )
         duration = clock.duration_s if clock else float("nan")
         samples = samples_of(columns, clock.time, clock.source) if clock else None
-        return Inventory(path, "text table", duration, channels, found, tuple(table.notes), samples)
+        notes = (*table.notes, *(clock.notes if clock else ()))
+        problem = why_no_clock(columns) if clock is None and options.clock is None else None
+        return Inventory(path, "text table", duration, channels, found, notes, samples, no_clock=problem)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -133,13 +135,32 @@ class _Table:
 
     def _cells(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
         """Return the cells (n,) of the wanted columns; lines of words that do not fit the columns are left out."""
-        try:
-            return self._parsed(wanted)
-        except LogError:
-            with TemporaryFile() as plain:
+        with TemporaryFile() as blanked, TemporaryFile() as plain:
+            if self.text.holds(ERRORS, self.begin, self.end):
+                self._without_errors(blanked)
+            try:
+                return self._parsed(wanted)
+            except LogError:
                 if not self._without_words(plain):
                     raise
                 return self._parsed(wanted)
+
+    def _without_errors(self, plain: IO[bytes]) -> None:
+        """Copy the rows, with an empty cell for each in which a program says that there is no number."""
+        count, first = 0, b""
+        with self.text.between(self.begin, self.end) as rows:
+            for raw in rows:
+                found = ERRORS.findall(raw) if b"#" in raw else []
+                count, first = count + len(found), first or (found[0] if found else b"")
+                plain.write(ERRORS.sub(b"", raw) if found else raw)
+        self._turn_to(plain)
+        message = f"cells that say there is no number, as {first.decode()!r}, taken as missing: {count}"
+        self.notes.append(Note("error_cells", message, {"count": count}))
+
+    def _turn_to(self, plain: IO[bytes]) -> None:
+        """Read the rows from a copy of them."""
+        self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
+        self.begin, self.end = 0, plain.tell()
 
     def _without_words(self, plain: IO[bytes]) -> bool:
         """Copy the rows, with an empty line for each line without a number that is no row; return whether there was one."""
@@ -150,8 +171,7 @@ class _Table:
                 is_row = not line or line.startswith("#") or has_number(line, self.form.separator, self.form.decimal)
                 plain.write(raw if is_row else b"\n")
                 found += [] if is_row else [line]
-        self.text = replace(self.text, stream=plain, size=plain.tell(), encoding=self.text.encoding.removesuffix("-sig"))
-        self.begin, self.end = 0, plain.tell()
+        self._turn_to(plain)
         message = f"lines of words between the rows, left out: {len(found)}, the first {found[0][:60]!r}" if found else ""
         self.notes += [Note("text_rows", message, {"count": len(found)})] if found else []
         return bool(found)

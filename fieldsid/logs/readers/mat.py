@@ -14,7 +14,7 @@ import numpy as np
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._clock import clock_of
+from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
@@ -133,7 +133,9 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         for name, values in ((n, columns.take(i)) for i, n in enumerate(columns.names))
     )
     samples = samples_of(columns, clock.time, clock.source) if clock else None
-    return Inventory(path, "MATLAB file", clock.duration_s if clock else float("nan"), channels, samples=samples)
+    problem = why_no_clock(columns) if clock is None and options.clock is None else None
+    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
+    return Inventory(path, "MATLAB file", duration, channels, notes=notes, samples=samples, no_clock=problem)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

@@ -13,7 +13,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
-from fieldsid.logs.readers._clock import clock_of
+from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.run import SIGNALS, Note
@@ -47,7 +47,9 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         first = cells[:3].astype(str) if cells.dtype.kind == "M" else cells[:3]
         channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist())),)))
     samples = samples_of(columns, clock.time, clock.source) if clock else None
-    return Inventory(path, "Parquet table", clock.duration_s if clock else float("nan"), tuple(channels), samples=samples)
+    problem = why_no_clock(columns) if clock is None and options.clock is None else None
+    duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
+    return Inventory(path, "Parquet table", duration, tuple(channels), notes=notes, samples=samples, no_clock=problem)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

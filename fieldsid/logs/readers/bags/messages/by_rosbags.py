@@ -31,8 +31,11 @@ from fieldsid.logs.readers.bags.messages.message_layout import (
 )
 from fieldsid.logs.readers.bags.packets import ROS1, Collector, Connection, UnknownFormError
 
-FAILURES = (Ros1ReaderError, Ros2ReaderError, SerdeError, TypesysError, AssertionError, KeyError, ValueError, IndexError, OSError)
-"""What rosbags raises on a file it cannot read; it asserts and indexes where a file breaks its rules."""
+FAILURES = (
+    Ros1ReaderError, Ros2ReaderError, SerdeError, TypesysError, AssertionError, KeyError, ValueError, IndexError, OSError,
+    OverflowError, MemoryError,
+)  # fmt: skip
+"""What rosbags raises on a file it cannot read; it asserts, indexes and believes any length where a file breaks its rules."""
 _LANGUAGES = {MessageDefinitionFormat.MSG: "msg", MessageDefinitionFormat.IDL: "idl"}
 _FLOAT = np.dtype("<f8")
 

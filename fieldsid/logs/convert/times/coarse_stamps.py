@@ -11,11 +11,14 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray
 
 FEWEST = 10
+WORN_OUT = 0.05
+"""Share of a last digit that a number's last bit may be worth, above which any number would pass for whole."""
 DIGITS = range(2, 8)
 DECIMALS = range(-9, 9)
 WITHIN = 1.0 + 1e-6
@@ -36,7 +39,8 @@ IN_TURN = 0.9
 def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
     """Return times (n,) with too few digits at the logger's even steps, and the note that says so; else as they are.
 
-    `time` is in the column's own unit, from its own zero: its digits tell what it was rounded to.
+    `time` is in the column's own unit, from its own zero: its digits tell what it was rounded to. A row whose time is missing
+    counts as a step, where that explains the others.
     """
     seen = np.flatnonzero(np.isfinite(time))
     stamps = time[seen]
@@ -47,7 +51,7 @@ def rebuilt(time: FloatArray, name: str) -> tuple[FloatArray, list[Note]]:
     for last in _last_digits(stamps):
         if not shared and float(np.median(last)) < ROUGH * float(np.median(steps)):
             continue
-        even = _even(stamps, last)
+        even = next((e for rows in (seen, np.arange(seen.size)) if (e := _even(stamps, last, rows)) is not None), None)
         if even is not None:
             if not shared and float(np.max(np.abs(even - stamps))) < SAME * float(np.median(steps)):
                 return time, []
@@ -82,34 +86,38 @@ def _last_digits(stamps: FloatArray) -> list[FloatArray]:
             found.append(unit)
             break
     for decimals in DECIMALS:
-        if _whole((stamps - stamps[0]) * 10.0**decimals):
+        if _whole((stamps - stamps[0]) * 10.0**decimals, float(np.spacing(size.max())) * 10.0**decimals):
             found.append(np.full(stamps.size, 10.0**-decimals))
             break
+    steps = np.diff(stamps)
+    ahead = steps[steps > 0.0]
+    if FEWEST <= ahead.size <= 0.5 * steps.size and _whole(ahead / (least := float(ahead.min()))):
+        found.append(np.full(stamps.size, least))  # samples that were sent together have the stamp of their message
     return found
 
 
-def _whole(numbers: FloatArray) -> bool:
-    """Whether numbers are whole, and not all zero for being counted in too large a unit."""
-    return bool(np.abs(numbers).max() >= 1.0) and bool(
-        np.all(np.abs(numbers - np.round(numbers)) <= 1e-6 + 1e-12 * np.abs(numbers))
-    )
+def _whole(numbers: FloatArray, last_bit: float = 0.0) -> bool:
+    """Whether numbers are whole within what their last bit is worth, and not all zero for being counted in too large a unit."""
+    if not bool(np.abs(numbers).max() >= 1.0) or last_bit > WORN_OUT:
+        return False
+    return bool(np.all(np.abs(numbers - np.round(numbers)) <= 1e-6 + last_bit + 1e-12 * np.abs(numbers)))
 
 
-def _even(stamps: FloatArray, last: FloatArray) -> FloatArray | None:
-    """Return the even steps (n,) of each stretch between gaps; None where one has none."""
+def _even(stamps: FloatArray, last: FloatArray, rows: npt.NDArray[np.intp]) -> FloatArray | None:
+    """Return the even steps (n,) of each stretch between gaps, of stamps in these rows (n,); None where one has none."""
     whole, steps = np.empty_like(stamps), np.diff(stamps)
     usual = float(np.mean(steps[steps <= np.percentile(steps, MOST)]))
     gaps = [int(i) + 1 for i in np.flatnonzero(steps > 2.0 * last[1:] + GAP_STEPS * usual)]
     for begin, end in pairwise([0, *gaps, stamps.size]):
-        part = _of_stretch(stamps[begin:end], last[begin:end], usual)
+        part = _of_stretch(stamps[begin:end], last[begin:end], usual, rows[begin:end] - rows[begin])
         if part is None:
             return None
         whole[begin:end] = part
     return whole if bool((np.diff(whole) > 0.0).all()) else None
 
 
-def _of_stretch(stamps: FloatArray, last: FloatArray, usual: float) -> FloatArray | None:
-    count = np.arange(stamps.size, dtype=np.float64)
+def _of_stretch(stamps: FloatArray, last: FloatArray, usual: float, rows: npt.NDArray[np.intp]) -> FloatArray | None:
+    count = rows.astype(np.float64)
     if stamps[-1] - stamps[0] < SHORT * last[-1]:
         even = stamps[0] + usual * count
     else:

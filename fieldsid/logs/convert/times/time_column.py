@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.clock_text import (
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.times.clock_parts import PLUS, clock_of_parts, parts_of, put_together
+from fieldsid.logs.convert.times.clock_text import (
     DAY_S,
     FORMS,
     HOUR_S,
+    STAMP,
     WEEK_S,
     Clock,
     clock_of_digits,
+    clock_of_stamps,
     clock_of_text,
-    days_of,
     going_on,
     lost_hours,
     stamps_of_text,
 )
-from fieldsid.logs.convert.coarse_stamps import rebuilt
-from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.times.coarse_stamps import rebuilt
+from fieldsid.logs.convert.times.dates import days_of_columns
+from fieldsid.logs.convert.times.starting_again import FEW_STEPS, gone_on, round_of
 from fieldsid.logs.convert.units import UNITS, pick_unit
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.run import Note
@@ -41,21 +46,21 @@ def seconds_of(
     options: ReadOptions | None = None,
     *,
     name: str,
-    dates: npt.NDArray[Any] | None = None,
+    dates: Sequence[npt.NDArray[Any]] = (),
     weeks: npt.NDArray[Any] | None = None,
 ) -> tuple[FloatArray, list[Note]]:
     """Return a time column (n,) in s, and notes.
 
     Numbers are in `unit` (seconds when None); text is ISO 8601, taken as UTC, a date and a clock, or a clock, to which `dates`
-    are the days and `unit` may say the form: `hh:mm:ss`, `mm:ss`, `hh:mm`, `hhmmss`. `weeks` are GPS weeks beside the time of
-    the week. A time that counts from an epoch or from midnight starts at zero, and the note `time_origin` keeps its start.
-    Stamps with too few digits are rebuilt, see coarse.py. Cells that are no times become NaN when salvaging. Raises LogError
-    for a cell that is no time, and MappingError for a unit that is not one of time.
+    are the days (one column, or year, month and day) and `unit` may say the form, see FORMS.
+    `weeks` are GPS weeks beside the time of the week. A time that counts from an epoch or from midnight starts at zero, and the
+    note `time_origin` keeps its start. Stamps with too few digits are rebuilt, see coarse_stamps.py. Cells that are no times
+    become NaN when salvaging. Raises LogError for a cell that is no time, and MappingError for a unit that is not one of time.
     """
     options = options or ReadOptions()
     if cells.size == 0:
         raise LogError("the table has no rows", found=f"only the header, with column `{name}`", hint=COPY_AGAIN)
-    if unit in FORMS or (dates is not None and cells.dtype.kind == "O"):
+    if unit in FORMS or (dates and cells.dtype.kind == "O"):
         return _of_clock(cells, unit if unit in FORMS else None, name, options, dates)
     if cells.dtype.kind == "M":
         return _of_integers(cells.astype("datetime64[ns]").astype(np.int64), 1e-9, name)
@@ -66,6 +71,29 @@ def seconds_of(
     if cells.dtype.kind == "f":
         return _of_floats(cells.astype(np.float64), _factor(unit), name, options)
     return _of_text(cells, unit, name, options)
+
+
+def seconds_of_parts(
+    columns: Sequence[npt.NDArray[Any]],
+    form: str | None,
+    options: ReadOptions | None = None,
+    *,
+    names: Sequence[str],
+    dates: Sequence[npt.NDArray[Any]] = (),
+    date_names: Sequence[str] = (),
+) -> tuple[FloatArray, list[Note]]:
+    """Return the time (n,) in s that several columns make up, and notes; `form` names the part of each, as `hh+mm+ss`.
+
+    Raises MappingError for a form that does not fit, LogError for a row that lacks a part.
+    """
+    options = options or ReadOptions()
+    if columns[0].size == 0:
+        raise LogError("the table has no rows", found=f"only the header, with column `{names[0]}`", hint=COPY_AGAIN)
+    parts = parts_of(form, names)
+    clock = clock_of_parts(columns, parts)
+    name = PLUS.join(names)
+    time, notes = _going_on(clock, clock.seconds, name, options, dates)
+    return time, [put_together(names, parts, date_names if dates else ()), *notes]
 
 
 def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
@@ -81,6 +109,8 @@ def likely_time_unit(cells: npt.NDArray[Any], step: float = 0.0) -> str | None:
     seen = cells[np.isfinite(cells)]
     if _are_digits_of_a_clock(seen):
         return "hhmmss"
+    if any(low <= size < high for low, high in STAMPS):
+        return STAMP
     if YEARS_S[0] < size < YEARS_S[1] and bool((seen != np.round(seen)).any()):
         return "s"
     return epoch or unit_of_step(step) or "s"
@@ -98,8 +128,8 @@ def _are_digits_of_a_clock(seen: npt.NDArray[Any]) -> bool:
     return bool(full.any() and (jumps >= 40.0).all() and (np.abs(steps[full]) <= FEW_STEPS * np.median(steps)).all())
 
 
-FEW_STEPS = 5.0
-"""Steps of a clock that may be missing at a full minute."""
+STAMPS = ((1.97e13, 2.12e13), (1.97e16, 2.12e16))
+"""Dates and times of a log as one number, with milliseconds or without: ms and us since 1970 are of another size until 2500."""
 
 
 def _are_days(size: float, step: float) -> bool:
@@ -137,7 +167,7 @@ def _factor(unit: str | None) -> float:
 
 def _of_integers(values: npt.NDArray[np.int64], factor: float, name: str) -> tuple[FloatArray, list[Note]]:
     """Subtract the start before scaling, so that nanoseconds of an epoch keep every digit."""
-    if _starts_again(values, factor):
+    if round_of(values, factor) is not None:
         return _of_floats(values.astype(np.float64), factor, name, ReadOptions())
     start = int(values[0])
     time, notes = rebuilt((values - start).astype(np.float64), name)
@@ -152,26 +182,16 @@ def _of_floats(values: FloatArray, factor: float, name: str, options: ReadOption
     if missing.size:
         notes.append(_no_times(missing, values, name, options))
         values = np.where(np.isin(np.arange(values.size), missing), np.nan, values)
-    if _starts_again(values[np.isfinite(values)], factor):
-        values, weeks = going_on(values, WEEK_S / factor)
-        notes.append(Note("weeks", f"`{name}` starts again with the week {weeks} time{'s' * (weeks != 1)}", {"count": weeks}))
+    again = round_of(values[np.isfinite(values)], factor)
+    if again is not None:
+        values, note = gone_on(values, again, name)
+        notes.append(note)
     values, coarse = rebuilt(values, name)
     seen = values[np.isfinite(values)]
     start = float(seen[0]) if seen.size else 0.0
     if start * factor <= EPOCH_FROM_S:
         return _scaled(values, factor), [*notes, *coarse]
     return _scaled(values - start, factor), [*notes, *coarse, _origin(start * factor)]
-
-
-def _starts_again(values: npt.NDArray[Any], factor: float) -> bool:
-    """Whether a time of the week falls back by most of one, within a week's numbers: the next week has begun."""
-    if values.size < 2 or float(values.min()) < 0.0 or float(values.max()) * factor > WEEK_S:
-        return False
-    return bool((np.diff(values) * factor < -OF_A_WEEK * WEEK_S).any())
-
-
-OF_A_WEEK = 0.99
-"""Share of a week by which its time falls back when the next one begins."""
 
 
 def _scaled(values: FloatArray, factor: float) -> FloatArray:
@@ -193,8 +213,10 @@ def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: Read
         if other is not None:
             return _from_start(other, cells, name, options)
         if clock_of_text(cells) is not None:
-            return _of_clock(cells, None, name, options, None)
+            return _of_clock(cells, None, name, options, ())
     missing = np.flatnonzero(np.isnat(stamps))
+    if missing.size == cells.size and wrong.size < cells.size:
+        raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)
     notes = [_no_times(missing, cells, name, options)] if missing.size else []
     nanoseconds = stamps.astype(np.int64)
     start = int(nanoseconds[~np.isnat(stamps)][0]) if missing.size < cells.size else 0
@@ -203,22 +225,27 @@ def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: Read
 
 
 def _of_clock(
-    cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions, dates: npt.NDArray[Any] | None
+    cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions, dates: Sequence[npt.NDArray[Any]]
+) -> tuple[FloatArray, list[Note]]:
+    return _going_on(_clock(cells, form, name, options), cells, name, options, dates)
+
+
+def _going_on(
+    clock: Clock, cells: npt.NDArray[Any], name: str, options: ReadOptions, dates: Sequence[npt.NDArray[Any]]
 ) -> tuple[FloatArray, list[Note]]:
     """Return a clock's time, midnights and full hours passed over; dates count the days where the clock counts all of one."""
-    clock = _clock(cells, form, name, options)
-    days = None if dates is None or clock.period_s != DAY_S else days_of(dates)
+    days = days_of_columns(dates) if dates and clock.period_s == DAY_S else None
     if days is not None:
         return _from_start(clock.seconds + DAY_S * days, cells, name, options)
     seconds, rounds = going_on(clock.seconds, clock.period_s)
-    time, notes = _from_start(seconds, cells, name, options, is_of_day=True)
-    return time, [*notes, lost_hours(name, rounds)] if clock.period_s == HOUR_S else notes
+    time, notes = _from_start(seconds, cells, name, options, is_of_day=np.isfinite(clock.period_s))
+    return time, [*notes, lost_hours(name, rounds, clock.period_s)] if clock.period_s <= HOUR_S else notes
 
 
 def _clock(cells: npt.NDArray[Any], form: str | None, name: str, options: ReadOptions) -> Clock:
     if form == "hhmmss":
         return clock_of_digits(as_numbers(cells)[0])
-    found = clock_of_text(cells, form)
+    found = clock_of_stamps(cells) if form == STAMP else clock_of_text(cells, form)
     if found is None:
         raise _refused(f"column `{name}` holds cells that are no clock", np.arange(cells.size), cells, options)
     return found

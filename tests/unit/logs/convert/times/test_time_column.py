@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.time_column import likely_time_unit, seconds_of
+from fieldsid.logs.convert.times.time_column import likely_time_unit, seconds_of
 from fieldsid.logs.reader import ReadOptions
 
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.errors import LogError
-from fieldsid.logs.convert.clock_text import days_of
-from fieldsid.logs.convert.time_column import GPS_EPOCH_S, seconds_of
+from fieldsid.logs.convert.times.dates import days_of
+from fieldsid.logs.convert.times.time_column import GPS_EPOCH_S, seconds_of
 
 
 def of(cells, unit=None, **more):
@@ -49,7 +49,7 @@ def test_a_clock_in_digits_is_read_where_the_mapping_says_so():
 )
 def test_a_date_in_a_column_of_its_own_counts_the_days(days):
     dates = np.array([days[0], days[1], days[1]], dtype=object)
-    found, _ = of(["23:59:59", "00:00:01", "18:00:00"], dates=dates)
+    found, _ = of(["23:59:59", "00:00:01", "18:00:00"], dates=[dates])
     assert found.tolist() == [0.0, 2.0, 64801.0]
 
 

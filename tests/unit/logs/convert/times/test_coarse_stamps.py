@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fieldsid.logs.convert.coarse_stamps import rebuilt
-from fieldsid.logs.convert.time_column import seconds_of
+from fieldsid.logs.convert.times.coarse_stamps import rebuilt
+from fieldsid.logs.convert.times.time_column import seconds_of
 
 
 def digits(time, count):

@@ -1,0 +1,1 @@
+"""Times of a table as seconds that go on."""

@@ -1,0 +1,111 @@
+"""A time whose parts are columns of their own: `hours`, `minutes` and `seconds`, `hhmm` and `seconds`, `secs` and `nsecs`.
+
+A form names the part of each column, as `hh+mm+ss`: the time is their sum. Of a clock in parts the lower one falls back where
+the higher goes on by one, which tells it from columns that are only called so, as the hours that a battery lasts.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import MappingError
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.times.clock_text import DAY_S, FORMS, HOUR_S, MINUTE_S, Clock, clock_of_digits, clock_of_text, going_on
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a number of a column is worth in s, and the s after which the column starts again."""
+
+    worth_s: float
+    period_s: float
+
+
+PARTS: Mapping[str, Part] = MappingProxyType(
+    {
+        "hh": Part(HOUR_S, DAY_S),
+        "mm": Part(MINUTE_S, HOUR_S),
+        "ss": Part(1.0, MINUTE_S),
+        "s": Part(1.0, np.inf),
+        "ds": Part(1e-1, 1.0),
+        "cs": Part(1e-2, 1.0),
+        "ms": Part(1e-3, 1.0),
+        "us": Part(1e-6, 1.0),
+        "ns": Part(1e-9, 1.0),
+        "hhmm": Part(MINUTE_S, DAY_S),
+        **{form: Part(1.0, period) for form, period in FORMS.items()},
+    }
+)
+"""What a column may be of a time that several make up: `s` are seconds that do not start again, `ss` those of a minute."""
+PLUS = "+"
+MOSTLY = 0.9
+"""Share of the places where a part falls back or goes on at which their sum must go on: in a damaged log not at each."""
+
+
+def parts_of(form: str | None, columns: Sequence[str | int], place: str = "the mapping") -> tuple[str, ...]:
+    """Return the part that each column is, of a form as `hh+mm+ss`; raises MappingError where it does not fit."""
+    parts = tuple(part.strip() for part in (form or "").split(PLUS))
+    unknown = [part for part in parts if part not in PARTS]
+    if not unknown and len(parts) == len(columns):
+        return parts
+    usual = PLUS.join(("hh", "mm", "ss", "ms")[: len(columns)] if len(columns) != 2 else ("mm", "ss"))
+    raise MappingError(
+        f"{place}: the unit of a time of {len(columns)} columns says which part of a clock each one is",
+        found="no unit" if form is None else f"no part {unknown[0]!r}" if unknown else f"{len(parts)} parts, {form!r}",
+        hint=f"write, as `time: {{columns: {json.dumps(list(columns))}, unit: {usual}}}`, of: {', '.join(PARTS)}",
+    )
+
+
+def seconds_of_part(cells: npt.NDArray[Any], part: str) -> FloatArray:
+    """Return what a column (n,) adds to a time in s, NaN where a cell is no number."""
+    if part in FORMS:
+        clock = clock_of_text(cells, part) if cells.dtype.kind == "O" and part != "hhmmss" else None
+        return clock.seconds if clock is not None else clock_of_digits(as_numbers(cells)[0]).seconds
+    numbers = as_numbers(cells)[0]
+    if part == "hhmm":
+        return clock_of_digits(100.0 * numbers).seconds
+    worth = PARTS[part].worth_s
+    return numbers * worth if worth >= 1.0 else numbers / round(1.0 / worth)
+
+
+def clock_of_parts(columns: Sequence[npt.NDArray[Any]], parts: Sequence[str]) -> Clock:
+    """Return the clock that several columns (n,) make up, the one that counts longest first."""
+    seconds = sum((seconds_of_part(cells, part) for cells, part in zip(columns, parts, strict=True)), np.zeros(columns[0].size))
+    return Clock(np.asarray(seconds), max(PARTS[part].period_s for part in parts))
+
+
+def carries(upper: FloatArray, lower: FloatArray, upper_period_s: float, lower_period_s: float) -> bool:
+    """Whether one part of a clock (n,) in s goes on where a lower one falls back, and nowhere else but over gaps.
+
+    The upper one is a whole number of the lower's rounds, and the lower lies within one.
+    """
+    seen = np.isfinite(upper) & np.isfinite(lower)
+    high, low = upper[seen] / lower_period_s, lower[seen]
+    if high.size < 2 or bool((np.abs(high - np.round(high)) > 1e-6).any()) or bool((high < 0.0).any()):
+        return False
+    if float(low.min()) < 0.0 or float(low.max()) > lower_period_s:
+        return False
+    steps = np.diff(going_on(upper[seen] + low, upper_period_s)[0])
+    falls, changes = np.diff(low) < -0.5 * lower_period_s, np.diff(high) != 0.0
+    either = falls | changes
+    if not either.any():
+        return True
+    is_slow = float(np.median(steps)) > 0.5 * lower_period_s
+    return float((steps[either] >= 0.0).mean()) >= MOSTLY and (is_slow or 2 * int((falls & changes).sum()) >= int(either.sum()))
+
+
+def put_together(names: Sequence[str], parts: Sequence[str], dates: Sequence[str]) -> Note:
+    """Return the note that says of which columns a time is the sum."""
+    columns = [f"`{name}` ({part})" for name, part in zip(names, parts, strict=True)]
+    days = f", and the days from {', '.join(f'`{name}`' for name in dates)}" if dates else ""
+    message = f"the time is put together from {', '.join(columns)}{days}"
+    return Note("clock_parts", message, {"columns": list(names), "parts": list(parts), "dates": list(dates)})

@@ -1,0 +1,131 @@
+"""Times written as on a clock: `hh:mm:ss.s`, `mm:ss.s` that starts again each hour, dates before or beside them.
+
+What a clock leaves out is put back by its going on: where it falls back by more than half of what it counts to (a day, or an
+hour where a spreadsheet has dropped the hours), the next one has begun.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.times.dates import days_of, texts
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import FloatArray
+
+MINUTE_S, HOUR_S, DAY_S, WEEK_S = 60.0, 3600.0, 86400.0, 604800.0
+STAMP = "yyyymmddhhmmss"
+FORMS = {"hh:mm:ss": DAY_S, "mm:ss": HOUR_S, "hh:mm": DAY_S, "hhmmss": DAY_S, STAMP: np.inf}
+"""How a clock may be written where a mapping says so as the unit of time, and the seconds after which it starts again."""
+CLOCK = re.compile(
+    r"(?:(\d+) days? )?(?:(\d{1,3}):)?(\d{1,3}):(\d{1,2}(?:[.,]\d*|:\d{3})?)"
+    r"\s*(?:([AaPp])\.?[Mm]\.?)?\s*(?:Z|[A-Z]{3,4})?"
+)
+"""Days that have passed, hours, minutes, seconds, half of the day, and a time zone, which all cells share."""
+IN_WORDS = (
+    "%a %b %d %H:%M:%S %Y", "%b %d, %Y %I:%M:%S.%f %p", "%b %d, %Y %I:%M:%S %p", "%b %d, %Y %H:%M:%S.%f", "%b %d, %Y %H:%M:%S",
+    "%a, %d %b %Y %H:%M:%S",
+)  # fmt: skip
+"""Dates in words as the C library, spreadsheets and mail write them."""
+MOSTLY = 0.5
+"""Share of the cells that must be of a form for a column to be taken for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Seconds (n,) that a clock shows, NaN where a cell is none, and those after which it starts again."""
+
+    seconds: FloatArray
+    period_s: float
+
+
+def clock_of_text(cells: npt.NDArray[Any], form: str | None = None) -> Clock | None:
+    """Return what a column of clock readings shows; None where less than half of the cells are readings."""
+    parts = texts(cells).str.extract(f"^{CLOCK.pattern}$")
+    numbers = (parts[i].str.replace(r"[,:]", ".", regex=True) for i in range(4))
+    day, first, second, third = (n.astype("float64").to_numpy(na_value=np.nan) for n in numbers)
+    if np.isfinite(third).mean() <= MOSTLY:
+        return None
+    if form == "hh:mm":
+        return Clock(HOUR_S * second + 60.0 * third, DAY_S)
+    if not np.isfinite(first).any():
+        return Clock(60.0 * second + third, HOUR_S)
+    half_day = parts[4].str.lower().map({"a": 0.0, "p": 12.0}).to_numpy(dtype=np.float64)
+    hours = np.where(np.isfinite(half_day), first % 12.0 + np.nan_to_num(half_day), first)
+    counts_days = bool(np.isfinite(day).any())
+    return Clock(DAY_S * np.nan_to_num(day) + HOUR_S * hours + 60.0 * second + third, np.inf if counts_days else DAY_S)
+
+
+def clock_of_digits(numbers: FloatArray) -> Clock:
+    """Return what readings written as one number show: 142018.5 is 14:20:18.5."""
+    hours, minutes = np.floor(numbers / 1e4), np.floor(numbers / 1e2) % 100.0
+    return Clock(HOUR_S * hours + 60.0 * minutes + numbers % 100.0, DAY_S)
+
+
+def clock_of_stamps(cells: npt.NDArray[Any]) -> Clock | None:
+    """Return the clock of dates and times as one number, as 20240301142018.5, or 20240301142018500 with milliseconds.
+
+    None where less than half are dates.
+    """
+    numbers = cells if cells.dtype.kind in "iu" else as_numbers(cells)[0]
+    worth = 1000 if float(np.nanmax(numbers)) > 1e15 else 1
+    days = days_of(np.floor(numbers / 1e6) if worth == 1 else np.floor(numbers // worth / 1e6))
+    if days is None:
+        return None
+    clock = clock_of_digits((numbers // worth % 1000000).astype(np.float64) if worth > 1 else np.asarray(numbers % 1e6))
+    return Clock(DAY_S * days + clock.seconds + (numbers % worth / worth if worth > 1 else 0.0), np.inf)
+
+
+def going_on(seconds: FloatArray, period_s: float) -> tuple[FloatArray, int]:
+    """Return a clock (n,) that does not start again each `period_s`, and how often it did."""
+    seen = np.isfinite(seconds)
+    steps = np.diff(seconds[seen], prepend=seconds[seen][:1])
+    rounds = np.cumsum(steps < -0.5 * period_s)
+    if not rounds.size or not rounds[-1]:
+        return seconds, 0
+    whole = seconds.copy()
+    whole[seen] += period_s * rounds
+    return whole, int(rounds[-1])
+
+
+def stamps_of_text(cells: npt.NDArray[Any]) -> FloatArray | None:
+    """Return the seconds (n,) since 1970 of cells with a date and a clock in one; None where less than half are."""
+    parts = texts(cells).str.split(r"(?<=\d)[ T_]+(?=\d)", n=1, regex=True, expand=True)
+    if parts.shape[1] == 2:
+        days, clocks = days_of(parts[0].to_numpy(dtype=object)), parts[1].to_numpy(dtype=object)
+        clock = _of_a_day(clocks) if days is not None else None
+        if days is not None and clock is not None:
+            return DAY_S * days + clock.seconds
+    return _in_words(cells)
+
+
+def _of_a_day(cells: npt.NDArray[Any]) -> Clock | None:
+    """Return the clock behind a date, which counts hours whether it tells seconds or not, or is digits alone."""
+    clock = clock_of_text(cells)
+    if clock is not None:
+        return clock if clock.period_s != HOUR_S else clock_of_text(cells, "hh:mm")
+    digits, wrong = as_numbers(cells)
+    return clock_of_digits(digits) if wrong.size < MOSTLY * cells.size else None
+
+
+def _in_words(cells: npt.NDArray[Any]) -> FloatArray | None:
+    """Return the seconds (n,) since 1970 of dates that name the month before the day; None where less than half are."""
+    import pandas as pd
+
+    for form in IN_WORDS:
+        stamps = pd.to_datetime(texts(cells), format=form, errors="coerce").to_numpy(dtype="datetime64[us]")
+        if np.isnat(stamps).mean() < 1.0 - MOSTLY:
+            return np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) / 1e6)
+    return None
+
+
+def lost_hours(name: str, times: int, period_s: float) -> Note:
+    """Return the note that hours, or minutes too, were added to a clock without them."""
+    counts, lacks = ("minutes and seconds", "hour") if period_s == HOUR_S else ("seconds", "minute")
+    again = f"; it starts again {times} time{'s' * (times != 1)}, each taken for the next {lacks}" if times else ""
+    return Note("lost_hours", f"`{name}` counts {counts}, the {lacks} is not in it{again}", {"count": times})

@@ -1,0 +1,126 @@
+"""Dates as days: in one cell with any separator or as digits, or as year, month and day in columns of their own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.numerics.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from pandas import Series
+
+DATE = re.compile(r"(\d{1,4})([-/.])(\d{1,2}|[A-Za-z]{3})[-/.](\d{1,4})")
+MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+MOSTLY = 0.5
+"""Share of the cells that must be dates for a column to be taken for it."""
+LONGEST_YEAR = 4
+YEARS = (1970.0, 2120.0)
+"""Years of a log, the last one not among them."""
+
+
+def days_of(cells: npt.NDArray[Any]) -> FloatArray | None:
+    """Return the days (n,) since 1970 of a column of dates, NaN where a cell is none; None where less than half are.
+
+    Year, month and day as ISO 8601 has them, day before month or month before day, eight or six digits, or by
+    week or day of the year: of the orders that are dates the one which goes on with the fewest days, and month first where
+    several do.
+    """
+    digits = _digits(cells)
+    if digits is not None:
+        return _of_digits(digits)
+    by_week = _of_weeks_or_days(cells)
+    if by_week is not None:
+        return by_week
+    parts = texts(cells).str.extract(f"^{DATE.pattern}$")
+    if parts[0].notna().mean() <= MOSTLY:
+        return None
+    a, b, c = (_month_numbers(parts[i]) for i in (0, 2, 3))
+    named = parts[2].str.isalpha().fillna(value=False).any()
+    is_iso = bool((parts[0].str.len() == LONGEST_YEAR).any())
+    return _likeliest([(a, b, c)] if is_iso else [(c, b, a)] if named else [(c, a, b), (c, b, a)])
+
+
+def days_of_columns(columns: Sequence[npt.NDArray[Any]]) -> FloatArray | None:
+    """Return the days (n,) since 1970 of dates in one column, of year and day of the year, or of year, month and day."""
+    if len(columns) == 1:
+        return days_of(columns[0])
+    year = as_numbers(columns[0])[0]
+    month, day = (np.ones(year.size), as_numbers(columns[1])[0]) if len(columns) == 2 else (as_numbers(c)[0] for c in columns[1:])
+    if len(columns) == 2:
+        first = _days(year, month, np.ones(year.size))
+        found = first + np.where((day >= 1.0) & (day < 367.0), np.floor(day) - 1.0, np.nan)
+    else:
+        found = _days(year, month, day)
+    return found if np.isfinite(found).mean() > MOSTLY else None
+
+
+def texts(cells: npt.NDArray[Any]) -> Series[str]:
+    """Return cells (n,) as text without blanks at their ends."""
+    import pandas as pd
+
+    return pd.Series(cells).astype("string").str.strip()
+
+
+def _of_weeks_or_days(cells: npt.NDArray[Any]) -> FloatArray | None:
+    """Return the days (n,) since 1970 of 2024-W09-5 or of 2024-061, the 61st day of the year; None where less than half are."""
+    parts = texts(cells).str.extract(r"^(\d{4})-(?:W(\d\d)-(\d)|(\d{3}))$")
+    year, week, day, yearday = (parts[i].astype("float64").to_numpy(dtype=np.float64, na_value=np.nan) for i in range(4))
+    if np.isfinite(year).mean() <= MOSTLY:
+        return None
+    fourth = _days(np.asarray(year), np.ones(year.size), np.full(year.size, 4.0))  # of January, which is in the first week
+    monday = fourth - (fourth + 3.0) % 7.0
+    return np.where(np.isfinite(week), monday + 7.0 * (week - 1.0) + day - 1.0, fourth - 3.0 + yearday - 1.0)
+
+
+def _digits(cells: npt.NDArray[Any]) -> FloatArray | None:
+    """Return numbers (n,) of dates that are written as digits alone, None where they are written otherwise."""
+    numbers, wrong = as_numbers(cells)
+    seen = numbers[np.isfinite(numbers)]
+    if wrong.size > MOSTLY * cells.size or not seen.size:
+        return None
+    return numbers if bool((seen == np.round(seen)).all()) and float(seen.min()) >= 100.0 else None
+
+
+def _of_digits(numbers: FloatArray) -> FloatArray | None:
+    """Return the days (n,) of 20240301 or 01032024, and of 010324 as satellite receivers write it or 240301."""
+    long = float(np.nanmax(numbers)) >= 1e6
+    first, middle, last = np.floor(numbers / 1e4), np.floor(numbers / 1e2) % 100.0, numbers % 100.0
+    orders = [(last, middle, first), (first, middle, last), (last, first, middle)]
+    if long:
+        day, month, year = np.floor(numbers / 1e6), np.floor(numbers / 1e4) % 100.0, numbers % 1e4
+        orders = [(first, middle, last), (year, day, month), (year, month, day)]
+    return _likeliest([order for order in orders if _are_years(order[0], long=long)])
+
+
+def _are_years(numbers: FloatArray, *, long: bool) -> bool:
+    """Whether numbers (n,) are years of a log, of four digits where they are long."""
+    low, high = YEARS if long else (0.0, 100.0)
+    return float(((numbers >= low) & (numbers < high)).mean()) > MOSTLY
+
+
+def _likeliest(orders: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> FloatArray | None:
+    found = [days for order in orders if np.isfinite(days := _days(*order)).any()]
+    return min(found, key=lambda d: (int(np.isnan(d).sum()), float(np.nanmax(d) - np.nanmin(d)))) if found else None
+
+
+def _month_numbers(months: Series[str]) -> FloatArray:
+    """Return numbers (n,) of texts, a month's name as its number."""
+    import pandas as pd
+
+    named = months.str.lower().map({name: i + 1.0 for i, name in enumerate(MONTHS)})
+    return np.asarray(pd.to_numeric(months, errors="coerce").fillna(named).to_numpy(dtype=np.float64, na_value=np.nan))
+
+
+def _days(year: FloatArray, month: FloatArray, day: FloatArray) -> FloatArray:
+    import pandas as pd
+
+    full = np.where(year < 100.0, np.where(year < 70.0, 2000.0, 1900.0) + year, year)
+    stamps = pd.to_datetime(pd.DataFrame({"year": full, "month": month, "day": day}), errors="coerce")
+    days = stamps.to_numpy(dtype="datetime64[D]")
+    return np.where(np.isnat(days), np.nan, days.astype(np.int64).astype(np.float64))
