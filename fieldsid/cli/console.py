@@ -44,8 +44,9 @@ def emit(
 ) -> Mapping[str, Any]:
     """Print a result and return its body: as one JSON object, or for a reader.
 
-    A reader gets the headline, then the notes as warnings, then what `render` prints. Only what is no result, as a page of the
-    guide, has no headline. Where what `render` prints `is_file`, to be redirected to one, the headline goes to stderr.
+    A reader gets the headline, then the notes as warnings, then what `render` prints; where it is to be quiet, the headline
+    alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints `is_file`, to be redirected
+    to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
     whole = body if headline is None else {**body, "headline": headline.record()}
     if as_json:
@@ -57,6 +58,8 @@ def emit(
             say(line)
     elif headline is not None:
         print_headline(to, headline)
+        if voice().is_quiet:
+            return whole
         warn(notes)
         to.print()
     render(to)
@@ -91,7 +94,12 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Renderable
 def say(text: str) -> None:
     """Print a message on stderr, unless the command is to be quiet."""
     if not voice().is_quiet:
-        messages().print(Text(text), soft_wrap=True)
+        complain(text)
+
+
+def complain(text: str) -> None:
+    """Print on stderr what makes the exit code other than 0, however quiet the command is to be."""
+    messages().print(Text(text), soft_wrap=True)
 
 
 def warn(notes: Iterable[Note], *, of: str = "") -> None:
@@ -119,7 +127,7 @@ def progress(says: str, total: int) -> Iterator[Callable[[], None]]:
     """Yield a function that moves a bar on by one; the bar is drawn on stderr, and only on a terminal."""
     console = messages()
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not shows_progress(console)) as bar:
         task = bar.add_task(says, total=total)
         yield lambda: bar.advance(task)
 
@@ -128,11 +136,16 @@ def tracked(items: Sequence[T], says: str) -> Iterator[tuple[T, Callable[[float]
     """Yield the items while a bar on a terminal shows how far it is, each with a function that tells how much of it is done."""
     console = messages()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not shows_progress(console)) as bar:
         task = bar.add_task(says, total=len(items))
         for i, item in enumerate(items):
             yield item, partial(_show_share, bar, task, i)
             bar.update(task, completed=i + 1)
+
+
+def shows_progress(console: Console) -> bool:
+    """Whether what is under way is drawn: on a terminal, unless the command is to be quiet."""
+    return console.is_terminal and not voice().is_quiet
 
 
 def _show_share(bar: Progress, task: TaskID, done: int, share: float) -> None:
