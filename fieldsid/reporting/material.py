@@ -64,7 +64,7 @@ class Material(Brief):
 def material_of(state: FolderState) -> Material:
     """Return what a report of a folder's files is made of; raises UsageError where there is neither a run nor a model."""
     if not (state.of_kind(RUN) or state.of_kind(MODEL)):
-        found = f"{len(state.items)} files of other kinds" if state.items else "nothing"
+        found = f"nothing but {', '.join(f'`{i.path}`' for i in state.items[:3])}" if state.items else "nothing"
         raise UsageError(
             f"there is nothing to report in `{state.folder}`", found=found, hint="begin with `sysid import LOG -o runs/`"
         )

@@ -40,7 +40,7 @@ def test_a_command_that_comes_too_early_is_told_what_comes_before_it(run_cli, fo
         answer = run_cli(*line)
         assert answer.code == 2
         assert "and the trial folder does not give it\n" in answer.err
-        assert answer.err.endswith("\nhint: 2 runs and no model: `sysid identify --axis yaw --joint`\n")
+        assert answer.err.endswith("\nhint: there is no model of the runs yet: `sysid identify --axis yaw --joint`\n")
     assert "trial folder" not in run_cli("effects", "show").err
 
 
