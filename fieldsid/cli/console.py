@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, TypeVar
 
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
@@ -21,6 +22,8 @@ from fieldsid.logs.run import Note
 
 T = TypeVar("T")
 WIDTH = 80
+NARROW, FAR = 60, 1000
+"""Columns of a terminal below which a table that does not fit is shown row by row, and those in which any table fits."""
 
 
 def out() -> Console:
@@ -73,9 +76,31 @@ def print_headline(to: Console, headline: Headline) -> None:
     to.file.flush()
 
 
+class Rows(Table):
+    """A table that a narrow terminal gets row by row, a line for each cell: folded in a column, a number cannot be read."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the table where it fits, and where the page is no narrow one."""
+        wanted = Measurement.get(console, options.update(max_width=FAR), self).maximum
+        if options.max_width >= NARROW or wanted <= options.max_width:
+            yield from super().__rich_console__(console, options)
+            return
+        if self.title:
+            yield Text(str(self.title), style="bold")
+        for row in zip(*(column.cells for column in self.columns), strict=True):
+            block = Table.grid(padding=(0, 2, 0, 0))
+            block.add_column(style="dim")
+            block.add_column(overflow="fold")
+            for column, cell in zip(self.columns, row, strict=True):
+                if cell:
+                    block.add_row(column.header, cell)
+            yield block
+            yield ""
+
+
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, left: int = 1) -> Table:
     """Return a table whose first `left` columns are words and whose others are numbers."""
-    made = Table(
+    made = Rows(
         title=title or None,
         title_justify="left",
         title_style="bold",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 from cli import trial
 from rich.console import Console
 
-from fieldsid.cli.console import folded, shows_progress
+from fieldsid.cli.console import folded, shows_progress, table
 from fieldsid.cli.voice import take, voice
 
 LONG = "run7: " + "the fin was at its limit for a long time, which says less of the authority; " * 3 + "[saturated]"
@@ -89,3 +91,30 @@ def test_what_follows_two_dashes_is_no_option():
     assert take(["inspect", "--quiet", "--", "-v"]) == ["inspect", "--", "-v"]
     assert voice().is_quiet
     assert not voice().is_verbose
+
+
+NUMBERS = ("0.014 +/- 0.020", "-0.025 .. 0.053", "1.40")
+
+
+def on_a_terminal_of(width, made):
+    to = Console(file=io.StringIO(), width=width, force_terminal=False)
+    to.print(made)
+    return to.file.getvalue()
+
+
+def test_a_table_that_does_not_fit_a_narrow_terminal_is_shown_row_by_row_with_its_numbers_whole():
+    columns = ("run", "parameter", "value", "95 % interval", "m/s")
+    shown = on_a_terminal_of(40, table("numbers", columns, [("pulses_1.4", "C0", *NUMBERS), ("", "a22", "1", "", "2")], left=2))
+    lines = shown.splitlines()
+    assert all(len(line) <= 40 for line in lines)
+    assert all(any(line.rstrip().endswith(f"  {n}") for line in lines) for n in NUMBERS)
+    assert lines[0] == "numbers"
+    assert sum(line.startswith("run") for line in lines) == 1
+    assert sum(line.startswith("95 % interval") for line in lines) == 1
+
+
+def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
+    small = table("", ("run", "m/s"), [("a", "1.4")])
+    assert on_a_terminal_of(40, small).splitlines()[0].split() == ["run", "m/s"]
+    wide = table("", ("run", "value"), [("r" * 90, "1.4")])
+    assert on_a_terminal_of(80, wide).splitlines()[0].split() == ["run", "value"]

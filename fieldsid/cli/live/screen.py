@@ -13,13 +13,12 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from fieldsid.cli.console import FAR
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import shown_estimate, shown_in
 
 STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
 BAR = 20
-FAR = 1000
-"""Columns of a terminal in which any table fits."""
 
 
 def screen(body: Mapping[str, Any]) -> RenderableType:
