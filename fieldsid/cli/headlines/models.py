@@ -8,9 +8,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MANY, MOST_NAMED, Body, counted, is_noise, named, over_noise, used
+from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, is_noise, named, over_noise, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
-from fieldsid.rounding import number
+from fieldsid.rounding import MANY, number
 
 
 def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
