@@ -187,6 +187,10 @@ def read_text(path: Path) -> str:
     """Read a text file; raises ArtifactError when it cannot be read or is no text."""
     try:
         return path.read_text(encoding="utf-8")
+    except IsADirectoryError as error:
+        held = sorted(p.name for p in path.iterdir())
+        found = f"it holds {', '.join(held[:3])}{' ...' if len(held) > 3 else ''}" if held else "it is empty"
+        raise ArtifactError(f"`{path}` is a folder, where a file is needed", found=found, hint="name a file in it") from error
     except OSError as error:
         raise ArtifactError(
             f"`{path}` cannot be read: {error.strerror}",

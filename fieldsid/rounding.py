@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import math
 
+MANY = 100.0
+"""Times its noise from which on an error is of a log with none to speak of, as of a towing tank or a simulation."""
+
 
 def digits_of_error(error: float) -> int:
     """Return the decimals to keep: two digits of an error whose leading three are 100..354 or 950..999, else one."""

@@ -77,7 +77,7 @@ def _end(codes: list[int]) -> None:
 def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     """Run one command in this process and return what it returns; session: what it shares with other commands.
 
-    Raises UsageError for an unknown command, and whatever the command raises.
+    Raises UsageError for an unknown command, KeyboardInterrupt, and whatever the command raises.
     """
     from fieldsid.cli.programs import program_of
 
@@ -88,7 +88,10 @@ def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     remember(arguments)
     if "--help" not in arguments:
         load_own_effects()
-    return program(words, prog_name=name, standalone_mode=False, obj=session)
+    result = program(words, prog_name=name, standalone_mode=False, obj=session)
+    if result == INTERRUPTED:  # typer makes a number of it
+        raise KeyboardInterrupt
+    return result
 
 
 def _dispatch(arguments: list[str]) -> int:
@@ -117,8 +120,6 @@ def _dispatch(arguments: list[str]) -> int:
         result = run_in_trial(arguments, run)
     else:
         result = run(arguments)
-    if result == INTERRUPTED:  # typer makes a number of it
-        raise KeyboardInterrupt
     return result if isinstance(result, int) else DONE
 
 

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, TypeVar
 
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
@@ -21,6 +22,8 @@ from fieldsid.logs.run import Note
 
 T = TypeVar("T")
 WIDTH = 80
+NARROW, FAR = 60, 1000
+"""Columns of a terminal below which a table that does not fit is shown row by row, and those in which any table fits."""
 
 
 def out() -> Console:
@@ -44,8 +47,9 @@ def emit(
 ) -> Mapping[str, Any]:
     """Print a result and return its body: as one JSON object, or for a reader.
 
-    A reader gets the headline, then the notes as warnings, then what `render` prints. Only what is no result, as a page of the
-    guide, has no headline. Where what `render` prints `is_file`, to be redirected to one, the headline goes to stderr.
+    A reader gets the headline, then the notes as warnings, then what `render` prints; where it is to be quiet, the headline
+    alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints `is_file`, to be redirected
+    to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
     whole = body if headline is None else {**body, "headline": headline.record()}
     if as_json:
@@ -57,6 +61,8 @@ def emit(
             say(line)
     elif headline is not None:
         print_headline(to, headline)
+        if voice().is_quiet:
+            return whole
         warn(notes)
         to.print()
     render(to)
@@ -70,9 +76,31 @@ def print_headline(to: Console, headline: Headline) -> None:
     to.file.flush()
 
 
+class Rows(Table):
+    """A table that a narrow terminal gets row by row, a line for each cell: folded in a column, a number cannot be read."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the table where it fits, and where the page is no narrow one."""
+        wanted = Measurement.get(console, options.update(max_width=FAR), self).maximum
+        if options.max_width >= NARROW or wanted <= options.max_width:
+            yield from super().__rich_console__(console, options)
+            return
+        if self.title:
+            yield Text(str(self.title), style="bold")
+        for row in zip(*(column.cells for column in self.columns), strict=True):
+            block = Table.grid(padding=(0, 2, 0, 0))
+            block.add_column(style="dim")
+            block.add_column(overflow="fold")
+            for column, cell in zip(self.columns, row, strict=True):
+                if cell:
+                    block.add_row(column.header, cell)
+            yield block
+            yield ""
+
+
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, left: int = 1) -> Table:
     """Return a table whose first `left` columns are words and whose others are numbers."""
-    made = Table(
+    made = Rows(
         title=title or None,
         title_justify="left",
         title_style="bold",
@@ -91,7 +119,12 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Renderable
 def say(text: str) -> None:
     """Print a message on stderr, unless the command is to be quiet."""
     if not voice().is_quiet:
-        messages().print(Text(text), soft_wrap=True)
+        complain(text)
+
+
+def complain(text: str) -> None:
+    """Print on stderr what makes the exit code other than 0, however quiet the command is to be."""
+    messages().print(Text(text), soft_wrap=True)
 
 
 def warn(notes: Iterable[Note], *, of: str = "") -> None:
@@ -119,7 +152,7 @@ def progress(says: str, total: int) -> Iterator[Callable[[], None]]:
     """Yield a function that moves a bar on by one; the bar is drawn on stderr, and only on a terminal."""
     console = messages()
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not shows_progress(console)) as bar:
         task = bar.add_task(says, total=total)
         yield lambda: bar.advance(task)
 
@@ -128,11 +161,16 @@ def tracked(items: Sequence[T], says: str) -> Iterator[tuple[T, Callable[[float]
     """Yield the items while a bar on a terminal shows how far it is, each with a function that tells how much of it is done."""
     console = messages()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not shows_progress(console)) as bar:
         task = bar.add_task(says, total=len(items))
         for i, item in enumerate(items):
             yield item, partial(_show_share, bar, task, i)
             bar.update(task, completed=i + 1)
+
+
+def shows_progress(console: Console) -> bool:
+    """Whether what is under way is drawn: on a terminal, unless the command is to be quiet."""
+    return console.is_terminal and not voice().is_quiet
 
 
 def _show_share(bar: Progress, task: TaskID, done: int, share: float) -> None:

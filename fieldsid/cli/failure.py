@@ -16,6 +16,7 @@ import typer
 
 from fieldsid._version import __version__
 from fieldsid.cli.exit_codes import BAD_INPUT, INTERRUPTED, OUR_BUG
+from fieldsid.cli.help.command_page import EXAMPLE
 from fieldsid.errors import FieldsidError, UsageError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -78,7 +79,31 @@ def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageErr
     words = error.format_message().strip().removesuffix(".").replace("Value error, ", "")  # pydantic's own words
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"sysid {arguments[0]}"
-    return UsageError(words[:1].lower() + words[1:], found=shlex.join(["sysid", *arguments]), hint=f"see `{path} --help`")
+    words, hint = words[:1].lower() + words[1:], f"see `{path} --help`"
+    if words.startswith("missing argument"):
+        from fieldsid.cli.trial.filled import FILLS
+        from fieldsid.trial_folder.journal import JOURNAL
+
+        if Path(JOURNAL).is_file() and path.removeprefix("sysid ") in FILLS:
+            return _not_given(words, arguments)
+        hint = f"{_example(context)}{hint}"
+    return UsageError(words, found=shlex.join(["sysid", *arguments]), hint=hint)
+
+
+def _example(context: typer.Context | None) -> str:
+    """Return the example of a command's page of help, to begin a hint with."""
+    _, is_there, line = ("" if context is None else context.command.help or "").partition(EXAMPLE)
+    return f"`{line.splitlines()[0]}`, or " if is_there else ""
+
+
+def _not_given(words: str, arguments: Sequence[str]) -> UsageError:
+    """Say of what the trial folder, which is the working folder, was to give and does not have what comes before it there."""
+    from fieldsid.trial_folder.next_step import next_step
+    from fieldsid.trial_folder.state import state_of
+
+    why, line = next_step(state_of(Path()))
+    hint = f"{why}: `{line}`" if line else "`sysid status` lists what is there"
+    return UsageError(f"{words}, and the trial folder does not give it", found=shlex.join(["sysid", *arguments]), hint=hint)
 
 
 def _as_full(error: OSError) -> UsageError:

@@ -12,7 +12,7 @@ import typer
 from rich.live import Live
 
 from fieldsid.artifacts import check_output
-from fieldsid.cli.console import messages
+from fieldsid.cli.console import messages, shows_progress
 from fieldsid.cli.session import session_of
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def refuse_figure(path: Path | None, *, force: bool) -> None:
 def trying(says: str) -> Iterator[Callable[[str], None]]:
     """Yield a function that shows what is being tried, on stderr and only on a terminal."""
     console = messages()
-    if not console.is_terminal:
+    if not shows_progress(console):
         yield lambda _text: None
         return
     # drawn by hand: a thread that redraws would keep the search from using a second core
@@ -66,7 +66,7 @@ def compiling(context: typer.Context, *besides: Callable[[], None]) -> Iterator[
         yield session.warmup
         return
     console = messages()
-    with warming_up(lambda text: console.print(text) if console.is_terminal else None, besides) as warmup:
+    with warming_up(lambda text: console.print(text) if shows_progress(console) else None, besides) as warmup:
         yield warmup
 
 

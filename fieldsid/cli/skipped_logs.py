@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from fieldsid.cli.console import say
+from fieldsid.cli.console import complain
 from fieldsid.errors import FieldsidError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Skips:
             self._runs.add(name)
         shown = str(file or "-")
         self.records.append({"run": name, "file": shown, "what": error.what, "found": error.found, "hint": error.hint})
-        say(f"skipped `{shown}`: {error}\n")
+        complain(f"skipped `{shown}`: {error}\n")
 
     def left_of(self, runs: Sequence[Run]) -> list[Run]:
         """Return those of the runs read that were not skipped afterwards."""
@@ -42,5 +42,5 @@ class Skips:
         """End the command with exit code 1 where logs were skipped, and say how many."""
         if not self.records:
             return
-        say(f"{len(self.records)} of {len(self.records) + used} logs skipped, for the reasons above")
+        complain(f"{len(self.records)} of {len(self.records) + used} logs skipped, for the reasons above")
         raise typer.Exit(1)

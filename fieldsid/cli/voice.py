@@ -1,4 +1,4 @@
-"""How every command speaks: `--quiet` errors alone, `-v` warnings in full, `--deg` angles of its text in degrees."""
+"""How every command speaks: `--quiet` its first lines alone, `-v` warnings in full, `--deg` angles of its text in degrees."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fieldsid.rounding import in_unit, interval, with_error
 
 QUIET, VERBOSE, DEGREES = "--quiet", "-v", "--deg"
 SAYS = {
-    QUIET: "Say the result and errors alone.",
+    QUIET: "Say the verdict, what it rests on and the next command, nothing below; and errors.",
     VERBOSE: "Say warnings in full, where a terminal gets a line of each.",
     DEGREES: "Show angles in degrees; files and JSON stay in radians.",
 }
@@ -23,7 +23,7 @@ HAS_OWN_V = ("demo",)
 
 @dataclass(frozen=True, slots=True)
 class Voice:
-    """Whether messages are left out, whether warnings are said in full on a terminal, and whether angles are in degrees."""
+    """Whether a result's first lines are all that is said, whether warnings are said in full, and angles in degrees."""
 
     is_quiet: bool = False
     is_verbose: bool = False

@@ -64,7 +64,7 @@ class Material(Brief):
 def material_of(state: FolderState) -> Material:
     """Return what a report of a folder's files is made of; raises UsageError where there is neither a run nor a model."""
     if not (state.of_kind(RUN) or state.of_kind(MODEL)):
-        found = f"{len(state.items)} files of other kinds" if state.items else "nothing"
+        found = f"nothing but {', '.join(f'`{i.path}`' for i in state.items[:3])}" if state.items else "nothing"
         raise UsageError(
             f"there is nothing to report in `{state.folder}`", found=found, hint="begin with `sysid import LOG -o runs/`"
         )
@@ -84,14 +84,31 @@ def _runs(state: FolderState, skipped: list[str]) -> list[Run]:
         sources = [s.path for i in state.of_kind(MODEL) for s in i.sources if s.path is not None]
         places = [p for p in dict.fromkeys(sources) if p.suffix != ".yaml"]
     if len(places) > MOST_RUNS:
-        skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: the first {MOST_RUNS} by name are")
+        said = "those that the model was not fitted to come first, then others evenly by name"
+        skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {said}")
+        places = _chosen(places, _fitted_to(state))
     found = []
-    for place in places[:MOST_RUNS]:
+    for place in places:
         try:
             found.append(load_run(place))
         except FieldsidError as error:
             skipped.append(f"{place.name}: {error.what}")
     return found
+
+
+def _fitted_to(state: FolderState) -> set[str]:
+    """Return the names of the runs that the best models were fitted to."""
+    best = {path for axis in ("yaw", "pitch") for path in chosen_models(state, axis)}
+    return {str(r) for i in state.of_kind(MODEL) if i.path in best for r in (i.body or {}).get("runs", ())}
+
+
+def _chosen(places: Sequence[Path], fitted: set[str]) -> list[Path]:
+    """Return as many runs as are drawn, those that judge first, then others evenly over the list."""
+    unseen = [p for p in places if p.stem not in fitted][:MOST_RUNS]
+    others = [p for p in places if p not in unseen]
+    count = MOST_RUNS - len(unseen)
+    spread = {others[round(i * (len(others) - 1) / max(count - 1, 1))] for i in range(count)}
+    return [*unseen, *(p for p in others if p in spread)]
 
 
 def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]) -> AxisMaterial | None:

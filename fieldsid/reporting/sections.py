@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from fieldsid._version import __version__
-from fieldsid.comparison.compare import DOWN_TO_NOISE
+from fieldsid.comparison.compare import DOWN_TO_NOISE, Channel, Comparison
 from fieldsid.reporting import figures
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
-from fieldsid.rounding import in_unit, interval, number, probability, with_error
+from fieldsid.rounding import MANY, in_unit, interval, number, probability, with_error
 from fieldsid.trial_folder.journal import Entry, made_by, relative_to
 from fieldsid.trial_folder.next_step import REPORT
 from fieldsid.trial_folder.state import FolderState, Item, Source
@@ -55,7 +55,7 @@ def _verdicts(axis: AxisMaterial) -> list[dict[str, str]]:
         on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
         good = max(c.leading.over_floor for c in judged) <= DOWN_TO_NOISE
         tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
-        says = f"error {over:.2f} x the noise on {on}{tail}"
+        says = f"error {over:.2f} x the noise on {on}{tail}" if over < MANY else _without_noise(judged, on)
         effects = f" with {', '.join(best.model.effects)}" if best.model.effects else ""
         out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
     if axis.diagnosis is not None and axis.diagnosis.body is not None:
@@ -123,7 +123,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "models": [{"path": s.path, "effects": ", ".join(s.model.effects) or "none", "rows": _errors(s)} for s in axis.shown],
         "failures": [
             {
-                "title": f"{run}: the {channel.name}, {channel.over_floor:.1f} x its noise",
+                "title": f"{run}: the {_followed(c, channel)}",
                 "chart": figures.failures(channel, f"where the {channel.name} of {run} fails"),
                 "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
             }
@@ -140,10 +140,23 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _followed(found: Comparison, channel: Channel) -> str:
+    """Return a channel with its error over its noise; of a log without noise, whose floor is that of its digits, with its fit."""
+    if channel.over_floor < MANY:
+        return f"{channel.name} {channel.over_floor:.2f} x its noise"
+    fit = found.merit.angle_fit if channel.name == "angle" else found.merit.rate_fit
+    return f"{channel.name} fit {fit:.1f} %"
+
+
+def _without_noise(judged: Sequence[Comparison], on: str) -> str:
+    worst = max(judged, key=lambda c: c.leading.over_floor)
+    return f"{_followed(worst, worst.leading)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
+
+
 def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
     title = f"{shown.path} on {found.run}"
     drawn, key = figures.free_run(found, f"{title}: free run and measurement")
-    over = ", ".join(f"{c.name} {c.over_floor:.2f} x its noise" for c in found.channels)
+    over = ", ".join(_followed(found, c) for c in found.channels)
     return {
         "model": shown.path, "run": found.run, "chart": drawn, "legend": key, "over": over,
         "fitted": shown.was_fitted_to(found.run), "first": shown is axis.shown[0],
@@ -160,7 +173,7 @@ def _errors(shown: Shown) -> list[dict[str, str]]:
             "rate": number(np.degrees(c.merit.rate_rms), 2),
             "rate_noise": number(np.degrees(c.floor.rate), 2),
             "fit": f"{number(c.merit.angle_fit, 3)} / {number(c.merit.rate_fit, 3)}",
-            "over": f"{c.leading.over_floor:.2f}",
+            "over": f"{c.leading.over_floor:.2f}" if c.leading.over_floor < MANY else "no noise",
             "fitted": "yes" if shown.was_fitted_to(c.run) else "no",
         }
         for c in shown.found

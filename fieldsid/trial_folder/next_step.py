@@ -55,7 +55,7 @@ def _data(state: FolderState) -> tuple[str, str] | None:
     if runs or state.of_kind(MODEL):
         return None
     if logs:
-        return f"{len(logs)} logs and no run", shlex.join(
+        return "there is no run of the logs yet", shlex.join(
             ["sysid", "import", *(i.path for i in logs), *_left_out(state, "-o", RUNS)]
         )
     return "there is no log yet", f"sysid plan --axis yaw --speeds {_speeds(state.folder)}"
@@ -73,7 +73,7 @@ def _model(state: FolderState) -> tuple[str, str] | None:
     axis = _axis(state)
     if not state.of_kind(MODEL):
         runs = state.of_kind(RUN)
-        return f"{len(runs)} runs and no model", shlex.join(
+        return "there is no model of the runs yet", shlex.join(
             ["sysid", "identify", *_left_out(state, *run_words(state)), "--axis", axis, *_joint(runs)]
         )
     diagnosis = next((e for e in reversed(state.entries) if e.command[1:2] == ("diagnose",) and e.exit in DONE), None)

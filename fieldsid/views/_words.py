@@ -7,7 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.page import Block, cut, facts
-from fieldsid.rounding import interval, number, with_error
+from fieldsid.rounding import MANY, interval, number, with_error
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model, Noise
 
 BETWEEN = " +/- "
-MANY = 100.0
-"""Times the noise floor from which on decimals say nothing."""
 
 
 def warned(notes: Iterable[Note]) -> tuple[str, ...]:

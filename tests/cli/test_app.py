@@ -87,6 +87,26 @@ def test_a_mistyped_option_is_refused_in_three_parts(run_cli):
     assert answer.err.endswith("\nhint: see `sysid effects list --help`\n")
 
 
+def test_an_interrupted_command_raises_in_the_command_that_runs_it_and_ends_with_130(run_cli, monkeypatch):
+    def interrupted(_topic):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fieldsid.guide.pick_page", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        app.run(["guide"])
+    answer = run_cli("guide")
+    assert (answer.code, answer.out, answer.err.strip()) == (130, "", "interrupted")
+
+
+def test_what_is_missing_is_shown_by_the_example_of_the_command(run_cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = run_cli("schedule", "verify")
+    assert answer.code == 2
+    assert answer.err.startswith("error: missing argument 'SCHEDULE'\n")
+    example = "`sysid schedule verify gains.yaml --require-phase-margin 40 -o gains.png`"
+    assert answer.err.endswith(f"\nhint: {example}, or see `sysid schedule verify --help`\n")
+
+
 @pytest.mark.parametrize("name", sorted(entries()))
 def test_every_command_explains_itself_and_has_a_module_of_its_name(run_cli, name):
     answer = run_cli(name, "--help")

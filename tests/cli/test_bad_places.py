@@ -51,6 +51,15 @@ def test_a_file_is_no_folder(run_cli, here, line):
     assert (here / "notes").read_text() == "mine"
 
 
+def test_a_folder_where_a_file_is_needed_is_said_with_what_it_holds(run_cli, here):
+    (here / "notes").mkdir()
+    (here / "notes" / "a.txt").write_text("calm")
+    answer = run_cli("compare", "notes", "run7.parquet")
+    assert answer.code == 2
+    assert answer.err.startswith("error: `notes` is a folder, where a file is needed\n  found: it holds a.txt\n")
+    assert "  found: nothing but `a.txt`\n" in run_cli("report", "notes").err
+
+
 @pytest.mark.parametrize("line", ["identify {} --axis yaw", "compare truth.yaml {}", "import {} -o out"])
 def test_a_closed_folder_is_no_bug_and_stops_no_other_log(run_cli, here, monkeypatch, line):
     closed = here / "closed"

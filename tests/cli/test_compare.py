@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from hashlib import sha256
+
 import numpy as np
 import pytest
 from cli import trial
@@ -109,3 +112,19 @@ def test_a_run_of_the_other_axis_is_refused(run_cli, tmp_path):
     answer = run_cli("compare", trial.model_file(tmp_path, Axis.PITCH), trial.flown(tmp_path, Axis.YAW))
     assert answer.code == 2
     assert "no fin signal for pitch" in answer.err
+
+
+def test_a_model_that_was_searched_in_vain_is_not_sent_to_the_same_search_again(run_cli, tmp_path, drifting):
+    log = trial.flown(tmp_path, spec="zigzag")
+    asked = ("compare", drifting, log, "--quiet")
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid diagnose ")
+    digest = sha256(drifting.read_bytes()).hexdigest()
+    diagnosis = tmp_path / "diagnosis_yaw.yaml"
+    held = f"schema: fieldsid/diagnosis/1\ninputs:\n- path: drifting.yaml\n  sha256: {digest}\neffects: "
+    diagnosis.write_text(f"{held}[]\n")
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid turn-radius ")
+    diagnosis.write_text(f"{held}[servo_lag]\n")
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid diagnose ")
+    diagnosis.write_text(f"{held}[]\n")
+    os.utime(diagnosis, (1.0, 1.0))  # older than the model
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid diagnose ")

@@ -73,6 +73,11 @@ def run(line: str) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
+def timeless(text: str) -> str:
+    """Return a text without how long something took."""
+    return re.sub(r"[\d.]+ (s|min)\b", "", text)
+
+
 def fly(folder: Path) -> None:
     hidden = ("servo_lag", {"lag": 0.35})
     for i, speed in enumerate(SPEEDS):
@@ -83,10 +88,19 @@ def fly(folder: Path) -> None:
 @pytest.fixture(scope="module")
 def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[int, str, str]]]:
     """What every command said, one after the other in one folder."""
-    folder = tmp_path_factory.mktemp("voice")
+    folder = tmp_path_factory.mktemp("voice") / "trial"
     fly(folder / "runs")
     with chdir(folder):
         yield {line: run(line) for line in LINES}
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[int, str, str]]]:
+    """What the same commands say, in another folder, where they are to be quiet."""
+    folder = tmp_path_factory.mktemp("quiet") / "trial"
+    fly(folder / "runs")
+    with chdir(folder):
+        yield {line: run(f"{line} --quiet") for line in LINES}
 
 
 def test_every_command_is_asked() -> None:
@@ -106,6 +120,14 @@ def test_a_result_says_its_verdict_then_what_it_rests_on_then_what_comes_next(sa
     assert rests_on.startswith("rests on ")
     assert then.startswith("next: ")
     assert lines[3] == ""
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_quiet_command_says_the_first_lines_of_its_result_and_nothing_else(said, quiet, line):
+    code, out, err = quiet[line]
+    assert (code, err) == (0, "")
+    whole = said[line][1].split("\n\n")[0].splitlines()
+    assert timeless(out).splitlines() == timeless("\n".join(whole[-3:])).splitlines()
 
 
 @pytest.mark.parametrize("line", LINES)

@@ -35,6 +35,15 @@ def test_runs_and_the_folder_of_models_need_not_be_typed(run_cli, folder):
     assert sorted(p.name for p in (folder / "models").iterdir()) == ["pulses_1.0_yaw.yaml", "pulses_1.4_yaw.yaml"]
 
 
+def test_a_command_that_comes_too_early_is_told_what_comes_before_it(run_cli, folder):
+    for line in (("schedule", "verify"), ("compare",), ("extend", "--add", "servo_lag"), ("turn-radius",)):
+        answer = run_cli(*line)
+        assert answer.code == 2
+        assert "and the trial folder does not give it\n" in answer.err
+        assert answer.err.endswith("\nhint: there is no model of the runs yet: `sysid identify --axis yaw --joint`\n")
+    assert "trial folder" not in run_cli("effects", "show").err
+
+
 def test_what_is_typed_counts(run_cli, folder):
     body = run_cli("identify", "runs/pulses_1.4.parquet", "--axis", "yaw", "-o", "other", "--no-figures", "--json").json
     assert [f["model"] for f in body["fits"]] == ["other/pulses_1.4_yaw.yaml"]

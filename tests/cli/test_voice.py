@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 from cli import trial
+from rich.console import Console
 
-from fieldsid.cli.console import folded
+from fieldsid.cli.console import folded, shows_progress, table
 from fieldsid.cli.voice import take, voice
 
 LONG = "run7: " + "the fin was at its limit for a long time, which says less of the authority; " * 3 + "[saturated]"
@@ -17,15 +20,51 @@ def afterwards():
     take([])
 
 
-def test_a_quiet_command_gives_its_result_and_nothing_else(run_cli, tmp_path):
-    run = trial.flown(tmp_path)
-    loud, quiet = run_cli("live", run, "--axis", "yaw", "--speed", "0", "--state", tmp_path / "s"), None
-    again = ("live", run, "--axis", "yaw", "--speed", "0", "--state", tmp_path / "s")
-    assert "going on from" in run_cli(*again).err
-    quiet = run_cli(*again, "--quiet")
-    assert quiet.err == ""
-    assert loud.out
-    assert quiet.out
+def test_a_quiet_command_does_not_say_where_it_goes_on_from(run_cli, tmp_path):
+    line = ("live", trial.flown(tmp_path), "--axis", "yaw", "--speed", "0", "--state", tmp_path / "s")
+    run_cli(*line)
+    assert "going on from" in run_cli(*line).err
+    assert run_cli(*line, "--quiet").err == ""
+
+
+def test_what_is_to_be_redirected_stays_whole_however_quiet_it_is(run_cli, tmp_path):
+    run_cli("identify", trial.flown(tmp_path), "--axis", "yaw", "-o", tmp_path, "--no-figures")
+    run_cli("schedule", "design", tmp_path / "run7_yaw.yaml", "-o", tmp_path / "gains.yaml")
+    answer, loud = (run_cli("schedule", "export", tmp_path / "gains.yaml", "--to", "ros2", *q) for q in (["--quiet"], []))
+    assert (answer.err, answer.out) == ("", loud.out)
+    assert "ros__parameters" in answer.out
+
+
+def test_a_page_of_the_guide_and_json_stay_whole(run_cli):
+    assert run_cli("guide", "theory", "--quiet").out == run_cli("guide", "theory").out
+    assert run_cli("effects", "list", "--json", "--quiet").out == run_cli("effects", "list", "--json").out
+
+
+def test_why_the_exit_code_is_not_0_is_said_however_quiet_it_is(run_cli, tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("no,log\n")
+    answer = run_cli("identify", trial.flown(tmp_path), broken, "--axis", "yaw", "-o", tmp_path, "--quiet")
+    assert answer.code == 1
+    assert len(answer.out.splitlines()) == 3
+    assert "skipped `" in answer.err
+
+
+def test_a_quiet_tour_ends_with_its_headline_alone(run_cli, tmp_path, monkeypatch):
+    monkeypatch.setattr("fieldsid.demo.steps.STEPS", ())
+    answer = run_cli("demo", "-o", tmp_path / "tour", "--quiet")
+    verdict, rests_on, then = answer.out.splitlines()
+    assert verdict.startswith("hidden in the trial was servo_lag")
+    assert rests_on.startswith("rests on ")
+    assert then.startswith("next: sysid ")
+
+
+def test_a_bar_is_drawn_on_a_terminal_unless_it_is_to_be_quiet():
+    on_terminal = Console(force_terminal=True)
+    take(["identify"])
+    assert shows_progress(on_terminal)
+    assert not shows_progress(Console(force_terminal=False))
+    take(["identify", "--quiet"])
+    assert not shows_progress(on_terminal)
 
 
 def test_errors_are_said_however_quiet_it_is(run_cli, tmp_path):
@@ -52,3 +91,30 @@ def test_what_follows_two_dashes_is_no_option():
     assert take(["inspect", "--quiet", "--", "-v"]) == ["inspect", "--", "-v"]
     assert voice().is_quiet
     assert not voice().is_verbose
+
+
+NUMBERS = ("0.014 +/- 0.020", "-0.025 .. 0.053", "1.40")
+
+
+def on_a_terminal_of(width, made):
+    to = Console(file=io.StringIO(), width=width, force_terminal=False)
+    to.print(made)
+    return to.file.getvalue()
+
+
+def test_a_table_that_does_not_fit_a_narrow_terminal_is_shown_row_by_row_with_its_numbers_whole():
+    columns = ("run", "parameter", "value", "95 % interval", "m/s")
+    shown = on_a_terminal_of(40, table("numbers", columns, [("pulses_1.4", "C0", *NUMBERS), ("", "a22", "1", "", "2")], left=2))
+    lines = shown.splitlines()
+    assert all(len(line) <= 40 for line in lines)
+    assert all(any(line.rstrip().endswith(f"  {n}") for line in lines) for n in NUMBERS)
+    assert lines[0] == "numbers"
+    assert sum(line.startswith("run") for line in lines) == 1
+    assert sum(line.startswith("95 % interval") for line in lines) == 1
+
+
+def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
+    small = table("", ("run", "m/s"), [("a", "1.4")])
+    assert on_a_terminal_of(40, small).splitlines()[0].split() == ["run", "m/s"]
+    wide = table("", ("run", "value"), [("r" * 90, "1.4")])
+    assert on_a_terminal_of(80, wide).splitlines()[0].split() == ["run", "value"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, messages, table
+from fieldsid.cli.console import complain, emit, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
 from fieldsid.cli.progress import get_ready, refuse_closed
 from fieldsid.cli.session import drawing
@@ -160,7 +160,7 @@ def _gate(entries: Sequence[Mapping[str, Any]], least: float | None) -> None:
     found = [(e["run"], name, e[f"{name}_fit_percent"]) for e in entries for name in e["over_floor"]]
     failed = [(run, name, fit) for run, name, fit in found if least is not None and not fit >= least]
     for run, name, fit in failed:
-        messages().print(f"gate failed: {run} has {name} fit {fit:.1f} %, below {least:g} %", soft_wrap=True)
+        complain(f"gate failed: {run} has {name} fit {fit:.1f} %, below {least:g} %")
     if failed:
         raise typer.Exit(1)
 

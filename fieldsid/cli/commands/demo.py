@@ -19,6 +19,7 @@ from fieldsid.cli.headlines.trial import of_demo
 from fieldsid.cli.options import Force, JsonFlag, OutputDir
 from fieldsid.cli.progress import compiling
 from fieldsid.cli.session import Session
+from fieldsid.cli.voice import voice
 from fieldsid.errors import ArtifactError
 from fieldsid.runtime.background_tasks import BackgroundTasks
 
@@ -42,7 +43,7 @@ SHORT_OPENING = (
     "A small vehicle waits on deck, with one effect more than the textbook's model. Each line is one command; "
     "`sysid demo --verbose` prints them with all they say."
 )
-BRIEF, VERBOSE, JSON = "brief", "verbose", "json"
+BRIEF, VERBOSE, SILENT = "brief", "verbose", "silent"
 """How much of the tour is told while it goes on."""
 
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print each command with all that it says, and what it means.")]
@@ -65,9 +66,10 @@ def command(
     Example: sysid demo --effect sway_coupling -o tour
     """
     began = perf_counter()
+    told = SILENT if as_json or voice().is_quiet else VERBOSE if verbose else BRIEF
     with compiling(context, _compile_loops) as warmup:
-        body = _tour(effect, output, began, warmup, force=force, told=JSON if as_json else VERBOSE if verbose else BRIEF)
-    if not as_json:
+        body = _tour(effect, output, began, warmup, force=force, told=told)
+    if told != SILENT:
         sys.stdout.write("\n")
     return emit(body, as_json=as_json, render=lambda to: _render(to, body, figures=verbose), headline=of_demo(body))
 
@@ -158,7 +160,7 @@ def _aloud() -> Iterator[None]:
 
 
 def _told(text: str, told: str) -> None:
-    if told != JSON:
+    if told != SILENT:
         sys.stdout.write(f"\n{fill(text, WIDTH, break_on_hyphens=False)}\n" + ("\n" if told == BRIEF else ""))
         sys.stdout.flush()
 

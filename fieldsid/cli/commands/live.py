@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import out, say
+from fieldsid.cli.console import emit, out, say
 from fieldsid.cli.exit_codes import GATE_FAILED
 from fieldsid.cli.options import AxisOption, JsonFlag, MappingFile
+from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -296,7 +297,7 @@ def _save(state: Path, identifier: OnlineIdentifier, watch: Watch, source: str) 
 
 @contextmanager
 def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
-    """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text."""
+    """Yield what shows a look: a line of JSON, a screen on a terminal, else a line of text; nothing where it is to be quiet."""
     from fieldsid.cli.live.screen import line, screen
 
     if as_json:
@@ -309,6 +310,9 @@ def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
         yield print_json
         return
     console = out()
+    if voice().is_quiet:
+        yield lambda _body: None
+        return
     if not console.is_terminal:
         yield lambda body: console.print(line(body), soft_wrap=True)
         return
@@ -319,7 +323,7 @@ def _shown(*, as_json: bool) -> Iterator[Callable[[Mapping[str, Any]], None]]:
 
 
 def _end(body: Mapping[str, Any]) -> None:
-    from fieldsid.cli.live.screen import final
+    from fieldsid.cli.live.screen import Parameters, headline_of
 
     if body:
-        final(out(), body)
+        emit(body, as_json=False, render=lambda to: to.print(Parameters(body)), headline=headline_of(body))

@@ -276,7 +276,7 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     backup = str(write_patch(patch)) if write else None
     body = {"schema": "fieldsid/export/1", "target": "into", "difference": patch.difference, "file": str(into), "backup": backup}
     shown, headline = (lambda out: out.out(patch.difference, end="", highlight=False)), of_patch(body, schedule, key)
-    return emit(body, as_json=as_json, render=shown, headline=headline, is_file=True)
+    return emit(body, as_json=as_json, render=shown, headline=headline, is_file=not write)
 
 
 def _limits(

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MANY, Body, counted, is_noise, named, times, used
+from fieldsid.cli.headlines.words import Body, counted, is_noise, named, times, used
 from fieldsid.cli.voice import shown_in
-from fieldsid.rounding import number, probability
+from fieldsid.rounding import MANY, number, probability
 
 MODELS = "models"
 LEAST_TO_SPARE_ONE = 3

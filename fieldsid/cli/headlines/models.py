@@ -8,9 +8,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MANY, MOST_NAMED, Body, counted, is_noise, named, over_noise, used
+from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, is_noise, named, over_noise, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
-from fieldsid.rounding import number
+from fieldsid.rounding import MANY, number
 
 
 def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
@@ -92,13 +92,27 @@ def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inpu
     """Return what to do with a model that does or does not follow its runs."""
     from fieldsid.models.model import load_model
 
-    if not fails:
+    if not fails or _searched(Path(model)):
         return used(axis, model)
     fitted = [p for p in inputs if is_there(p)]
     unseen = [p for p in runs if p.resolve() not in {f.resolve() for f in fitted}]
     known = ("--model", model) if load_model(Path(model)).effects else ()
     judged = repeated("--validate", unseen) if fitted else []
     return pasted("diagnose", fitted or list(runs), "--axis", axis, *known, *judged)
+
+
+def _searched(model: Path) -> bool:
+    """Whether a diagnosis beside a model asked since it was written what it lacks, and named nothing to add."""
+    from fieldsid.artifacts import inputs_of, read_yaml
+    from fieldsid.logs.unknown_file import own_kind
+
+    return any(
+        own_kind(path) == "diagnosis"
+        and path.stat().st_mtime_ns >= model.stat().st_mtime_ns
+        and model.resolve() in {p.resolve() for p in inputs_of(path)}
+        and not read_yaml(path).get("effects")
+        for path in model.parent.glob("*.yaml")
+    )
 
 
 def _leading(entry: Body) -> float:

@@ -7,14 +7,12 @@ from math import isfinite
 from typing import Any
 
 from fieldsid.cli.headlines.typed import pasted
-from fieldsid.rounding import number
+from fieldsid.rounding import MANY, number
 
 Body = Mapping[str, Any]
 USE = {"yaw": ("turn-radius",), "pitch": ("schedule", "design")}
 """What a model is for once it leaves no more than the noise."""
 MOST_NAMED = 3
-MANY = 100.0
-"""Times the noise from which on a log has none to speak of, as one of a towing tank or a simulation."""
 
 
 def counted(count: int, word: str, many: str = "") -> str:

@@ -14,7 +14,7 @@ effect it is missing, a turning radius and gains. Start with `sysid demo`.
 """
 _FOOT = """
 Every command: `--help` explains it, `--json` prints one JSON object.
-`--quiet` leaves out all but result and errors, `-v` says warnings in full.
+`--quiet` says a result's first lines alone, `-v` its warnings in full.
 The tabulator key completes commands and options: `--install-completion`.
 Exit codes: 0 done, 1 done but a gate failed, 2 bad usage or input, 3 our bug.
 """

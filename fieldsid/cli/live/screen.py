@@ -13,21 +13,19 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from fieldsid.cli.console import print_headline
+from fieldsid.cli.console import FAR
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import shown_estimate, shown_in
 
 STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
 BAR = 20
-FAR = 1000
-"""Columns of a terminal in which any table fits."""
 
 
 def screen(body: Mapping[str, Any]) -> RenderableType:
     """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
     head = Text(body["said"], style=STYLE[body["verdict"]])
     return Group(
-        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), _Parameters(body), Text(), _meters(body), _met(body)
+        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), Parameters(body), Text(), _meters(body), _met(body)
     )
 
 
@@ -47,15 +45,13 @@ def rests_on(body: Mapping[str, Any]) -> str:
     return f"{body['axis']}, {body['samples']} samples{speed}; goals: {body['goals_from']}"
 
 
-def final(to: Console, body: Mapping[str, Any]) -> None:
-    """Print the last look: verdict, what it rests on, the next command, the table."""
-    print_headline(to, Headline(body["said"], rests_on(body), body["next"]))
-    to.print()
-    to.print(_Parameters(body))
+def headline_of(body: Mapping[str, Any]) -> Headline:
+    """Return the first lines of the last look."""
+    return Headline(body["said"], rests_on(body), body["next"])
 
 
 @dataclass(frozen=True, slots=True)
-class _Parameters:
+class Parameters:
     """The table of the parameters; where a terminal is too narrow, without the band, which the value's error says as well."""
 
     body: Mapping[str, Any]

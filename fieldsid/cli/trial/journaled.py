@@ -14,7 +14,7 @@ from typing import Any, Self, TextIO
 import typer
 
 from fieldsid.cli.console import say
-from fieldsid.cli.exit_codes import BAD_INPUT, DONE, INTERRUPTED, OUR_BUG
+from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
 from fieldsid.cli.trial.filled import filled, in_words, wants
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
@@ -56,8 +56,7 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
         except Exception as error:
             kept.write(OUR_BUG, f"{type(error).__name__}: {error}")
             raise
-    if result != INTERRUPTED:
-        kept.write(result if isinstance(result, int) else DONE, shown.line, result)
+    kept.write(result if isinstance(result, int) else DONE, shown.line, result)
     return result
 
 
