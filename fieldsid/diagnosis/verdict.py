@@ -18,6 +18,7 @@ from fieldsid.diagnosis.thresholds import (
     EVIDENCE_TEMPERATURE,
     FAR_ERROR_RATIO,
     GUSTY_ERROR_RATIO,
+    MAIN_EXPLAINED_SHARE,
     MAX_VALIDATION_ERROR_RATIO,
     MIN_P_VALUE,
     MISSING_ERROR_RATIO,
@@ -45,7 +46,8 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     Errors are over the noise floor that is reported, with the sensors' coloured noise where they have it. Without an effect,
     `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is `disturbed` where
     the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the training runs
-    better leaves a visible error on the validation runs that is no smaller than without it.
+    better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one than
+    it leaves: a lag of a sample may be there, and is not what is missing.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     error = found.selection_errors.over(floor)
@@ -54,9 +56,10 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
     visible = error > SUFFICIENT_ERROR_RATIO
-    if visible and found.selection_errors.mean >= search.base().selection_errors.mean:
-        return _unnamed(found, left, floor)
     share = excess_explained(search, found, floor)
+    minor = error > MISSING_ERROR_RATIO and share < MAIN_EXPLAINED_SHARE and not search.is_noiseless
+    if visible and (minor or found.selection_errors.mean >= search.base().selection_errors.mean):
+        return _unnamed(found, left, floor)
     asked = (
         SHARES_TO_EXPLAIN
         if error <= MISSING_ERROR_RATIO or search.is_noiseless

@@ -36,7 +36,7 @@ def test_the_table_counts_what_was_said_never_to_settle_and_what_was_refused():
 
 @pytest.mark.parametrize("number", range(len(KINDS)), ids=list(KINDS))
 def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
-    rows = evaluate(at_one_speed(number), number, SEED, "pd")
+    rows = evaluate(at_one_speed(number), number, SEED, "pd", "pulses")
     assert rows
     for row in rows:
         said = f"said {row.said:.1f} s ({row.said_low:.1f} .. {row.said_high:.1f})"
@@ -51,7 +51,7 @@ def test_hulls_of_every_kind_settle_within_what_was_said_and_none_hunts(number):
 def test_an_unstable_hull_gets_no_proportional_gain_and_is_told_what_holds_it():
     number = list(KINDS).index("unstable")
     hull = at_one_speed(number)
-    source, runs = identified(hull, number, SEED)
+    source, runs = identified(hull, number, SEED, "pulses")
     with pytest.raises(ModelError, match="unstable") as caught:
         design_schedule(source, hull.rudder_limit, wish=Wish("p"), runs=runs)
     assert "`--controller pd`" in caught.value.hint

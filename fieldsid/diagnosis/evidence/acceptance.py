@@ -36,12 +36,12 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
 def _explains_most(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
-    What it explains must show on the validation runs: a few percent of the training error alone are the speed and clock of a run.
+    On one of them it must predict better, not equally well.
     """
-    before, after = (
-        sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in (h.selection_errors, h.train)) for h in (without, with_)
-    )
-    return without.selection_errors.over(floor) > EXPLAINED_ERROR_RATIO and before - after > MAIN_EXPLAINED_SHARE * before
+    pairs = [(without.selection_errors, with_.selection_errors), (without.train, with_.train)]
+    before, after = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in zip(*pairs, strict=True))
+    better = any(EQUAL_ERROR_RATIO * now.over(floor) < then.over(floor) for then, now in pairs)
+    return better and leaves_error(without, floor) and before - after > MAIN_EXPLAINED_SHARE * before
 
 
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:

@@ -1,0 +1,42 @@
+"""The verdict on an effect that explains little of a large error."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from fieldsid.diagnosis import verdict
+from fieldsid.models.model import Noise
+
+FLOOR = Noise(angle=0.005, rate=0.005)
+
+
+def errors(ratio):
+    return SimpleNamespace(mean=ratio, over=lambda _floor: ratio)
+
+
+def judged(monkeypatch, before, after, p, *, noiseless=False):
+    monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
+    monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
+    monkeypatch.setattr(verdict, "added_effects", lambda *_of: ("servo_lag",))
+    base = SimpleNamespace(names=(), selection_errors=errors(before), train=errors(before))
+    found = SimpleNamespace(
+        names=("servo_lag",), selection_errors=errors(after), train=errors(after), validation=(), validation_errors=errors(after)
+    )
+    search = SimpleNamespace(floor=FLOOR, root=frozenset(), base=lambda: base, is_noiseless=noiseless)
+    return verdict.verdict_of(search, found, SimpleNamespace(p=p, dependence=p), SimpleNamespace(noise=FLOOR)).word
+
+
+@pytest.mark.parametrize(("p", "word"), [(0.6, "disturbed"), (1e-4, "unexplained")])
+def test_an_effect_that_leaves_more_of_a_large_error_than_it_explains_is_not_what_is_missing(monkeypatch, p, word):
+    assert judged(monkeypatch, 3.5, 3.3, p) == word
+
+
+@pytest.mark.parametrize(("before", "after"), [(3.5, 1.6), (1.45, 1.4), (3.5, 2.4)])
+def test_one_that_explains_most_of_it_or_leaves_little_is_named(monkeypatch, before, after):
+    assert judged(monkeypatch, before, after, 0.6) == "effect"
+
+
+def test_without_noise_no_floor_says_what_is_large(monkeypatch):
+    assert judged(monkeypatch, 3.5, 3.3, 0.6, noiseless=True) == "effect"
