@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import compared_errors, validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import (
@@ -50,15 +51,16 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     it leaves: a lag of a sample may be there, and is not what is missing.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
-    error = found.selection_errors.over(floor)
+    was, now = compared_errors(search.base(), found)
+    error = now.over(floor)
     if frozenset(found.names) == search.root:
-        if max(error, found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:
+        if max(found.selection_errors.over(floor), found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
     visible = error > SUFFICIENT_ERROR_RATIO
-    share = excess_explained(search, found, floor)
+    share = _share(was, now, floor)
     minor = error > MISSING_ERROR_RATIO and share < MAIN_EXPLAINED_SHARE and not search.is_noiseless
-    if visible and (minor or found.selection_errors.mean >= search.base().selection_errors.mean):
+    if visible and (minor or not now.mean < was.mean):
         return _unnamed(found, left, floor)
     asked = (
         SHARES_TO_EXPLAIN
@@ -110,9 +112,13 @@ def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
 
 def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:
     """Return the share (0..1) that a model removes of the base's excess squared error over a noise floor."""
-    base, now = (x.selection_errors.over(floor or search.floor) for x in (search.base(), h))
+    return _share(search.base().selection_errors, h.selection_errors, floor or search.floor)
+
+
+def _share(before: Errors, now: Errors, floor: Noise) -> float:
+    base, left = before.over(floor), now.over(floor)
     excess = base**2 - 1.0
-    return float(np.clip((base**2 - now**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
+    return float(np.clip((base**2 - left**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
 
 
 def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:

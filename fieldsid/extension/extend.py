@@ -14,6 +14,7 @@ import numpy as np
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
+from fieldsid.diagnosis.evidence.acceptance import is_accepted
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
@@ -34,6 +35,10 @@ from fieldsid.models.record import Record, left_out
 
 EQUAL_LOG_LIKELIHOOD = 1e-3
 """Log likelihoods that differ by less are one optimum."""
+FITTED_TO_ALL = Note(
+    "fitted_to_all",
+    "the runs to fit leave the addition's size open, and the unseen ones settle it: all were fitted, none is left to judge by",
+)
 BEAM_WIDTH = 2
 """Orders in which several effects are added that are followed from one addition to the next."""
 
@@ -97,8 +102,10 @@ def extend(
 ) -> Extension:
     """Return a model with effects added by name, base and all effects refitted to the training runs together.
 
-    Without validation runs a part of the training runs is held back to judge by. report is told what is being tried. unfit is
-    told of each of several runs that cannot be fitted; without it, and where none of a group is left, its error is raised.
+    Without validation runs a part of the training runs is held back to judge by. Where an addition is accepted though its error
+    on the validation runs does not fall, since the training runs leave its size open, all runs are fitted together. report is
+    told what is being tried. unfit is told of each of several runs that cannot be fitted; without it, and where none of a group
+    is left, its error is raised.
     Raises UsageError for an effect that is unknown, of the other axis or in the model already, DataError for runs that
     cannot be used or lack a signal the effects need, EffectError for a user's effect that fails, or has a coefficient of a name
     that another effect of the model has.
@@ -108,9 +115,21 @@ def extend(
     records, unseen = [record for _, record in fitted], tuple(record for _, record in checked)
     learned, judged, notes = (tuple(records), unseen, ()) if unseen else holdout_split(records)
     parts = _with_signals((*(effect_held(n, parent.own) for n in parent.effects), *new), [*learned, *judged])
+    notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
     work = Search(learned, judged, parent.axis, parts, parent.effects, report, thorough=True)
-    before = base_from(work, parent)
-    after = _with_all(work)
+    before, after = base_from(work, parent), _with_all(work)
+    found = _extension(work, before, after, new, notes)
+    if found.pays or not judged or not is_accepted(before, after):
+        return found
+    work = Search((*learned, *judged), (), parent.axis, parts, parent.effects, report, thorough=True)
+    return _extension(work, base_from(work, parent), _with_all(work), new, (*notes, FITTED_TO_ALL))
+
+
+def _extension(
+    work: Search, before: ScoredModel, after: ScoredModel, new: Sequence[Effect], notes: tuple[Note, ...]
+) -> Extension:  # fmt: skip
+    """Return the extension from a model without the new effects to one with them, both fitted by one search."""
+    learned, judged = work.records, work.validation
     work.update_noise_floor(after.likelihood_fit.fitted)
     gain = Gain(
         added=tuple(e.name for e in new),
@@ -121,11 +140,9 @@ def extend(
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),
     )
-    model = final_model(after)
-    notes = (*notes, *as_flown(model, judged), *left_out([run for run, _ in (*fitted, *checked)], parent.axis))
-    ended = after.reported_fit
+    model, ended = final_model(after), after.reported_fit
     on_bound = tuple(p.name for p in ended.problem.layout.on_bound(ended.x))
-    return Extension(model, gain, after.log_evidence - before.log_evidence, notes, on_bound)
+    return Extension(model, gain, after.log_evidence - before.log_evidence, (*notes, *as_flown(model, judged)), on_bound)
 
 
 def base_from(work: Search, parent: Model) -> ScoredModel:

@@ -5,7 +5,10 @@ The log evidence holds the prior odds of what was added; the errors are those of
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     EXPLAINED_ERROR_RATIO,
@@ -26,27 +29,45 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
 
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
     a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, the addition
-    may explain instead more of what is left above it than it leaves: near the floor no effect lowers the whole error much.
+    may explain instead more of what is left above it than it leaves: near the floor no effect lowers the whole error much. See
+    `compared_errors` for which validation error.
     """
-    unseen, fitted = with_.selection_errors.mean / without.selection_errors.mean, with_.train.mean / without.train.mean
+    before, now = compared_errors(without, with_)
+    unseen, fitted = now.mean / before.mean, with_.train.mean / without.train.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
-    return keeps_error(without, with_) and bool(lowers or (floor is not None and _explains_most(without, with_, floor)))
+    explains = floor is not None and _explains_most((before, without.train), (now, with_.train), floor)
+    return _keeps(before, now) and (lowers or explains)
 
 
-def _explains_most(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
+def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
+    """Return the validation errors that two models are compared by.
+
+    They are those at the training runs' parameters; where these do not fall, and those at the parameters of all runs do or are at
+    least kept, the latter.
+    """
+    pairs = tuple(zip(without.unseen_errors, with_.unseen_errors, strict=True))
+    lower = next((pair for pair in pairs if pair[1].mean < pair[0].mean), None)
+    return lower or next((pair for pair in pairs if _keeps(*pair)), pairs[0])
+
+
+def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
     On one of them it must predict better, not equally well.
     """
-    pairs = [(without.selection_errors, with_.selection_errors), (without.train, with_.train)]
-    before, after = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in zip(*pairs, strict=True))
-    better = any(EQUAL_ERROR_RATIO * now.over(floor) < then.over(floor) for then, now in pairs)
-    return better and leaves_error(without, floor) and before - after > MAIN_EXPLAINED_SHARE * before
+    was, left = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in (before, now))
+    better = any(EQUAL_ERROR_RATIO * b.over(floor) < a.over(floor) for a, b in zip(before, now, strict=True))
+    leaves = max(errors.over(floor) for errors in before) > EXPLAINED_ERROR_RATIO
+    return better and leaves and was - left > MAIN_EXPLAINED_SHARE * was
 
 
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:
-    """Whether an addition does not raise the validation error."""
-    return bool(with_.selection_errors.mean < EQUAL_ERROR_RATIO * without.selection_errors.mean)
+    """Whether an addition does not raise the validation error, at the training runs' parameters or at those of all runs."""
+    return _keeps(*compared_errors(without, with_))
+
+
+def _keeps(before: Errors, now: Errors) -> bool:
+    return bool(now.mean < EQUAL_ERROR_RATIO * before.mean)
 
 
 def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

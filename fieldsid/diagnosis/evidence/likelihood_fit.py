@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from fieldsid.diagnosis.evidence.information import Information, information
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.initial.effect_screen import equivalent_solution
@@ -56,7 +58,7 @@ class FittedProblem:
         return tuple(e.name for e in self.effects)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LikelihoodFit:
     """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there."""
 
@@ -65,6 +67,11 @@ class LikelihoodFit:
     log_likelihood: float
     noise_kind: str
     floor: Noise
+
+    @cached_property
+    def information(self) -> Information:
+        """What the training runs know of the parameters."""
+        return information(self.fitted.problem, self.fitted.x, self.noise)
 
 
 def fit_output_error(

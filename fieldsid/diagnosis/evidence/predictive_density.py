@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
-from fieldsid.fitting.optimise.levenberg_marquardt import gram_products, normal_equations
+from fieldsid.fitting.optimise.levenberg_marquardt import gram_products
 from fieldsid.fitting.predict.predict import values_at_speed
 from fieldsid.fitting.problem.problem import Problem, RunResult
 from fieldsid.models.axis import NAMES
@@ -58,8 +58,12 @@ class ValidationRun:
     linearisation: RunResult
 
 
-def log_predictive_density(ml_fit: LikelihoodFit, runs: Sequence[ValidationRun], records: Sequence[Record]) -> FloatArray:
+def log_predictive_density(
+    ml_fit: LikelihoodFit, runs: Sequence[ValidationRun], records: Sequence[Record]
+) -> tuple[FloatArray, list[FloatArray]]:
     """Return the log predictive density of each validation run, (R,), in turn, under the noise that all of them support.
+
+    With it, each run's residual (2, n) at the parameters' posterior mean after all runs.
 
     The parameters are those of the training runs. The noise is estimated from the validation runs: that of the training runs
     would penalise a model the more for a small error, the better it fitted there.
@@ -74,8 +78,8 @@ def log_predictive_density(ml_fit: LikelihoodFit, runs: Sequence[ValidationRun],
         noise, _ = estimate_noise(
             records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, floor=ml_fit.floor, evaluations=evaluations
         )
-        found.append(_under(noise, runs, dynamics, known)[0])
-    return max(found, key=lambda v: float(v.sum()))
+        found.append(_under(noise, runs, dynamics, known))
+    return max(found, key=lambda v: float(v[0].sum()))
 
 
 def _differ(plain: Sequence[FloatArray], led: Sequence[FloatArray], floor: Noise) -> bool:
@@ -88,9 +92,8 @@ def precision(ml_fit: LikelihoodFit) -> FloatArray:
     """Return the posterior precision (S, S) of the shared parameters after the training runs, nuisances projected out."""
     problem, x = ml_fit.fitted.problem, ml_fit.fitted.x
     shared = problem.layout.shared
-    _, normal, _, _ = normal_equations(problem, x, ml_fit.noise, range(x.size))
     width = (problem.layout.high - problem.layout.low)[:shared]
-    a, _ = _schur_complement(normal, np.zeros(x.size), shared)
+    a, _ = _schur_complement(ml_fit.information.normal, np.zeros(x.size), shared)
     return a + np.diag(1.0 / width**2)
 
 

@@ -1,9 +1,11 @@
 """A fitted model with its free-run errors and its log evidence, by which models are ranked.
 
-    log evidence = log L(training runs) + log p(validation runs | training runs) - 1/2 k log N - prior log odds
-The first and third terms are the Schwarz approximation of the evidence of the training runs, the second is the predictive density
-of the validation runs. The prior log odds are those against each effect, and against each variant other than the textbook's.
-Source: Schwarz 1978, Annals of Statistics 6(2); Kass and Raftery 1995, section 4.
+    log evidence = log L(training runs) + log p(validation runs | training runs) - 1/2 sum_j log n_j - prior log odds
+The first and third terms are the Schwarz approximation of the evidence of the training runs, with the effective sample size n_j
+of each coefficient (information.py); the second is the predictive density of the validation runs. The prior log odds are those
+against each effect, and against each variant other than the textbook's.
+Source: Schwarz 1978, Annals of Statistics 6(2); Kass and Raftery 1995, section 4; Berger, Bayarri and Pericchi 2014, Econometric
+Reviews 33.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.fitting.predict.predict import frozen_problem, refit_nuisances, with_command_timing
 from fieldsid.fitting.predict.speed_correction import correct_speed, speed_sensitivity
+from fieldsid.fitting.problem.parameters import group_name
 from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Effect, definitions_of
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
@@ -54,6 +58,7 @@ class ScoredModel:
     complexity_penalty: float
     validation: tuple[Record, ...]
     validation_fits: ValidationFits
+    settled_errors: Errors | None = None
     output_error_fit: FittedProblem | None = None
 
     @property
@@ -92,6 +97,15 @@ class ScoredModel:
         """The errors that models are selected by: on the validation runs, or on the training runs where there are none."""
         return self.validation_errors if self.validation else self.train
 
+    @property
+    def unseen_errors(self) -> tuple[Errors, ...]:
+        """The errors that models are compared by: at the training runs' parameters, and at those that all runs leave together.
+
+        Training runs may leave a parameter open that one validation run settles, as two headings do a current: the first are
+        then those of a chance value.
+        """
+        return (self.selection_errors,) if self.settled_errors is None else (self.selection_errors, self.settled_errors)
+
     def evaluate_errors(self, *, fitted: bool = False) -> ScoredModel:
         """Return itself with the selection errors computed, so that the process that fitted it computes them too.
 
@@ -125,13 +139,15 @@ def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredMo
     """Return a maximum-likelihood fit with its log likelihood by training run and log predictive density by validation run."""
     problem, x = ml_fit.fitted.problem, ml_fit.fitted.x
     flown = validation_fits(bare_model(problem, x, ml_fit.noise), ml_fit.fitted, validation)
+    density, settled = validation_log_density(ml_fit, validation, flown)
     return ScoredModel(
         ml_fit,
         likelihood_by_run(problem, x, ml_fit.noise),
-        validation_log_density(ml_fit, validation, flown),
+        density,
         bic_penalty(ml_fit, validation),
         tuple(validation),
         flown,
+        pooled_errors(validation, settled) if validation else None,
     )
 
 
@@ -142,10 +158,12 @@ def validation_fits(model: Model, fitted: FittedProblem, validation: Sequence[Re
     return tuple(with_command_timing(*p, model.noise) for p in problems)
 
 
-def validation_log_density(ml_fit: LikelihoodFit, validation: Sequence[Record], flown: ValidationFits) -> FloatArray:
-    """Return each validation run's log predictive density, (R,)."""
+def validation_log_density(
+    ml_fit: LikelihoodFit, validation: Sequence[Record], flown: ValidationFits
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Return each validation run's log predictive density, (R,), and its residual (2, n) at the posterior mean of all runs."""
     if not validation:
-        return np.zeros(0)
+        return np.zeros(0), []
     runs = [
         ValidationRun(
             p,
@@ -225,19 +243,21 @@ def training_errors(fitted: FittedProblem) -> Errors:
 
 
 def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
-    """Return the prior log odds and 1/2 k log N.
+    """Return the prior log odds and half the log of the effective sample size of each coefficient.
 
-    Shared coefficients and authorities beyond the first count once, nuisances once for every run they fit.
+    Shared coefficients and authorities beyond the first count once; nuisances once for every run they fit, with all its samples.
 
     The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
     """
     layout, records = ml_fit.fitted.problem.layout, ml_fit.fitted.problem.records
     own = sum(len(e.nuisance) for e in layout.effects)
     hidden = sum(1 for e in layout.effects if e.extra_states)
-    count = sum(len(e.shared) for e in layout.effects) + (0 if layout.groups.by_law else len(layout.groups.speeds) - 1)
-    total = sum(ALTERNATIVE_LOG_ODDS * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects) + 0.5 * count * np.log(
-        measured_count(records)
-    )
+    total = sum(ALTERNATIVE_LOG_ODDS * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects)
+    beyond = {c.name for e in layout.effects for c in e.shared} | {
+        group_name(NAMES[layout.axis].authority, layout.groups, i) for i in range(len(layout.groups.speeds))
+    } - {NAMES[layout.axis].authority}
+    sizes = ml_fit.information.sample_sizes
+    total += 0.5 * float(np.log(sizes[[n in beyond for n in layout.names]]).sum())
     for record in (*records, *validation):
         total += 0.5 * own * np.log(max(measured_count([record]), 2)) + hidden
     return float(total) + exchange_penalty(ml_fit)

@@ -60,11 +60,25 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
         )
     names = " and ".join(verdict.effects)
     says = "; ".join(_says(found, n) for n in verdict.effects)
-    fall = f"the error on {runs} falls from {_sized(search, search.base(), base)} to {_sized(search, found, error)}"
+    fall = _fall(search, found, floor, runs)
     if verdict.word == "undecided":
         others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
         return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
     return f"{names} ({says}): {fall}"
+
+
+def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
+    """Return how the error falls with a model's effects; where the fitted runs' numbers raise it, with all runs'."""
+    base = search.base()
+    before, after = over(search, base, floor), over(search, found, floor)
+    if found.selection_errors.mean < base.selection_errors.mean or not search.validation:
+        return f"the error on {runs} falls from {_sized(search, base, before)} to {_sized(search, found, after)}"
+    fitted = " to ".join(f"{h.train.over(floor):.2f}" for h in (base, found))
+    settled = min(errors.over(floor) for errors in found.unseen_errors)
+    return (
+        f"the error on the fitted runs goes from {fitted} x the noise floor, that on {runs} from {before:.2f} to {after:.2f} x "
+        f"with their numbers, to {settled:.2f} x with those that all runs together leave"
+    )
 
 
 def _disturbance(noise: Noise) -> str:

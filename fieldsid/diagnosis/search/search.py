@@ -34,6 +34,7 @@ class Search(MoveEvaluation):
         self._expand()
         self._join_leaders()
         self._exchange_for_variants()
+        self._drop_each()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -169,9 +170,16 @@ class Search(MoveEvaluation):
         fitted = h.likelihood_fit.fitted
         problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
         x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
-        ml_fit = fit_maximum_likelihood(problem, x, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
-        key = frozenset(ml_fit.fitted.names)
-        before, kept = self.tried.get(key), self._keep(ml_fit)
+        starts, before = [x], self.tried.get(frozenset(e.name for e in problem.layout.effects))
+        if before is not None and any(e not in before.effects for e in problem.layout.effects):
+            # in its variants the others' numbers may be far from those without it
+            own = before.likelihood_fit.fitted
+            starts.append(overlay_parameters(own.problem.layout, own.x, problem.layout, x))
+        for start in starts:
+            kept = self._keep(
+                fit_maximum_likelihood(problem, start, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+            )
+        key = frozenset(kept.names)
         if kept is not before:
             self.tried[key] = prefer_output_error(kept, self.floor)
         return self.tried[key]

@@ -16,13 +16,20 @@ def errors(ratio):
     return SimpleNamespace(mean=ratio, over=lambda _floor: ratio)
 
 
-def judged(monkeypatch, before, after, p, *, noiseless=False):
+def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
     monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
     monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
     monkeypatch.setattr(verdict, "added_effects", lambda *_of: ("servo_lag",))
-    base = SimpleNamespace(names=(), selection_errors=errors(before), train=errors(before))
+    base = SimpleNamespace(
+        names=(), selection_errors=errors(before), train=errors(before), unseen_errors=(errors(before), errors(before))
+    )
     found = SimpleNamespace(
-        names=("servo_lag",), selection_errors=errors(after), train=errors(after), validation=(), validation_errors=errors(after)
+        names=("servo_lag",),
+        selection_errors=errors(after),
+        train=errors(after),
+        validation=(),
+        validation_errors=errors(after),
+        unseen_errors=(errors(after), errors(settled or after)),
     )
     search = SimpleNamespace(floor=FLOOR, root=frozenset(), base=lambda: base, is_noiseless=noiseless)
     return verdict.verdict_of(search, found, SimpleNamespace(p=p, dependence=p), SimpleNamespace(noise=FLOOR)).word
@@ -40,3 +47,8 @@ def test_one_that_explains_most_of_it_or_leaves_little_is_named(monkeypatch, bef
 
 def test_without_noise_no_floor_says_what_is_large(monkeypatch):
     assert judged(monkeypatch, 3.5, 3.3, 0.6, noiseless=True) == "effect"
+
+
+@pytest.mark.parametrize(("settled", "word"), [(1.1, "effect"), (12.0, "unexplained")])
+def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, word):
+    assert judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled) == word

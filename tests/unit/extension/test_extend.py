@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import hidden_lag
 import numpy as np
 import pytest
@@ -55,7 +57,20 @@ def test_an_effect_that_is_not_there_does_not_pay():
     train, unseen = hidden_lag.runs(lag=0.0)
     found = extend(PLAIN, ["deadband"], train, [unseen])
     assert not found.pays
+    assert found.gain.unseen
     assert found.gain.over_floor[1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_is_accepted_though_no_unseen_error_falls_is_fitted_to_all_runs(monkeypatch):
+    from fieldsid.extension import extend as module
+
+    monkeypatch.setattr(sys.modules[module.__module__], "is_accepted", lambda *_of: True)
+    train, unseen = hidden_lag.runs(lag=0.0)
+    found = extend(PLAIN, ["deadband"], train, [unseen])
+    assert not found.gain.unseen
+    assert found.gain.learned_on == (*(r.name for r in train), unseen.name) == found.gain.judged_on
+    assert "fitted_to_all" in {note.code for note in found.notes}
+    assert not found.pays
 
 
 def test_where_nothing_can_be_held_back_the_evidence_must_pay():

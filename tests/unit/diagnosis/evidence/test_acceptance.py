@@ -16,9 +16,12 @@ from fieldsid.models.model import Noise
 FLOOR = Noise(0.004, 0.002)
 
 
-def hypothesis(*names, gain=0.0, over=1.0, train=1.0):
-    """One with this much log evidence beyond the base, half of it learned, and errors over the floor."""
-    errors = [Errors(FLOOR.angle * e, FLOOR.rate * e) for e in (over, train)]
+def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None):
+    """One with this much log evidence beyond the base, half of it learned, and errors over the floor.
+
+    `settled` is the one on unseen runs with the numbers of all runs, by default that with those of the fitted.
+    """
+    errors = [Errors(FLOOR.angle * e, FLOOR.rate * e) for e in (over, train, over if settled is None else settled)]
     effects = tuple(effect_named(n) for n in names)
     learned = np.array([0.25 * gain, 0.25 * gain])
     return SimpleNamespace(
@@ -28,6 +31,7 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0):
         log_evidence=gain,
         selection_errors=errors[0],
         train=errors[1],
+        unseen_errors=(errors[0], errors[2]),
     )
 
 
@@ -98,3 +102,15 @@ def test_near_the_floor_an_addition_counts_that_explains_more_than_it_leaves(bef
     more = hypothesis("servo_lag", "stall", gain=50.0, over=after[0], train=after[1])
     assert is_accepted(base, more, FLOOR) == counts
     assert not is_accepted(base, more)
+
+
+@pytest.mark.parametrize(("settled", "counts"), [(1.0, True), (1.22, True), (1.3, False)])
+def test_what_the_fitted_runs_leave_open_is_judged_with_the_numbers_of_all_runs(settled, counts):
+    base, found = hypothesis(over=1.2, train=3.0), hypothesis("current", gain=50.0, over=5.0, train=1.0, settled=settled)
+    assert (keeps_error(base, found), lowers_error(base, found)) == (counts, counts)
+
+
+def test_errors_are_compared_like_with_like():
+    base = hypothesis(over=2.3, train=1.2, settled=1.2)
+    assert lowers_error(base, hypothesis("backlash", gain=50.0, over=1.6, train=1.1, settled=1.7))
+    assert not lowers_error(base, hypothesis("backlash", gain=50.0, over=2.4, train=1.1, settled=1.7))

@@ -10,8 +10,8 @@ import pytest
 from fieldsid.diagnosis.diagnose import confusable
 from fieldsid.diagnosis.evidence.scored_model import pooled_errors
 from fieldsid.diagnosis.records import Errors, Pair
-from fieldsid.diagnosis.report.report_text import evidence
-from fieldsid.diagnosis.verdict import excess_explained, probabilities, worsens
+from fieldsid.diagnosis.report.report_text import evidence, headline
+from fieldsid.diagnosis.verdict import Verdict, excess_explained, probabilities, worsens
 from fieldsid.models.model import Noise
 
 FLOOR = Noise(0.004, 0.002)
@@ -92,3 +92,16 @@ def test_errors_hold_those_of_each_run():
     assert [e.angle_rms_rad for e in found.each] == pytest.approx([0.1, 0.3])
     assert found.rate_rms_rad_s == pytest.approx(np.sqrt((10 * 0.01 + 30 * 0.09) / 40))
     assert pooled_errors([], []).each == ()
+
+
+def test_where_the_fitted_runs_leave_the_numbers_open_the_headline_says_both_errors():
+    base, found = _made(train=(3.0,), unseen=(7.0,), score=0.0), _made("current", train=(1.0,), unseen=(9.0,), score=40.0)
+    found.train, base.train, found.effects = found.errors.train, base.errors.train, ()
+    found.unseen_errors = (found.selection_errors, _errors(1.1))
+    search = _search(base)
+    search.is_noiseless = False
+    said = headline(search, Verdict("effect", ("current",)), found, SimpleNamespace(), FLOOR, FLOOR)
+    assert said.endswith(
+        "the error on the fitted runs goes from 3.00 to 1.00 x the noise floor, that on unseen runs from 7.00 to 9.00 x with "
+        "their numbers, to 1.10 x with those that all runs together leave"
+    )

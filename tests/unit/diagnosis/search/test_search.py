@@ -115,6 +115,7 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
             log_evidence=evidence,
             log_likelihood_by_run=known,
             selection_errors=errors,
+            unseen_errors=(errors,),
             train=errors,
         )
 

@@ -19,7 +19,12 @@ def hypothesis(*names, score, fitted=0.0, error=1.0):
     """A hypothesis of some evidence, on all runs and on those fitted to, and its error on unseen ones."""
     errors = SimpleNamespace(mean=error)
     return SimpleNamespace(
-        names=names, log_evidence=score, log_likelihood_by_run=np.array([fitted]), complexity_penalty=0.0, selection_errors=errors
+        names=names,
+        log_evidence=score,
+        log_likelihood_by_run=np.array([fitted]),
+        complexity_penalty=0.0,
+        selection_errors=errors,
+        unseen_errors=(errors,),
     )
 
 
