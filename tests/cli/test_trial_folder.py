@@ -9,6 +9,7 @@ from hashlib import sha256
 import pytest
 from cli import trial
 
+from fieldsid.logs import load_run, save_run
 from fieldsid.trial_folder.journal import Entry, Stamp, append
 
 
@@ -182,6 +183,25 @@ def test_status_of_another_folder_says_where_to_go(run_cli, folder, monkeypatch)
     answer = run_cli("status", "nowhere")
     assert answer.code == 2
     assert "`nowhere` is no folder" in answer.err
+
+
+def test_status_tells_a_fin_limit_that_the_runs_contradict_until_it_is_corrected(run_cli, folder):
+    vehicle = folder / "vehicle.yaml"
+    vehicle.write_text(vehicle.read_text().replace("rudder_max_rad: 0.436", "rudder_max_rad: 0.1"))
+    assert run_cli("status", "--json").json["warnings"] == []  # these runs were not imported here
+    for run in sorted((folder / "runs").iterdir()):
+        save_run(load_run(run), folder / "logs" / f"{run.stem}.csv")
+    imported = run_cli("import", "logs/pulses_1.0.csv", "logs/pulses_1.4.csv", "-o", "runs", "--force")
+    (line,) = (part for part in imported.err.splitlines() if "[saturated]" in part)
+    assert "(and 1 more like it)" in line
+    (told,) = run_cli("status", "--json").json["warnings"]
+    assert told["code"] == "fin_limit"
+    assert told["message"].startswith("vehicle.yaml: `rudder_max_rad: 0.1` is less than the 0.")
+    vehicle.write_text(vehicle.read_text().replace("rudder_max_rad: 0.1", "rudder_max_rad: 0.4"))
+    assert run_cli("status").err == ""
+    vehicle.write_text("name: [")
+    (told,) = run_cli("status", "--json").json["warnings"]
+    assert told["code"] == "vehicle"
 
 
 def test_status_writes_nothing(run_cli, folder):
