@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shlex
+from dataclasses import replace
 from hashlib import sha256
 
+import numpy as np
 import pytest
 from cli import trial
 
@@ -208,6 +210,28 @@ def test_status_writes_nothing(run_cli, folder):
     before = (folder / "journal.jsonl").read_bytes()
     assert run_cli("status").code == 0
     assert (folder / "journal.jsonl").read_bytes() == before
+
+
+def with_track(file):
+    """The run of a file with the positions that its heading at 1.4 m/s makes."""
+    run = load_run(file)
+    steps = 1.4 * np.diff(run.time, prepend=run.time[0])
+    track = {"x_m": np.cumsum(steps * np.cos(run["yaw_rad"])), "y_m": np.cumsum(steps * np.sin(run["yaw_rad"]))}
+    save_run(replace(run, signals={**run.signals, **track}), file, force=True)
+
+
+def test_turn_radius_takes_the_circles_that_were_flown_and_counts_each_once(run_cli, folder):
+    with_track(trial.flown(folder / "runs", spec="turning_circle", name="circle"))
+    with_track(folder / "runs/pulses_1.0.parquet")  # a track alone is no circle
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--effects", "servo_lag", "--no-figures").code == 0
+    answer = run_cli("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", "--json")
+    assert "joint_yaw.yaml --measured runs/circle.parquet\n" in answer.err
+    (circle,) = answer.json["measured"]
+    assert circle["run"] == "circle"
+    others = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
+    line = [w for run in others for w in ("--runs", run)]
+    apart = run_cli("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", *line, "--json").json["measured"]
+    assert apart == answer.json["measured"]
 
 
 def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cli, folder):
