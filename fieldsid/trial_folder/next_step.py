@@ -17,6 +17,8 @@ DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 
 REPORT = "sysid report"
+TAKES_ALL_RUNS = ("identify", "diagnose")
+"""Commands that take every run of their trial folder where none is typed."""
 
 
 def next_step(state: FolderState) -> tuple[str, str]:
@@ -31,12 +33,20 @@ def _again(state: FolderState) -> tuple[str, str] | None:
         return None
     first = min(stale, key=lambda i: i.stale.endswith(" is stale"))
     maker = made_by(state.entries, first.path)
-    return f"{first.path}: {first.stale}", _made_again(maker) if maker is not None else _remake(state, first)
+    return f"{first.path}: {first.stale}", _made_again(state, maker) if maker is not None else _remake(state, first)
 
 
-def _made_again(entry: Entry) -> str:
-    words = [w for w in entry.command if w != "--json"]
+def _made_again(state: FolderState, entry: Entry) -> str:
+    words = _words(state, entry)
     return shlex.join([*words, *([] if "--force" in words else ["--force"])])
+
+
+def _words(state: FolderState, entry: Entry) -> list[str]:
+    """Return the words of a command, to be run again; without its runs where it takes just these from its trial folder."""
+    words = [w for w in entry.command if w != "--json"]
+    runs = [w for w in words if w in run_words(state)]
+    takes_all = words[1] in TAKES_ALL_RUNS and "--validate" not in words and is_trial(state.folder)
+    return [w for w in words if w not in runs] if takes_all and sorted(runs) == sorted(run_words(state)) else words
 
 
 def _remake(state: FolderState, item: Item) -> str:
@@ -105,7 +115,7 @@ def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] |
     """
     if diagnosis is None:
         return None
-    verdict, words = diagnosis.verdict.partition(":")[0], [w for w in diagnosis.command if w != "--json"]
+    verdict, words = diagnosis.verdict.partition(":")[0], _words(state, diagnosis)
     written = {"-o", "--output", "--figure"} & set(words)
     if verdict == "unexplained" and "--thorough" not in words:
         longer = shlex.join([*words, "--thorough", *(["--force"] if written and "--force" not in words else [])])

@@ -54,10 +54,10 @@ def turn_radius(
 
     runs are those the models came from, measured are runs of turns: the turn is that of a vehicle in surge, sway and yaw fitted
     to all of them, `length` (m) being the vehicle's where it is known. A measured circle is compared with what the other runs
-    alone predict, and counts once where the models were fitted to it too. method "auto" does so where the models carry effects and the runs a speed; without runs it simulates
-    models with effects, and takes the u-turn formula elsewhere, where an offset of the fin below `fin_zero` (rad) is not
-    counted. unfit is told of each of several measured runs without a circle; without it, and where none has one, DataError is
-    raised. Raises UsageError, and ModelError for an unstable model.
+    alone predict, and counts once where the models were fitted to it too. method "auto" does so where the models carry effects
+    and the runs a speed; without runs it simulates models with effects, and takes the u-turn formula elsewhere, where an offset
+    of the fin below `fin_zero` (rad) is not counted. unfit is told of each of several measured runs without a circle; without
+    it, and where none has one, DataError is raised. Raises UsageError, and ModelError for an unstable model.
     """
     _check(source, speeds, rudder_max, method)
     source = source.models_flown_by(runs)

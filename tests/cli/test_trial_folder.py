@@ -14,6 +14,8 @@ from cli import trial
 from fieldsid.logs import load_run, save_run
 from fieldsid.trial_folder.journal import Entry, Stamp, append
 
+BOTH_RUNS = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
+
 
 @pytest.fixture
 def folder(run_cli, tmp_path, monkeypatch):
@@ -134,6 +136,13 @@ def test_the_fin_of_a_planned_leg_is_no_log(run_cli, folder):
             ("d.yaml",),
             "sysid diagnose --axis yaw -o d.yaml --thorough --force",
         ),
+        (("diagnose", "--axis", "yaw", *BOTH_RUNS), "unexplained: 2.3 x", (), "sysid diagnose --axis yaw --thorough"),
+        (
+            ("diagnose", "--axis", "yaw", BOTH_RUNS[0], "--validate", BOTH_RUNS[1]),
+            "unexplained: 2.3 x",
+            (),
+            "sysid diagnose --axis yaw runs/pulses_1.0.parquet --validate runs/pulses_1.4.parquet --thorough",
+        ),
         (("diagnose", "--axis", "yaw", "--thorough"), "unexplained: 2.3 x", (), "sysid schedule design -o gains.yaml"),
         (("diagnose", "--axis", "yaw", "-o", "d.yaml"), "undecided: two", ("d.yaml",), "sysid plan --from d.yaml -o plan"),
     ],
@@ -155,7 +164,7 @@ def test_a_changed_run_makes_its_model_stale_and_the_gains_made_of_that(run_cli,
     assert why["models/joint_yaw.yaml"] == "runs/pulses_1.0.parquet has changed"
     assert why["gains.yaml"] == "models/joint_yaw.yaml is stale"
     again = body["next"]["command"]
-    assert again.startswith("sysid identify --axis yaw --joint --no-figures ")
+    assert again == "sysid identify --axis yaw --joint --no-figures -o models --force"
     assert run_cli(*shlex.split(again)[1:]).code == 0
     body = run_cli("status", "--json").json
     assert body["stale"] == ["gains.yaml"]

@@ -150,6 +150,5 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
 def in_words(added: Sequence[str]) -> str:
     """Return what was taken from the folder, short."""
     runs = [w for w in added if w.startswith(f"{RUNS}/")]
-    if len(runs) <= FEW:
-        return " ".join(added)
-    return " ".join([*dict.fromkeys(w for w in added if w not in runs), runs[0], f"... {len(runs)} runs"])
+    words = dict.fromkeys(w for w in added if w not in runs)
+    return " ".join([*words, *(runs if len(runs) <= FEW else [runs[0], f"... {len(runs)} runs"])])
