@@ -26,6 +26,18 @@ def next_step(state: FolderState) -> tuple[str, str]:
     return (_again(state) or _data(state) or _model(state) or _use(state)) or ("everything rests on what is there", "")
 
 
+def step_before(command: str, state: FolderState) -> tuple[str, str]:
+    """Return why a command finds nothing to work on here, and what to run first; empty where nothing would help."""
+    if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
+        return step
+    if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
+        runs = [i for i in state.of_kind(RUN) if Axis.YAW in _axes(state, i)]
+        if not runs:
+            return "there is no model of the yaw, and no run with a rudder", ""
+        return "there is no model of the yaw yet", shlex.join(["sysid", "identify", "--axis", "yaw", *_joint(runs)])
+    return next_step(state)
+
+
 def _again(state: FolderState) -> tuple[str, str] | None:
     """Return how to make the first stale file again; what only rests on a stale one comes after it."""
     stale = [i for i in state.items if i.stale]
@@ -204,7 +216,14 @@ def _axis(state: FolderState) -> str:
     """Return the plane of the models, else the one that the first run moved a fin in; yaw where both are there."""
     if state.models:
         return str((state.models[0].body or {}).get("axis", "yaw"))
-    tables = [state.place(i) for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
-    names = import_module("pyarrow.parquet").read_schema(tables[0]).names if tables else []
-    axes = [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & set(names)]
+    tables = [i for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
+    axes = _axes(state, tables[0]) if tables else []
     return axes[0].value if axes else Axis.YAW.value
+
+
+def _axes(state: FolderState, run: Item) -> list[Axis]:
+    """Return the planes that a run has a fin of, every one where it is no Parquet file."""
+    if not run.path.endswith(".parquet"):
+        return list(Axis)
+    names = set(import_module("pyarrow.parquet").read_schema(state.place(run)).names)
+    return [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & names]

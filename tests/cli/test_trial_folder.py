@@ -12,6 +12,7 @@ import pytest
 from cli import trial
 
 from fieldsid.logs import load_run, save_run
+from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.journal import Entry, Stamp, append
 
 BOTH_RUNS = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
@@ -47,6 +48,24 @@ def test_a_command_that_comes_too_early_is_told_what_comes_before_it(run_cli, fo
         assert "and the trial folder does not give it\n" in answer.err
         assert answer.err.endswith("\nhint: there is no model of the runs yet: `sysid identify --axis yaw --joint`\n")
     assert "trial folder" not in run_cli("effects", "show").err
+
+
+def test_a_command_that_comes_too_early_is_told_what_it_needs_itself(run_cli, folder):
+    trial.model_file(folder / "models", Axis.PITCH)
+    assert run_cli("turn-radius").err.endswith("hint: there is no model of the yaw yet: `sysid identify --axis yaw --joint`\n")
+    assert run_cli("schedule", "verify").err.endswith("hint: no gains yet: `sysid schedule design -o gains.yaml`\n")
+    for speed in (1.0, 1.4):
+        (folder / f"runs/pulses_{speed}.parquet").unlink()
+    trial.flown(folder / "runs", Axis.PITCH, name="pitch")
+    assert "hint: there is no model of the yaw, and no run with a rudder: `sysid status`" in run_cli("turn-radius").err
+
+
+def test_a_batch_that_could_use_nothing_leads_to_its_logs_and_not_to_a_trend(run_cli, folder):
+    for run in (folder / "runs").iterdir():
+        run.unlink()
+    trial.flown(folder / "runs", Axis.PITCH, name="pitch")
+    answer = run_cli("batch", "--axis", "yaw", "--json")
+    assert (answer.code, json.loads(answer.out)["headline"]["next"]) == (1, "sysid inspect runs/pitch.parquet")
 
 
 def test_what_is_typed_counts(run_cli, folder):
