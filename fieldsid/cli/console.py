@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, TypeVar
@@ -135,6 +135,21 @@ def warn(notes: Iterable[Note], *, of: str = "") -> None:
     for note in notes:
         said = f"{where}{note.message} [{note.code}]"
         to.print(Text(f"warning: {folded(said, to.width) if to.is_terminal else said}", style="yellow"), soft_wrap=True)
+
+
+def alike(found: Iterable[tuple[Hashable, str, Note]]) -> list[Note]:
+    """Return one warning of each kind, that of the first run that has it and how many more have it.
+
+    `found` gives of each its kind, whose it is, and the note.
+    """
+    kinds: dict[Hashable, list[tuple[str, Note]]] = {}
+    for kind, whose, note in found:
+        kinds.setdefault(kind, []).append((whose, note))
+    said = []
+    for (whose, note), *others in kinds.values():
+        more = f" (and {len(others)} more like it)" if others else ""
+        said.append(Note(note.code, f"{whose}: {note.message}{more}", {}))
+    return said
 
 
 def folded(text: str, width: int) -> str:

@@ -85,7 +85,7 @@ def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageErr
         from fieldsid.trial_folder.journal import JOURNAL
 
         if Path(JOURNAL).is_file() and path.removeprefix("sysid ") in FILLS:
-            return _not_given(words, arguments)
+            return _not_given(words, arguments, path.removeprefix("sysid "))
         hint = f"{_example(context)}{hint}"
     return UsageError(words, found=shlex.join(["sysid", *arguments]), hint=hint)
 
@@ -96,13 +96,13 @@ def _example(context: typer.Context | None) -> str:
     return f"`{line.splitlines()[0]}`, or " if is_there else ""
 
 
-def _not_given(words: str, arguments: Sequence[str]) -> UsageError:
+def _not_given(words: str, arguments: Sequence[str], command: str) -> UsageError:
     """Say of what the trial folder, which is the working folder, was to give and does not have what comes before it there."""
-    from fieldsid.trial_folder.next_step import next_step
+    from fieldsid.trial_folder.next_step import step_before
     from fieldsid.trial_folder.state import state_of
 
-    why, line = next_step(state_of(Path()))
-    hint = f"{why}: `{line}`" if line else "`sysid status` lists what is there"
+    why, line = step_before(command, state_of(Path()))
+    hint = f"{why}: `{line}`" if line else f"{why}: `sysid status` lists what is there"
     return UsageError(f"{words}, and the trial folder does not give it", found=shlex.join(["sysid", *arguments]), hint=hint)
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from math import exp, log
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +12,13 @@ import numpy as np
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import DOWN_TO_NOISE, Channel, Comparison
 from fieldsid.reporting import figures
+from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
 from fieldsid.rounding import MANY, in_unit, interval, number, probability, with_error
-from fieldsid.trial_folder.journal import Entry, made_by, relative_to
+from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT
-from fieldsid.trial_folder.state import FolderState, Item, Source
+from fieldsid.trial_folder.patterns import shortened
+from fieldsid.trial_folder.state import FolderState, Item
 
 DONE = (0, 1)
 MOST_CANDIDATES = 12
@@ -38,7 +38,7 @@ def context_of(material: Material) -> dict[str, Any]:
         "runs": [_run(r) for r in material.runs],
         "axes": [_axis(a) for a in material.axes],
         "vehicle": _vehicle(material),
-        "files": [_file(i, state) for i in state.items],
+        "files": lineage_rows(state),
         "commands": _commands(state),
         "notes": material.notes.strip(),
         "skipped": list(material.skipped),
@@ -279,27 +279,10 @@ def _vehicle(material: Material) -> list[tuple[str, str]]:
     return [(name, f"{number(value, 3)} {unit}") for name, value, unit in pairs if value is not None]
 
 
-def _file(item: Item, state: FolderState) -> dict[str, str]:
-    maker = made_by(state.entries, item.path)
-    return {
-        "path": item.path,
-        "kind": item.kind,
-        "made_from": "\n".join(_source(s, state.folder) for s in item.sources),
-        "by": "" if maker is None else " ".join(maker.command[:3]),
-        "state": f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else "",
-    }
-
-
-def _source(source: Source, folder: Path) -> str:
-    name = source.named if source.path is None else relative_to(source.path, folder)
-    return f"{name} ({source.sha256[:8]})" if source.sha256 else name
-
-
 def _commands(state: FolderState) -> list[dict[str, str]]:
     """Return the commands that made what is there: those of the journal that ended well and wrote something or gave a result."""
-    return [
-        {"line": shlex.join(e.command), "verdict": e.verdict, "time": _when(e)} for e in _told(state.entries) if e.exit in DONE
-    ]
+    told = [e for e in _told(state.entries) if e.exit in DONE]
+    return [{"line": shortened(e.command, state.folder), "verdict": e.verdict, "time": _when(e)} for e in told]
 
 
 def _told(entries: Sequence[Entry]) -> list[Entry]:

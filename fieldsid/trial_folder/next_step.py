@@ -17,11 +17,25 @@ DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 
 REPORT = "sysid report"
+TAKES_ALL_RUNS = ("identify", "diagnose")
+"""Commands that take every run of their trial folder where none is typed."""
 
 
 def next_step(state: FolderState) -> tuple[str, str]:
     """Return why, and the command to run next, ready to paste in the folder; without one where nothing is left to do."""
     return (_again(state) or _data(state) or _model(state) or _use(state)) or ("everything rests on what is there", "")
+
+
+def step_before(command: str, state: FolderState) -> tuple[str, str]:
+    """Return why a command finds nothing to work on here, and what to run first; empty where nothing would help."""
+    if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
+        return step
+    if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
+        runs = [i for i in state.of_kind(RUN) if Axis.YAW in _axes(state, i)]
+        if not runs:
+            return "there is no model of the yaw, and no run with a rudder", ""
+        return "there is no model of the yaw yet", shlex.join(["sysid", "identify", "--axis", "yaw", *_joint(runs)])
+    return next_step(state)
 
 
 def _again(state: FolderState) -> tuple[str, str] | None:
@@ -31,12 +45,20 @@ def _again(state: FolderState) -> tuple[str, str] | None:
         return None
     first = min(stale, key=lambda i: i.stale.endswith(" is stale"))
     maker = made_by(state.entries, first.path)
-    return f"{first.path}: {first.stale}", _made_again(maker) if maker is not None else _remake(state, first)
+    return f"{first.path}: {first.stale}", _made_again(state, maker) if maker is not None else _remake(state, first)
 
 
-def _made_again(entry: Entry) -> str:
-    words = [w for w in entry.command if w != "--json"]
+def _made_again(state: FolderState, entry: Entry) -> str:
+    words = _words(state, entry)
     return shlex.join([*words, *([] if "--force" in words else ["--force"])])
+
+
+def _words(state: FolderState, entry: Entry) -> list[str]:
+    """Return the words of a command, to be run again; without its runs where it takes just these from its trial folder."""
+    words = [w for w in entry.command if w != "--json"]
+    runs = [w for w in words if w in run_words(state)]
+    takes_all = words[1] in TAKES_ALL_RUNS and "--validate" not in words and is_trial(state.folder)
+    return [w for w in words if w not in runs] if takes_all and sorted(runs) == sorted(run_words(state)) else words
 
 
 def _remake(state: FolderState, item: Item) -> str:
@@ -105,7 +127,7 @@ def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] |
     """
     if diagnosis is None:
         return None
-    verdict, words = diagnosis.verdict.partition(":")[0], [w for w in diagnosis.command if w != "--json"]
+    verdict, words = diagnosis.verdict.partition(":")[0], _words(state, diagnosis)
     written = {"-o", "--output", "--figure"} & set(words)
     if verdict == "unexplained" and "--thorough" not in words:
         longer = shlex.join([*words, "--thorough", *(["--force"] if written and "--force" not in words else [])])
@@ -194,7 +216,14 @@ def _axis(state: FolderState) -> str:
     """Return the plane of the models, else the one that the first run moved a fin in; yaw where both are there."""
     if state.models:
         return str((state.models[0].body or {}).get("axis", "yaw"))
-    tables = [state.place(i) for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
-    names = import_module("pyarrow.parquet").read_schema(tables[0]).names if tables else []
-    axes = [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & set(names)]
+    tables = [i for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
+    axes = _axes(state, tables[0]) if tables else []
     return axes[0].value if axes else Axis.YAW.value
+
+
+def _axes(state: FolderState, run: Item) -> list[Axis]:
+    """Return the planes that a run has a fin of, every one where it is no Parquet file."""
+    if not run.path.endswith(".parquet"):
+        return list(Axis)
+    names = set(import_module("pyarrow.parquet").read_schema(state.place(run)).names)
+    return [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & names]

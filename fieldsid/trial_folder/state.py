@@ -22,6 +22,8 @@ METADATA_KEY = b"fieldsid"
 LOG, RUN, MODEL, PLANNED = "log", "run", "model", "planned"
 SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
 """Kinds of files that a user writes: they are read, and made of nothing."""
+BEYOND = ("saturated", "fin_limit")
+"""Codes of the findings that a fin went beyond its limit."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -38,6 +40,7 @@ class Item(Brief):
     """One file: its path from the folder, kind, what it was made from, and why it is stale, empty where it is not.
 
     `body` is the record of a YAML file of this program, empty for all others. `missing` are the inputs that are nowhere.
+    `fins` is how far (rad) a run's fins went where its import found them beyond the vehicle's limits, by signal.
     """
 
     path: str
@@ -46,6 +49,7 @@ class Item(Brief):
     stale: str = ""
     missing: tuple[str, ...] = ()
     body: Mapping[str, Any] | None = None
+    fins: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -104,8 +108,11 @@ def _items(folder: Path) -> Iterator[Item]:
 
 def _item(path: Path, name: str, folder: Path) -> Item | None:
     if path.name.endswith(".parquet") and (head := _run_head(path)) is not None:
-        made = any(note.get("code") == SIMULATED for note in head.get("notes") or ())
-        return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs"), folder))
+        notes = head.get("notes") or ()
+        made = any(note.get("code") == SIMULATED for note in notes)
+        told = [n["data"] for n in notes if n.get("code") in BEYOND and "reach_rad" in (n.get("data") or {})]
+        fins = {str(d["signal"]): float(d["reach_rad"]) for d in told}
+        return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs"), folder), fins=fins)
     kind = own_kind(path) if path.suffix in (".yaml", ".yml") else None
     if kind is not None:
         return _own(path, name, kind, folder)

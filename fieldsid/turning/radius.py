@@ -54,13 +54,14 @@ def turn_radius(
 
     runs are those the models came from, measured are runs of turns: the turn is that of a vehicle in surge, sway and yaw fitted
     to all of them, `length` (m) being the vehicle's where it is known. A measured circle is compared with what the other runs
-    alone predict. method "auto" does so where the models carry effects and the runs a speed; without runs it simulates
-    models with effects, and takes the u-turn formula elsewhere, where an offset of the fin below `fin_zero` (rad) is not
-    counted. unfit is told of each of several measured runs without a circle; without it, and where none has one, DataError is
-    raised. Raises UsageError, and ModelError for an unstable model.
+    alone predict, and counts once where the models were fitted to it too. method "auto" does so where the models carry effects
+    and the runs a speed; without runs it simulates models with effects, and takes the u-turn formula elsewhere, where an offset
+    of the fin below `fin_zero` (rad) is not counted. unfit is told of each of several measured runs without a circle; without
+    it, and where none has one, DataError is raised. Raises UsageError, and ModelError for an unstable model.
     """
     _check(source, speeds, rudder_max, method)
     source = source.models_flown_by(runs)
+    runs = _others(runs, measured)
     chosen = _chosen(source, method)
     if chosen in ("simulated", "maneuvering") and source.own_laws:
         raise UsageError(
@@ -91,6 +92,13 @@ def turn_radius(
     return TurnPrediction(
         tuple(rows), tuple(compared), rudder_max, surge, (*unfitted, *lacking, *_notes(source, rows, chosen, surge, fin_zero))
     )
+
+
+def _others(runs: Sequence[Run], measured: Sequence[Run]) -> Sequence[Run]:
+    """Return the runs that are not among the measured turns; all where every one is, as nothing else was flown."""
+    files = {run.source.resolve() for run in measured if run.source is not None}
+    others = [r for r in runs if not any(r is m for m in measured) and (r.source is None or r.source.resolve() not in files)]
+    return others or runs
 
 
 def _beliefs(

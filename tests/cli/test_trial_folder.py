@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 import shlex
+from dataclasses import replace
 from hashlib import sha256
 
+import numpy as np
 import pytest
 from cli import trial
 
+from fieldsid.logs import load_run, save_run
+from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.journal import Entry, Stamp, append
+
+BOTH_RUNS = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
 
 
 @pytest.fixture
@@ -42,6 +48,24 @@ def test_a_command_that_comes_too_early_is_told_what_comes_before_it(run_cli, fo
         assert "and the trial folder does not give it\n" in answer.err
         assert answer.err.endswith("\nhint: there is no model of the runs yet: `sysid identify --axis yaw --joint`\n")
     assert "trial folder" not in run_cli("effects", "show").err
+
+
+def test_a_command_that_comes_too_early_is_told_what_it_needs_itself(run_cli, folder):
+    trial.model_file(folder / "models", Axis.PITCH)
+    assert run_cli("turn-radius").err.endswith("hint: there is no model of the yaw yet: `sysid identify --axis yaw --joint`\n")
+    assert run_cli("schedule", "verify").err.endswith("hint: no gains yet: `sysid schedule design -o gains.yaml`\n")
+    for speed in (1.0, 1.4):
+        (folder / f"runs/pulses_{speed}.parquet").unlink()
+    trial.flown(folder / "runs", Axis.PITCH, name="pitch")
+    assert "hint: there is no model of the yaw, and no run with a rudder: `sysid status`" in run_cli("turn-radius").err
+
+
+def test_a_batch_that_could_use_nothing_leads_to_its_logs_and_not_to_a_trend(run_cli, folder):
+    for run in (folder / "runs").iterdir():
+        run.unlink()
+    trial.flown(folder / "runs", Axis.PITCH, name="pitch")
+    answer = run_cli("batch", "--axis", "yaw", "--json")
+    assert (answer.code, json.loads(answer.out)["headline"]["next"]) == (1, "sysid inspect runs/pitch.parquet")
 
 
 def test_what_is_typed_counts(run_cli, folder):
@@ -131,6 +155,13 @@ def test_the_fin_of_a_planned_leg_is_no_log(run_cli, folder):
             ("d.yaml",),
             "sysid diagnose --axis yaw -o d.yaml --thorough --force",
         ),
+        (("diagnose", "--axis", "yaw", *BOTH_RUNS), "unexplained: 2.3 x", (), "sysid diagnose --axis yaw --thorough"),
+        (
+            ("diagnose", "--axis", "yaw", BOTH_RUNS[0], "--validate", BOTH_RUNS[1]),
+            "unexplained: 2.3 x",
+            (),
+            "sysid diagnose --axis yaw runs/pulses_1.0.parquet --validate runs/pulses_1.4.parquet --thorough",
+        ),
         (("diagnose", "--axis", "yaw", "--thorough"), "unexplained: 2.3 x", (), "sysid schedule design -o gains.yaml"),
         (("diagnose", "--axis", "yaw", "-o", "d.yaml"), "undecided: two", ("d.yaml",), "sysid plan --from d.yaml -o plan"),
     ],
@@ -152,7 +183,7 @@ def test_a_changed_run_makes_its_model_stale_and_the_gains_made_of_that(run_cli,
     assert why["models/joint_yaw.yaml"] == "runs/pulses_1.0.parquet has changed"
     assert why["gains.yaml"] == "models/joint_yaw.yaml is stale"
     again = body["next"]["command"]
-    assert again.startswith("sysid identify --axis yaw --joint --no-figures ")
+    assert again == "sysid identify --axis yaw --joint --no-figures -o models --force"
     assert run_cli(*shlex.split(again)[1:]).code == 0
     body = run_cli("status", "--json").json
     assert body["stale"] == ["gains.yaml"]
@@ -184,10 +215,51 @@ def test_status_of_another_folder_says_where_to_go(run_cli, folder, monkeypatch)
     assert "`nowhere` is no folder" in answer.err
 
 
+def test_status_tells_a_fin_limit_that_the_runs_contradict_until_it_is_corrected(run_cli, folder):
+    vehicle = folder / "vehicle.yaml"
+    vehicle.write_text(vehicle.read_text().replace("rudder_max_rad: 0.436", "rudder_max_rad: 0.1"))
+    assert run_cli("status", "--json").json["warnings"] == []  # these runs were not imported here
+    for run in sorted((folder / "runs").iterdir()):
+        save_run(load_run(run), folder / "logs" / f"{run.stem}.csv")
+    imported = run_cli("import", "logs/pulses_1.0.csv", "logs/pulses_1.4.csv", "-o", "runs", "--force")
+    (line,) = (part for part in imported.err.splitlines() if "[saturated]" in part)
+    assert "(and 1 more like it)" in line
+    (told,) = run_cli("status", "--json").json["warnings"]
+    assert told["code"] == "fin_limit"
+    assert told["message"].startswith("vehicle.yaml: `rudder_max_rad: 0.1` is less than the 0.")
+    vehicle.write_text(vehicle.read_text().replace("rudder_max_rad: 0.1", "rudder_max_rad: 0.4"))
+    assert run_cli("status").err == ""
+    vehicle.write_text("name: [")
+    (told,) = run_cli("status", "--json").json["warnings"]
+    assert told["code"] == "vehicle"
+
+
 def test_status_writes_nothing(run_cli, folder):
     before = (folder / "journal.jsonl").read_bytes()
     assert run_cli("status").code == 0
     assert (folder / "journal.jsonl").read_bytes() == before
+
+
+def with_track(file):
+    """The run of a file with the positions that its heading at 1.4 m/s makes."""
+    run = load_run(file)
+    steps = 1.4 * np.diff(run.time, prepend=run.time[0])
+    track = {"x_m": np.cumsum(steps * np.cos(run["yaw_rad"])), "y_m": np.cumsum(steps * np.sin(run["yaw_rad"]))}
+    save_run(replace(run, signals={**run.signals, **track}), file, force=True)
+
+
+def test_turn_radius_takes_the_circles_that_were_flown_and_counts_each_once(run_cli, folder):
+    with_track(trial.flown(folder / "runs", spec="turning_circle", name="circle"))
+    with_track(folder / "runs/pulses_1.0.parquet")  # a track alone is no circle
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--effects", "servo_lag", "--no-figures").code == 0
+    answer = run_cli("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", "--json")
+    assert "joint_yaw.yaml --measured runs/circle.parquet\n" in answer.err
+    (circle,) = answer.json["measured"]
+    assert circle["run"] == "circle"
+    others = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
+    line = [w for run in others for w in ("--runs", run)]
+    apart = run_cli("turn-radius", "--speeds", "1.4", "--rudder-max", "0.35", *line, "--json").json["measured"]
+    assert apart == answer.json["measured"]
 
 
 def test_live_takes_the_newest_run_and_what_the_plan_of_its_axis_promised(run_cli, folder):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, progress, table
+from fieldsid.cli.console import alike, emit, progress, table
 from fieldsid.cli.options import (
     AxisOption,
     EffectNames,
@@ -27,6 +27,7 @@ from fieldsid.cli.options import (
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_closed
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_estimate, shown_in
+from fieldsid.logs.run import Note
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from fieldsid.fitting.fit import Fit
     from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
     from fieldsid.fitting.predict.predict import Prediction
-    from fieldsid.logs import Note, Run
+    from fieldsid.logs import Run
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="auto, output_error, pem, svf_ls, svf_rls or srivc.")]
@@ -206,16 +207,7 @@ def _parameters(fit: Fit) -> dict[str, dict[str, Any]]:
 
 def _warnings(entries: Sequence[Mapping[str, Any]]) -> list[Note]:
     """Return each kind of warning once, with the numbers of the first run that has it."""
-    from fieldsid.logs import Note
-
-    seen: dict[str, list[str]] = {}
-    first: dict[str, str] = {}
-    for e in entries:
-        for w in e["warnings"]:
-            seen.setdefault(w["code"], []).append(_label(e))
-            first.setdefault(w["code"], w["message"])
-    more = {code: "" if len(runs) == 1 else f" (and {len(runs) - 1} more like it)" for code, runs in seen.items()}
-    return [Note(code, f"{runs[0]}: {first[code]}{more[code]}", {}) for code, runs in seen.items()]
+    return alike((w["code"], _label(e), Note(w["code"], w["message"], {})) for e in entries for w in e["warnings"])
 
 
 def _render_reasons(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:

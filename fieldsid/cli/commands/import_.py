@@ -57,7 +57,7 @@ def command(
     Example: sysid import run7.mcap --mapping mapping.yaml -o runs/
     """
     from fieldsid.artifacts import check_output
-    from fieldsid.cli.console import emit, tracked, warn
+    from fieldsid.cli.console import alike, emit, tracked, warn
     from fieldsid.cli.inputs import between, mapping_of
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.logs.importing import Importer
@@ -80,9 +80,8 @@ def command(
     done = [importer.write(run, place, force=force) for run, place in placed]
     body: dict[str, Any] = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
     from fieldsid.cli.headlines.logs import of_import
-    from fieldsid.logs.run import Note
 
-    notes = [Note(n.code, f"{item.run.name}: {n.message}", n.data) for item in done for n in item.warnings]
+    notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
     result = emit(body, as_json=as_json, render=lambda c: _render(done, c), headline=of_import(body), notes=notes)
     if as_json:  # a run is used for long: what is odd about it is said however it is asked for
         warn(notes)

@@ -43,6 +43,7 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
     Example: sysid status
     """
     from fieldsid.errors import UsageError
+    from fieldsid.trial_folder.fin_limits import contradicted_limits
     from fieldsid.trial_folder.next_step import next_step
     from fieldsid.trial_folder.state import state_of
 
@@ -51,6 +52,8 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
             f"`{folder}` is no folder", found="a file" if folder.exists() else "nothing there", hint="`sysid init NAME`"
         )
     state = state_of(folder)
+    broken = f"{state.broken_lines} lines of the journal cannot be read"
+    notes = [*([Note("journal", broken, {})] if state.broken_lines else []), *contradicted_limits(state)]
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"
@@ -65,10 +68,9 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
             for e in state.entries
         ],
         "unreadable_journal_lines": state.broken_lines,
+        "warnings": [{"code": n.code, "message": n.message} for n in notes],
         "next": {"why": why, "command": line},
     }
-    broken = f"{state.broken_lines} lines of the journal cannot be read"
-    notes = [Note("journal", broken, {})] if state.broken_lines else []
     return emit(body, as_json=as_json, render=lambda to: _render(to, state, body), headline=of_status(body), notes=notes)
 
 

@@ -77,7 +77,7 @@ def of_batch(body: Body, *, trend: bool) -> Headline:
     return Headline(
         f"{counted(body['runs'], 'run')} identified, {len(bad)} not; {found}",
         f"{counted(body['logs'], 'log')}{known}, took {body['seconds']:.1f} s on {body['where']}",
-        typed_with("--trend") if not trend else pasted("inspect", bad[0]["file"]) if bad else "",
+        typed_with("--trend") if body["runs"] and not trend else pasted("inspect", bad[0]["file"]) if bad else "",
     )
 
 

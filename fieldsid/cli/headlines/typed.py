@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from glob import escape
 from itertools import groupby
-from os.path import commonprefix
 from pathlib import Path
 
-FEW = 3
-"""Files up to which each is named; more are given by a pattern that matches just them, where there is one."""
+from fieldsid.trial_folder.patterns import FEW, pattern_of
+
 _WORDS: list[tuple[str, ...]] = [()]
 
 
@@ -31,7 +29,7 @@ def pasted(*words: str | Path | Sequence[str | Path]) -> str:
     """Return a command line of `sysid`; a word may be a list of files, all of them or the pattern that stands for them."""
     parts: list[str] = ["sysid"]
     for word in words:
-        parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else _files([Path(_near(p)) for p in word])
+        parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else pattern_of([Path(_near(p)) for p in word])
     return " ".join(parts)
 
 
@@ -50,17 +48,6 @@ def _is_file(word: str) -> bool:
 def repeated(option: str, files: Sequence[str | Path]) -> list[str]:
     """Return an option that takes one file, once for each of them."""
     return [word for file in files for word in (option, str(file))]
-
-
-def _files(paths: Sequence[Path]) -> list[str]:
-    folders, suffixes = {p.parent for p in paths}, {p.suffix for p in paths}
-    if len(paths) > FEW and len(folders) == len(suffixes) == 1:
-        folder, suffix = folders.pop(), suffixes.pop()
-        start = commonprefix([p.stem for p in paths])  # noqa: RUF071 - characters are what is meant
-        if suffix and sorted(folder.glob(f"{escape(start)}*{suffix}")) == sorted(paths):
-            before = "" if folder == Path() else f"{shlex.quote(str(folder))}/"
-            return [f"{before}{shlex.quote(start) if start else ''}*{suffix}"]
-    return [shlex.quote(str(p)) for p in paths]
 
 
 def _near(word: str | Path) -> str:

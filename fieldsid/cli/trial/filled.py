@@ -9,9 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from fieldsid.cli.trial.parsed import Parsed
+from fieldsid.errors import FieldsidError
 from fieldsid.trial_folder.make import MODELS, RUNS
 from fieldsid.trial_folder.next_step import chosen_models, run_words, trained_runs, unseen_runs
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
+
+FEW = 3
+"""Runs up to which each is named."""
 
 Fill = Callable[[Parsed, FolderState], list[str]]
 
@@ -74,8 +78,27 @@ def _models(parsed: Parsed, state: FolderState) -> list[str]:
     return [] if parsed.values.get("models") else chosen_models(state)
 
 
-def _yaw_models(parsed: Parsed, state: FolderState) -> list[str]:
-    return [] if parsed.values.get("models") else chosen_models(state, "yaw")
+def _turn_radius(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the models of the yaw, and the runs of the folder that are turning circles."""
+    models = [] if parsed.values.get("models") else chosen_models(state, "yaw")
+    circles = [] if parsed.values.get("measured") else _circles(state)
+    return [*models, *[word for circle in circles for word in ("--measured", circle)]]
+
+
+def _circles(state: FolderState) -> list[str]:
+    """Return the runs that settle on a circle; who works with a run that cannot be read says so."""
+    from fieldsid.logs import load_run
+    from fieldsid.turning.measured.measured_turn import is_circle
+
+    found = []
+    for item in state.of_kind(RUN):
+        try:
+            run = load_run(state.place(item))
+        except FieldsidError:
+            continue
+        if is_circle(run):
+            found.append(item.path)
+    return found
 
 
 def _schedule(parsed: Parsed, state: FolderState) -> list[str]:
@@ -113,7 +136,7 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
         "history": _model,
         "simulate": _model,
         "fit": _models,
-        "turn-radius": _yaw_models,
+        "turn-radius": _turn_radius,
         "schedule design": _models,
         "schedule verify": _schedule,
         "schedule export": _schedule,
@@ -127,5 +150,5 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
 def in_words(added: Sequence[str]) -> str:
     """Return what was taken from the folder, short."""
     runs = [w for w in added if w.startswith(f"{RUNS}/")]
-    words = [w for w in added if w not in runs]
-    return " ".join([*words, *(runs if len(runs) <= 3 else [runs[0], f"... {len(runs)} runs"])])
+    words = dict.fromkeys(w for w in added if w not in runs)
+    return " ".join([*words, *(runs if len(runs) <= FEW else [runs[0], f"... {len(runs)} runs"])])

@@ -86,16 +86,30 @@ def _fins(run: Run, limits: Mapping[str, float]) -> list[Note]:
     if not any(run.has(s) for s in MAIN if s not in _FINS):
         found.append(Note("no_motion", "neither an angle nor a rate of yaw or pitch is in the log; map one of them", {}))
     for fin, limit in limits.items():
-        if not run.has(fin):
-            continue
-        share = share_beyond(run, fin, limit)
-        if share > BEYOND_SHARE:
-            message = (
-                f"{fin} is beyond its limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
-                f"{100 * BEYOND_SHARE:.0f} %): the fin stopped there, and the log does not show it; log the measured fin"
-            )
-            found.append(Note("saturated", message, {"signal": fin, "value": share, "limit": BEYOND_SHARE}))
+        found += _beyond(run, fin, limit)
     return found
+
+
+def _beyond(run: Run, fin: str, limit: float) -> list[Note]:
+    """Return that a fin was measured, or commanded for long, beyond its limit (rad)."""
+    measured, stated = f"{fin.removesuffix('_rad')}_measured_rad", f"`{fin.removesuffix('_rad')}_max_rad` of vehicle.yaml"
+    name = measured if run.has(measured) else fin
+    if not run.has(name) or (share := _share(run, name, limit)) <= BEYOND_SHARE:
+        return []
+    reach = float(np.nanmax(np.abs(run[name])))
+    message = (
+        f"{name} goes to {reach:.3g} rad, beyond the fin's limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
+        f"{100 * BEYOND_SHARE:.0f} %): "
+    )
+    data = {"signal": name, "value": share, "limit": BEYOND_SHARE, "reach_rad": reach}
+    if name == measured:
+        return [Note("fin_limit", f"{message}correct {stated}", data)]
+    advice = f"where the fin goes so far, correct {stated}; where it stopped, the log does not show it: log the measured fin"
+    return [Note("saturated", message + advice, data)]
+
+
+def _share(run: Run, name: str, limit: float) -> float:
+    return float(np.mean(np.abs(run[name][np.isfinite(run[name])]) > limit + FIN_ZERO))
 
 
 def share_beyond(run: Run, fin: str, limit: float) -> float:
@@ -105,4 +119,4 @@ def share_beyond(run: Run, fin: str, limit: float) -> float:
     """
     if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
         return 0.0
-    return float(np.mean(np.abs(run[fin][np.isfinite(run[fin])]) > limit + FIN_ZERO))
+    return _share(run, fin, limit)

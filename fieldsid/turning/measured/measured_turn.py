@@ -12,7 +12,7 @@ from fieldsid.errors import DataError
 from fieldsid.logs.run import Run
 from fieldsid.models.record import knows_speed
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.turning.measured.circle import Circle, fit_circle
+from fieldsid.turning.measured.circle import LEAST_TURN_FOR_CURRENT_RAD, Circle, fit_circle
 
 TURNING_SHARE = 0.5
 SETTLED_SHARE = 0.05
@@ -65,6 +65,14 @@ def measure_turn(run: Run, *, start_s: float | None = None, end_s: float | None 
         track=(run["x_m"], run["y_m"]),
         settled=(run["x_m"][span] - circle.current[0] * since, run["y_m"][span] - circle.current[1] * since),
     )
+
+
+def is_circle(run: Run) -> bool:
+    """Whether a run settles on most of a full circle, as a turning circle does: a turn that is broken off is none."""
+    try:
+        return measure_turn(run).circle.turned >= LEAST_TURN_FOR_CURRENT_RAD
+    except DataError:  # no positions, no turn, or too short an arc
+        return False
 
 
 def _need_positions(run: Run) -> None:

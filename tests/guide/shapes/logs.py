@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from guide.shapes.common import Number, RemarkWithData, Result, Shape, Skipped, schema_field
+from guide.shapes.common import Number, Remark, RemarkWithData, Result, Shape, Skipped, schema_field
 
 
 class Init(Result):
@@ -83,6 +83,8 @@ class Status(Result):
     """The commands that were run in it, the oldest first."""
     unreadable_journal_lines: int
     """Lines of the journal that are none, as a power cut leaves them."""
+    warnings: list[Remark]
+    """What does not go together, as a fin that went beyond the limit of vehicle.yaml."""
     next: NextStep
     """What to do next."""
 

@@ -119,6 +119,17 @@ def test_saturation_is_judged_by_the_limit_that_is_given():
     assert ("saturated", "rudder_rad") not in codes(seen, fin_max_rad={"rudder_rad": 0.2})
 
 
+def test_a_fin_beyond_its_limit_says_how_far_it_went_and_which_line_is_wrong_then():
+    (told,) = (n for n in examine(healthy(), {"rudder_rad": 0.2}) if n.code == "saturated")
+    reach = float(np.max(np.abs(healthy()["rudder_rad"])))
+    assert told.message.startswith(f"rudder_rad goes to {reach:.3g} rad, beyond the fin's limit of 0.2 rad")
+    assert "`rudder_max_rad` of vehicle.yaml" in told.message
+    seen = changed(healthy(), rudder_measured_rad=healthy()["rudder_rad"])
+    (told,) = (n for n in examine(seen, {"rudder_rad": 0.2}) if n.code == "fin_limit")
+    assert (told.data["signal"], told.data["reach_rad"]) == ("rudder_measured_rad", reach)
+    assert "fin_limit" not in {n.code for n in examine(seen, {"rudder_rad": reach})}
+
+
 def test_a_log_without_fin_or_motion_is_said_to_be_of_no_use():
     time = np.arange(100.0)
     assert ("no_fin", None) in codes(Run("a", time, {"yaw_rad": np.sin(time)}))

@@ -1,0 +1,62 @@
+"""What was made from what, in few rows: each file with the start of its SHA-256, many inputs of one folder in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import PurePosixPath
+
+from fieldsid.trial_folder.journal import Hashes, made_by, relative_to
+from fieldsid.trial_folder.state import LOG, RUN, FolderState, Item, Source
+
+FEW = 3
+"""Files of one folder up to which each is named with its folder."""
+HASH = 8
+"""Characters of a SHA-256 that are shown."""
+
+
+def lineage_rows(state: FolderState) -> list[dict[str, str]]:
+    """Return a row for each file; a log that a run was made from stands in the row of that run."""
+    hashes = Hashes(state.folder, state.entries)
+    used = {_name(s, state) for run in state.of_kind(RUN) for s in run.sources}
+    items = [i for i in state.items if not (i.kind == LOG and i.path in used)]
+    now = {i.path: hashes.stamp(state.place(i)).sha256 for i in items}
+    return [_row(i, state, now) for i in items]
+
+
+def _row(item: Item, state: FolderState, now: Mapping[str, str]) -> dict[str, str]:
+    maker = made_by(state.entries, item.path)
+    named = [(s, _name(s, state)) for s in item.sources]
+    told = [f"{name} ({s.sha256[:HASH]})" for s, name in named if s.sha256 and now.get(name) != s.sha256]
+    plain = [name for s, name in named if not s.sha256 or now.get(name) == s.sha256]
+    return {
+        "path": item.path,
+        "sha": now[item.path][:HASH],
+        "kind": item.kind,
+        "made_from": "; ".join([*_together(plain, now), *told]),
+        "by": "" if maker is None else " ".join(maker.command[1 : 3 if maker.command[1] == "schedule" else 2]),
+        "state": f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else "",
+    }
+
+
+def _name(source: Source, state: FolderState) -> str:
+    return source.named if source.path is None else relative_to(source.path, state.folder)
+
+
+def _together(names: Iterable[str], rows: Collection[str]) -> list[str]:
+    """Return names, more than a few of one folder and suffix as one part: which they are, or that they are all of the table's."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for name in dict.fromkeys(names):
+        path = PurePosixPath(name)
+        kinds.setdefault((path.parent.as_posix(), path.suffix), []).append(name)
+    parts = []
+    for (folder, suffix), group in kinds.items():
+        there = [r for r in rows if PurePosixPath(r).parent.as_posix() == folder and PurePosixPath(r).suffix == suffix]
+        left_out = [PurePosixPath(r).stem for r in there if r not in group]
+        if len(group) <= FEW:
+            parts += group
+        elif len(left_out) <= FEW:
+            but = f", without {', '.join(left_out)}" if left_out else ""
+            parts.append(f"{folder}/*{suffix} ({len(group)}{but})")
+        else:
+            parts.append(f"{folder}/: {', '.join(PurePosixPath(n).stem for n in group)}")
+    return parts

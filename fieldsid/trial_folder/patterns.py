@@ -1,0 +1,36 @@
+"""Files of a command line in few words: a pattern that stands for just them, where there is one."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from glob import escape
+from itertools import groupby
+from os.path import commonprefix
+from pathlib import Path
+
+FEW = 3
+"""Files up to which each is named; more are given by a pattern that matches just them, where there is one."""
+
+
+def pattern_of(files: Sequence[Path], folder: Path = Path()) -> list[str]:
+    """Return the words for files named from a folder, quoted for a shell: a pattern where it matches just them, else each."""
+    parents, suffixes = {p.parent for p in files}, {p.suffix for p in files}
+    if len(files) > FEW and len(parents) == len(suffixes) == 1:
+        parent, suffix = parents.pop(), suffixes.pop()
+        start = commonprefix([p.stem for p in files])  # noqa: RUF071 - characters are what is meant
+        if suffix and sorted((folder / parent).glob(f"{escape(start)}*{suffix}")) == sorted(folder / p for p in files):
+            before = "" if parent == Path() else f"{shlex.quote(str(parent))}/"
+            return [f"{before}{shlex.quote(start) if start else ''}*{suffix}"]
+    return [shlex.quote(str(p)) for p in files]
+
+
+def shortened(words: Sequence[str], folder: Path) -> str:
+    """Return a command line that was run in a folder, quoted, its many files as patterns."""
+
+    def kind(word: str) -> Path | None:
+        return Path(word).parent if not word.startswith("-") and (folder / word).is_file() else None
+
+    groups = [(parent, list(group)) for parent, group in groupby(words, key=kind)]
+    parts = [[shlex.quote(w) for w in g] if parent is None else pattern_of([Path(w) for w in g], folder) for parent, g in groups]
+    return " ".join(word for part in parts for word in part)
