@@ -69,7 +69,7 @@ def _covers(model: Model, speed: float) -> bool:
 def _of_model(model: Model, speed: float) -> tuple[dict[str, float], dict[str, float]]:
     """Return a model's base parameters and trim angle at a speed, and their standard errors: those of its nearest point."""
     names = NAMES[model.axis]
-    _, points = points_of([model], ["model"])
+    _, (points,) = points_of([model], ["model"])
     near = min(points, key=lambda p: abs(p.speed - speed))
     values = dict(model.at_speed(speed))
     scaled = {n: abs(values[n] / near.values[n]) if near.values[n] else 1.0 for n in values}

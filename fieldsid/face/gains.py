@@ -38,11 +38,9 @@ def fit_laws(models: Models, *, unweighted: bool = False) -> Laws:
     models: models of one axis at two speeds at least, or a table of parameters with a column speed_m_s. unweighted: every point
     counts alike, standard errors or not. Raises DataError for one speed only.
     """
-    from fieldsid.turning import fit_laws as fit_points
-
     own_effects()
     source = source_of(models)
-    return fit_points(source.axis, source.points, weighted=not unweighted)
+    return source.fitted(weighted=not unweighted)
 
 
 def turn_radius(

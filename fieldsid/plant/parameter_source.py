@@ -13,7 +13,7 @@ from fieldsid.artifacts import read_yaml, where_now
 from fieldsid.display import Brief
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import DataError, UsageError
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import Note, Run
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, load_model
@@ -23,7 +23,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.axis_laws import KIND as FIT_KIND
 from fieldsid.plant.laws.axis_laws import Laws, carried_models, fit_laws, load_laws, with_own_law
 from fieldsid.plant.laws.parameter_law import ParameterLaw
-from fieldsid.plant.points import EQUAL_SPEED_SHARE, Point, check_authority, distinct_speeds, points_of
+from fieldsid.plant.points import EQUAL_SPEED_SHARE, Point, check_authority, distinct_speeds, of_known_sign, points_of
 from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
 from fieldsid.rounding import nine_digits
@@ -31,8 +31,6 @@ from fieldsid.rounding import nine_digits
 MAX_PROPOSALS = 40
 LEAST_SHARE = 0.05
 """A draw keeps the sign of damping and authority, and this share of the estimate: no plant turns the other way."""
-SIGN_STD_ERRORS = 3.0
-"""Within so many of zero the sign of an authority is not known; `identify` calls it unclear then."""
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 
 
@@ -40,8 +38,8 @@ TABLE_SUFFIXES = (".csv", ".txt", ".tsv")
 class ParameterSource(Brief):
     """Points of one axis at rising speeds; the models they came from (none for a table); laws where two speeds allow them.
 
-    A fit file carries its models, and its laws are those of the file. `left_out` are models of which not even the sign of the
-    authority is known, and that have another than the rest.
+    A fit file carries its models, and its laws are those of the file. `left_out` are models that have the
+    authority with another sign than the rest at a speed where its sign is not known; their `paths` follow the models' own.
     """
 
     axis: Axis
@@ -64,6 +62,19 @@ class ParameterSource(Brief):
     def largest_fin(self) -> float:
         """The largest fin in the models' runs, rad; 0 where there is no model."""
         return max((m.trained.get("fin_max", 0.0) for m in self.models), default=0.0)
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What is said of models that are left out."""
+        if not self.left_out:
+            return ()
+        words = f"the sign of its {NAMES[self.axis].authority} is not known at a speed, and another than elsewhere: left out"
+        return (Note("model_left_out", f"{', '.join(self.left_out)}: {words}", {"models": list(self.left_out)}),)
+
+    def fitted(self, *, weighted: bool = True) -> Laws:
+        """Return the laws of the points, with what is said of models that are left out; raises DataError as `fit_laws` does."""
+        found = fit_laws(self.axis, self.points, weighted=weighted)
+        return replace(found, notes=(*found.notes, *self.notes))
 
     def supports(self, speed: float) -> bool:
         """Whether a speed lies within those the data were taken at."""
@@ -245,27 +256,13 @@ def source_of_models(
     """Return the source of models with a name each; raises UsageError and DataError as `load_parameter_source` does."""
     if not models:
         raise UsageError("nothing to work on", found="no model", hint="give models, or the files of models")
-    kept = _of_known_sign(models)
-    axis, points = points_of([models[i] for i in kept], [names[i] for i in kept])
-    left_out = tuple(names[i] for i in range(len(models)) if i not in kept)
-    source = _with_laws(axis, points, tuple(models[i] for i in kept), tuple(names[i] for i in kept), paths, laws)
-    return replace(source, left_out=left_out)
-
-
-def _of_known_sign(models: Sequence[Model]) -> list[int]:
-    """Return the places of the models to take: all, or where their authorities disagree in sign those whose own is known.
-
-    One that cannot be told from zero does not say which way the fin turns; where those that do disagree, all stay, to be refused.
-    """
-    name = NAMES[models[0].axis].authority
-    if any(m.axis is not models[0].axis for m in models):
-        return list(range(len(models)))
-    values, errors = np.array([m.values[name] for m in models]), np.array([m.std_error(name) for m in models])
-    known = ~(np.abs(values) < SIGN_STD_ERRORS * errors)
-    agree = np.unique(np.sign(values[known])).size == 1
-    if np.unique(np.sign(values)).size == 1 or not agree:
-        return list(range(len(models)))
-    return [int(i) for i in np.flatnonzero(known)]
+    axis, points = points_of(models, names)
+    kept = of_known_sign(axis, points)
+    dropped = [i for i in range(len(models)) if i not in kept]
+    taken = [p for i in kept for p in points[i]]
+    ordered = [paths[i] for i in (*kept, *dropped)] if len(paths) == len(models) else paths
+    source = _with_laws(axis, taken, tuple(models[i] for i in kept), tuple(names[i] for i in kept), ordered, laws)
+    return replace(source, left_out=tuple(names[i] for i in dropped))
 
 
 def source_of_laws(
@@ -275,8 +272,12 @@ def source_of_laws(
     for text in laws:
         found = with_own_law(found, text)
     own = tuple(t.partition("=")[0] for t in laws)
-    names, models = tuple(n for n, _ in carried), tuple(m for _, m in carried)
-    return ParameterSource(found.axis, found.points, models, names, found, tuple(paths), own, is_fit_file=True)
+    names, models = [n for n, _ in carried], [m for _, m in carried]
+    kept = of_known_sign(*points_of(models, names)) if carried else []
+    return ParameterSource(
+        found.axis, found.points, tuple(models[i] for i in kept), tuple(names[i] for i in kept), found, tuple(paths), own,
+        is_fit_file=True, left_out=tuple(n for i, n in enumerate(names) if i not in kept),
+    )  # fmt: skip
 
 
 def draw_values(model: Model, count: int, rng: np.random.Generator) -> tuple[list[dict[str, float]], FloatArray]:

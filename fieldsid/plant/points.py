@@ -16,6 +16,8 @@ from fieldsid.numerics.arrays import FloatArray
 
 EQUAL_SPEED_SHARE = 0.03
 """Speeds closer than this fraction count as one: log-to-log spread of a held thrust setting."""
+SIGN_STD_ERRORS = 3.0
+"""Within so many of zero the sign of an authority is not known; `identify` calls it unclear then."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -28,8 +30,8 @@ class Point(Brief):
     std_errors: Mapping[str, float]
 
 
-def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tuple[Point, ...]]:
-    """Return the points of identified models; a joint model gives one point per speed group.
+def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tuple[tuple[Point, ...], ...]]:
+    """Return the points of each identified model; a joint model gives one point per speed group.
 
     Raises DataError when the models are of two axes, or one of them knows no speed.
     """
@@ -37,8 +39,26 @@ def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tupl
     if len(axes) != 1:
         found = ", ".join(f"{n}: {m.axis.value}" for n, m in zip(names, models, strict=True))
         raise DataError("the models are not of one axis", found=found, hint="give the yaw models and the pitch models apart")
-    points = [p for m, n in zip(models, names, strict=True) for p in _model_points(m, n)]
-    return models[0].axis, tuple(points)
+    return models[0].axis, tuple(tuple(_model_points(m, n)) for m, n in zip(models, names, strict=True))
+
+
+def of_known_sign(axis: Axis, points: Sequence[Sequence[Point]]) -> list[int]:
+    """Return the places of the models to take by the points of each: all, or those whose authority turns as the known ones do.
+
+    An authority that cannot be told from zero at a speed does not say which way the fin turns. Where those that can be told
+    disagree, or there is none, all stay, to be refused.
+    """
+    name = NAMES[axis].authority
+    everywhere = [p for of_model in points for p in of_model if name in p.values]
+    known = {float(np.sign(p.values[name])) for p in everywhere if _sign_is_known(p, name)}
+    if len(known) != 1:
+        return list(range(len(points)))
+    (sign,) = known
+    return [i for i, of_model in enumerate(points) if all(sign * p.values.get(name, sign) > 0.0 for p in of_model)]
+
+
+def _sign_is_known(point: Point, name: str) -> bool:
+    return abs(point.values[name]) >= SIGN_STD_ERRORS * point.std_errors.get(name, 0.0)
 
 
 def distinct_speeds(speeds: FloatArray) -> int:

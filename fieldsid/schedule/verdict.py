@@ -19,6 +19,7 @@ from fieldsid.schedule.verify import (
     LONGEST_STEP_S,
     READ_OFF,
     STEP_ANGLE_RAD,
+    STEPS_RAD,
     Verification,
 )
 
@@ -171,7 +172,11 @@ def _extrapolated(checked: Verification) -> list[str]:
         return []
     size, held = checked.extrapolated
     step = f"a {degrees(size):.0f} deg step turns tighter than any run, which held {100 * held:.0f} % of its curvature"
-    return [f"{step}: how it settles is extrapolated until a turn that tight is flown"]
+    if not checked.unsaid:
+        return [f"{step}: how it settles is extrapolated until a turn that tight is flown"]
+    large = f"a {degrees(STEPS_RAD[checked.schedule.axis][2]):.0f} deg step"
+    why = "the hull alone is unstable, and what its fin does against such a turn was not measured"
+    return [f"{step}: {why}; how {large} settles is not said (`-`) until a turn that tight is flown"]
 
 
 def fin_of(actuator: Mapping[str, float | None]) -> str:

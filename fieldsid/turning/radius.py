@@ -331,10 +331,7 @@ def _notes(
         notes.append(Note("surge_not_measured", "no surge in the runs: the loss of speed in a turn is taken as 15 % (5 .. 50 %)"))
     if method == "u_turn":
         notes += _offset_notes(source, fin_zero)
-    if source.left_out:
-        words = f"the sign of its {NAMES[Axis.YAW].authority} is not known, and it is another than elsewhere: left out"
-        notes.append(Note("model_left_out", f"{', '.join(source.left_out)}: {words}", {"models": list(source.left_out)}))
-    return notes
+    return [*notes, *source.notes]
 
 
 def _offset_notes(source: ParameterSource, fin_zero: float) -> list[Note]:

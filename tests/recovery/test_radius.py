@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from truth.maneuvering.hulls import draw_hull
+from truth.maneuvering.motion import true_turn
+from truth.maneuvering.trials import training
 from truth.pilots import Autopilot, excited, steady_turn, zigzagging
 from truth.vehicle import Fins, Flight, Sea, fly_vehicle
 
@@ -11,7 +16,7 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
-from fieldsid.plant.parameter_source import load_parameter_source
+from fieldsid.plant.parameter_source import load_parameter_source, source_of_models
 from fieldsid.turning.measured.measured_turn import measure_turn
 from fieldsid.turning.radius import turn_radius
 
@@ -97,3 +102,18 @@ def test_a_sway_that_this_hull_hardly_shows_costs_accuracy_but_the_band_holds_th
     for row in turn_radius(source_of(tmp_path, runs, SWAY), [SPEED], 0.3, runs=runs).rows:
         assert row.interval95[0] <= truth <= row.interval95[1]
         assert row.radius == pytest.approx(truth, rel=0.25)
+
+
+def test_an_unstable_hull_at_one_speed_of_which_no_fit_knows_which_way_the_fin_turns_has_its_circle_by_all_runs():
+    whole = draw_hull(62, 47)
+    hull = replace(whole, speeds=whole.speeds[:2])
+    assert not hull.stable
+    logs = training(hull, "pulses+zigzag", np.random.default_rng([47, 62, 1]), sway=True)
+    runs = [Run(log.name, log.time, log.columns) for log in logs]
+    models = [identify(runs[i : i + 2], Axis.YAW, effects=SWAY, joint=True)[0].model for i in (0, 2)]
+    prediction = turn_radius(source_of_models(models, ["slow", "fast"]), hull.speeds, hull.rudder_limit, runs=runs)
+    for row in prediction.rows:
+        truth = true_turn(hull, row.speed, 1.0 if row.side == "starboard" else -1.0)[0]
+        assert row.method == "maneuvering"
+        assert row.radius == pytest.approx(truth, rel=0.15)
+        assert row.interval95[0] <= truth <= row.interval95[1]

@@ -46,7 +46,10 @@ BAND_EDGE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One step flown beside what was said of it: median and 95 % band of the draws (s); NaN without a schedule."""
+    """One step flown beside what was said of it: median and 95 % band of the draws (s); NaN without a schedule.
+
+    `said` alone is NaN where verify gives no settling time, as of a step that hangs on what no run showed.
+    """
 
     draw: int
     kind: str
@@ -133,23 +136,25 @@ def flown(hull: Hull, draw: int, law: np.ndarray, speed: float, size: float, sai
 
 def line(name: str, rows: list[Outcome]) -> str:
     """Return one line of the table."""
-    known = [r for r in rows if np.isfinite(r.flown)]
+    flights = [r for r in rows if np.isfinite(r.flown)]
+    known = [r for r in flights if not np.isnan(r.said)]
     if not known:
-        return f"{name:34s} {len(rows):5d} none designed: {rows[0].refused[:60]}"
+        why = "none said" if flights else f"none designed: {rows[0].refused[:60]}"
+        return f"{name:34s} {len(rows):5d} {why}"
     # what was said never to settle is off by the whole
     off = np.array([abs(r.flown - r.said) / max(r.said, AT_LEAST_S / WITHIN) if np.isfinite(r.said) else 1.0 for r in known])
     held = 100.0 * float(np.mean([r.as_said for r in known]))
     below = 100.0 * float(np.mean([r.in_band for r in known]))
     return (
         f"{name:34s} {len(known):5d} {len(rows) - len(known):4d} {100 * np.median(off):7.0f} {100 * off.max():8.0f} {held:9.0f} "
-        f"{below:9.0f} {sum(r.hunts for r in known):5d} {100 * max(r.overshoot for r in known):7.0f} "
+        f"{below:9.0f} {sum(r.hunts for r in flights):5d} {100 * max(r.overshoot for r in known):7.0f} "
         f"{min(r.margin for r in known):8.0f}"
     )
 
 
 def table(rows: list[Outcome]) -> list[str]:
     """Return the table's lines: all, then by kind, by size of step, stable and unstable."""
-    heads = "rows refd   mid %  worst %  as said% in band %  hunt  over %   margin"
+    heads = "rows none   mid %  worst %  as said% in band %  hunt  over %   margin"
     lines = [f"{'settling flown against said':34s}  {heads}", line("all", rows)]
     lines += [line(f"  {kind}", part) for kind in KINDS if (part := [r for r in rows if r.kind == kind])]
     sizes = sorted({r.step_deg for r in rows})

@@ -122,6 +122,10 @@ def _verify_row(check: Check, constant: Check) -> tuple[str, ...]:
 
 
 def _settles(seconds: float) -> str:
+    from math import isnan
+
+    if isnan(seconds):
+        return "-"
     return f"{seconds:.1f}" if seconds != float("inf") else "never"
 
 

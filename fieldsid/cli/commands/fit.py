@@ -42,20 +42,21 @@ def command(
     """
     from fieldsid.cli.headlines.gains import of_fit
     from fieldsid.errors import UsageError
-    from fieldsid.plant.laws.axis_laws import fit_laws, law_notes, report, save_laws
+    from fieldsid.plant.laws.axis_laws import law_notes, report, save_laws
     from fieldsid.plant.parameter_source import load_parameter_source
 
     source = load_parameter_source(models)
     if source.is_fit_file:
         raise UsageError("this is a fit file already", found=str(models[0]), hint="give models or a table")
-    laws = fit_laws(source.axis, source.points, weighted=not unweighted)
+    laws = source.fitted(weighted=not unweighted)
     body: dict[str, Any] = {"schema": "fieldsid/fit/1", **report(laws), "file": None, "figure": None}
     if output is not None:
         there = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_laws(laws, output, models=there if source.models else (), inputs=there, force=force))
         if figures:
             body["figure"] = str(_draw(laws, output.with_suffix(".png"), context, force=force))
-    return emit(body, as_json=as_json, render=lambda to: _render(to, laws, body), headline=of_fit(body), notes=law_notes(laws))
+    notes = (*source.notes, *law_notes(laws))
+    return emit(body, as_json=as_json, render=lambda to: _render(to, laws, body), headline=of_fit(body), notes=notes)
 
 
 def _draw(laws: Laws, path: Path, context: typer.Context, *, force: bool) -> Path:

@@ -88,6 +88,8 @@ class StepCheck(Shape):
 
     step_rad: float
     """Its size."""
+    said: bool
+    """Whether overshoot and settling are said; not those of a large step of an unstable hull that no run turned as tight."""
     overshoot_percent: Number
     """Overshoot by the estimate."""
     overshoot_most_percent: Number

@@ -113,6 +113,42 @@ def test_a_model_whose_fin_has_no_known_sign_is_left_out_where_it_disagrees():
         source_of_models([models[0], authority_model(1.5, 20.0, 2.0)], ["a", "b"])
 
 
+def joint_model(speeds, b2s, error):
+    """Return a model of two speed groups, the later one its reference."""
+    (low, high), (at_low, at_high) = speeds, b2s
+    model = authority_model(high, at_high, error)
+    info = {"law_parameters": {f"b2@{low:.3g}": {"std_error": error}}}
+    return replace(model, law=SpeedLaw(high, points=((low, at_low), (high, at_high))), info=info)
+
+
+def test_a_joint_model_that_disagrees_at_one_of_its_speeds_is_left_out_and_weak_ones_that_agree_stay():
+    models = [
+        authority_model(1.0, -0.5, 0.02),
+        joint_model((1.2, 1.5), (0.003, -0.001), 0.4),
+        joint_model((1.6, 2.0), (-0.4, -0.6), 0.5),
+    ]
+    source = source_of_models(models, ["a", "b", "c"])
+    assert source.left_out == ("b",)
+    assert source.speeds.tolist() == [1.0, 1.6, 2.0]
+    with pytest.raises(DataError, match="sign of b2"):  # each knows its sign at one speed, and not the same
+        source_of_models([models[0], joint_model((1.2, 1.5), (0.3, 0.4), 0.05)], ["a", "b"])
+    with pytest.raises(DataError, match="sign of b2"):  # none knows
+        source_of_models(models[1:], ["b", "c"])
+
+
+def test_a_model_that_is_left_out_stays_so_in_a_fit_file_and_is_named(tmp_path):
+    odd = joint_model((1.2, 1.5), (0.003, -0.001), 0.4)
+    given = {"odd": odd, "a": authority_model(1.0, -0.5, 0.02), "c": authority_model(2.0, -2.0, 0.05)}
+    paths = [save_model(m, tmp_path / f"{n}.yaml") for n, m in given.items()]
+    source = load_parameter_source(paths)
+    assert [p.stem for p in source.paths] == ["a", "c", "odd"]
+    laws = source.fitted()
+    assert [n.code for n in laws.notes] == ["model_left_out"]
+    again = load_parameter_source([save_laws(laws, tmp_path / "law.yaml", models=source.paths)])
+    assert again.left_out == ("odd",)
+    assert again.names == ("a", "c")
+
+
 def test_models_of_two_axes_are_refused(tmp_path):
     yaw = save_model(yaw_model(), tmp_path / "yaw.yaml")
     pitch = Model(

@@ -14,9 +14,9 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.schedule.flown.response import Steps, tightest
-from fieldsid.schedule.linear_plant import FinLimits
+from fieldsid.schedule.linear_plant import FinLimits, LinearPlant
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.plants import plants_of
+from fieldsid.schedule.plants import Plants, plants_of
 from fieldsid.schedule.record import load_schedule, save_schedule
 from fieldsid.schedule.verdict import rests_on
 from fieldsid.schedule.verify import STEPS_RAD, verify_schedule
@@ -99,3 +99,21 @@ def test_a_step_that_turns_tighter_than_any_run_is_said_to_be_extrapolated(trial
     assert share == pytest.approx(0.5, abs=0.3)
     assert "how it settles is extrapolated until a turn that tight is flown" in rests_on(loose, made, source)
     assert replace(checked, tightest_flown=float("nan")).extrapolated is None
+
+
+def test_how_an_unstable_hull_comes_out_of_a_turn_tighter_than_any_run_is_not_said(trial, monkeypatch):
+    source, runs = trial
+    made = design_schedule(source, 0.26, runs=runs, length=2.0)
+
+    def checked(flown, growth):
+        monkeypatch.setattr(Plants, "tightest_flown", property(lambda _: flown))
+        monkeypatch.setattr(LinearPlant, "growth", property(lambda plant: np.full(plant.count, growth)))
+        return verify_schedule(made, source, draws=4, runs=runs)
+
+    for flown, growth in ((1e-3, -0.1), (1e3, 0.1)):
+        steps = checked(flown, growth).scheduled[0].steps
+        assert all(s.record()["said"] and np.isfinite(s.settling) for s in steps)
+    found = checked(1e-3, 0.1)
+    assert [s.record()["said"] for s in found.scheduled[0].steps] == [True, True, False]
+    assert "how a 90 deg step settles is not said (`-`) until" in rests_on(found, made, source)
+    assert found.scheduled[0].settling == steps[1].settling
