@@ -90,7 +90,11 @@ def _gain_verdict(axis: str, body: Mapping[str, Any]) -> dict[str, str]:
     says = (
         f"least phase margin {phase:.0f} deg at {number(worst['speed_m_s'], 3)} m/s, {wanted:.0f} deg asked for, by the estimate"
     )
-    return {"what": f"{axis} gains at {len(rows)} speeds", "says": says, "state": "good" if phase >= wanted - 0.5 else "warn"}
+    return {
+        "what": f"{axis} gains at {len(rows)} speed{'s' * (len(rows) > 1)}",
+        "says": says,
+        "state": "good" if phase >= wanted - 0.5 else "warn",
+    }
 
 
 def _state_verdict(state: FolderState) -> list[dict[str, str]]:

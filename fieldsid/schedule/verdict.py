@@ -154,7 +154,8 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
         (
             f"rests on {named} with {', '.join(effects) or 'no effects'}",
             errors,
-            f"{len(speeds)} speeds, {number(min(speeds), 3)} .. {number(max(speeds), 3)} m/s"
+            (f"{len(speeds)} speeds, {number(min(speeds), 3)} .. " if len(speeds) > 1 else "")
+            + f"{number(max(speeds), 3)} m/s"
             + (f", {beyond} of them beyond the data" if beyond else ""),
             f"fin {limit} rad, {fin_of(checked.actuator)}",
             checked.speed_lost,

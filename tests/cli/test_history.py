@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
+
 import hidden_lag
 import pytest
 from cli import trial
@@ -53,6 +55,18 @@ def test_a_model_nobody_extended_has_no_history_yet(run_cli, tmp_path):
     assert "nothing was added yet" in answer.out
     assert "no figure to draw" in answer.err
     assert not (tmp_path / "h.png").exists()
+
+
+def test_a_model_whose_runs_were_searched_in_vain_goes_on_to_its_use(run_cli, tmp_path):
+    log = trial.flown(tmp_path)
+    (fit,) = run_cli("identify", log, "--axis", "yaw", "-o", tmp_path, "--no-figures", "--json").json["fits"]
+    asked = ("history", fit["model"], "--quiet")
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid diagnose ")
+    held = f"schema: fieldsid/diagnosis/1\ninputs:\n- path: run7.parquet\n  sha256: {sha256(log.read_bytes()).hexdigest()}\n"
+    (tmp_path / "diagnosis.yaml").write_text(f"{held}effects: []\n")
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid turn-radius ")
+    (tmp_path / "diagnosis.yaml").write_text(f"{held}effects: [servo_lag]\n")
+    assert run_cli(*asked).out.splitlines()[2].startswith("next: sysid diagnose ")
 
 
 def test_a_parent_that_is_missing_or_changed_is_said_on_stderr(run_cli, line, tmp_path):

@@ -102,14 +102,23 @@ def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inpu
 
 
 def _searched(model: Path) -> bool:
-    """Whether a diagnosis beside a model asked since it was written what it lacks, and named nothing to add."""
+    """Whether a diagnosis beside a model asked since it was written what it lacks, and named nothing to add.
+
+    A model without effects is what a diagnosis of its own runs begins with, whether it is named there or not.
+    """
     from fieldsid.artifacts import inputs_of, read_yaml
     from fieldsid.logs.unknown_file import own_kind
+
+    own = {p.resolve() for p in inputs_of(model)} if not read_yaml(model).get("effects") else set()
+
+    def asks_of(path: Path) -> bool:
+        inputs = {p.resolve() for p in inputs_of(path)}
+        return model.resolve() in inputs or (bool(own) and inputs == own)
 
     return any(
         own_kind(path) == "diagnosis"
         and path.stat().st_mtime_ns >= model.stat().st_mtime_ns
-        and model.resolve() in {p.resolve() for p in inputs_of(path)}
+        and asks_of(path)
         and not read_yaml(path).get("effects")
         for path in model.parent.glob("*.yaml")
     )
@@ -164,9 +173,10 @@ def of_history(body: Body, inputs: Sequence[Path]) -> Headline:
     """Return how the error fell along a model's line; inputs: what it was fitted to."""
     steps = [g for g in body["generations"] if g.get("over_floor")]
     axis, model = str(body["axis"]), str(body["model"])
-    logs = [p for p in inputs if is_there(p)]
+    is_searched = _searched(Path(model))
+    logs = [] if is_searched else [p for p in inputs if is_there(p)]
     if not steps:
-        next_ = pasted("diagnose", logs, "--axis", axis) if logs else pasted("status")
+        next_ = used(axis, model) if is_searched else pasted("diagnose", logs, "--axis", axis) if logs else pasted("status")
         return Headline("nothing was added yet", f"{model}, whose line begins with itself", next_)
     first, last = steps[0]["over_floor"]["before"], steps[-1]["over_floor"]["after"]
     added = ", then ".join("+".join(g["added"]) for g in steps)
