@@ -78,7 +78,7 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=plants.actuator,
-        provenance=_provenance(source, wish, plants.says, knots) | {"belief_refused": refused, "length_m": length},
+        provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length},
         stated=limits.record(),
         notes=() if plants.note is None else (plants.note,),
     )
@@ -137,7 +137,8 @@ def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: 
     )
 
 
-def _provenance(source: ParameterSource, wish: Wish, speed_lost: str, knots: Sequence[float]) -> dict[str, Any]:
+def _provenance(plants: Plants, wish: Wish, knots: Sequence[float]) -> dict[str, Any]:
+    source = plants.source
     names = NAMES[source.axis]
     sign = float(np.sign(source.base_at(float(source.speeds[0]))[names.authority]))
     low, high = float(source.speeds[0]), float(source.speeds[-1])
@@ -147,9 +148,10 @@ def _provenance(source: ParameterSource, wish: Wish, speed_lost: str, knots: Seq
         "runs": [r for m in source.models for r in m.runs],
         "effects": sorted({e for m in source.models for e in m.effects}),
         "effects_not_counted": list(not_counted(source.models)),
-        "speed_lost": speed_lost,
+        "speed_lost": plants.says,
         "draws": DESIGN_DRAWS,
-        "draws_rejected": max(source.share_rejected(speed, DESIGN_DRAWS, SEED) for speed in knots),
+        "draws_of": plants.draws_of,
+        "draws_rejected": max(plants.share_rejected(speed, DESIGN_DRAWS, SEED) for speed in knots),
         "schedule_variable": "speed_m_s: forward speed through the water, m/s",
         "between_rows": "linear in speed",
         "outside_rows": "clamp: the nearest row's gains",

@@ -75,6 +75,15 @@ class Plants:
         return self.belief.largest_curvature if self.belief is not None else float("nan")
 
     @property
+    def draws_of(self) -> str:
+        """What the draws are of, in words."""
+        return "what all runs together allow" if self.belief is not None else "the models' errors"
+
+    def share_rejected(self, speed: float, count: int, seed: int) -> float:
+        """Return the share of the draws at a speed that are rejected as not physical: a belief's are none of them."""
+        return 0.0 if self.belief is not None else self.source.share_rejected(speed, count, seed)
+
+    @property
     def says(self) -> str:
         """Where the loss of speed comes from, in words."""
         return BELIEVED if self.belief is not None else speed_kept_said(self.source.axis, self.surge)

@@ -143,7 +143,7 @@ def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource)
     names = source.names or tuple(p.name for p in source.paths)
     named = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
     effects = sorted({e for m in source.models for e in m.effects})
-    errors = f"{checked.draws} draws of their errors" if checked.spread else "no errors stated, the estimate alone"
+    errors = f"{checked.draws} draws of {checked.draws_of}" if checked.spread else "no errors stated, the estimate alone"
     speeds = [c.speed for c in checked.scheduled]
     beyond = sum(not c.supported for c in checked.scheduled)
     heard = (

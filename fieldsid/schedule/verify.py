@@ -195,9 +195,11 @@ class Verification(Plotted):
     draws: int
     spread: bool
     """Draws of the errors for each model, and whether they differ: a table may state no errors."""
+    draws_of: str
     speed_lost: str
     disturbance: float
-    """Where the speed lost in the turn comes from; the rms of the models' disturbance moment, rad/s^2, zero for none."""
+    """What the draws are of and where the speed lost in the turn comes from, in words; the rms of the models' disturbance moment,
+    rad/s^2, zero for none."""
     unstable: bool
     """Whether the hull alone is unstable at one of the speeds, and each speed has a model of its own: how it settles then hangs
     on what that leaves out."""
@@ -270,7 +272,9 @@ def verify_schedule(
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
     kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
     unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
-    return Verification(schedule, scheduled, compared, constant, flown, draws, spread, kept, heard, unstable, seen, of.actuator)
+    return Verification(
+        schedule, scheduled, compared, constant, flown, draws, spread, of.draws_of, kept, heard, unstable, seen, of.actuator
+    )
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:

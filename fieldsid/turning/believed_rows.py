@@ -81,7 +81,7 @@ def _missing(turn: BelievedTurn, *, flown: bool, usual: bool) -> tuple[str, ...]
         "a turn this tight was not flown": turn.curvature_covered >= MIN_COVERED_SHARE,
         "a fin angle this large was not flown": turn.fin_covered >= MIN_COVERED_SHARE,
         "this speed was not flown": flown,
-        "the draws are worth too few independent ones": turn.effective >= LEAST_EFFECTIVE,
+        "the draws are too much alike to tell how wide the band is": turn.effective >= LEAST_EFFECTIVE,
         "the fit lies where no vehicle of the ensemble does": usual,
     }
     return (*(says for says, fine in short.items() if not fine), *doubts_of_draws(high - low, turn.radius, turn.unsettled))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
 from typing import Any
@@ -15,6 +15,14 @@ from fieldsid.turning.steady.speed_loss import SurgeModel
 SIDES: Mapping[str, float] = {"port": -1.0, "starboard": 1.0}
 EQUAL_TURN_SHARE = 0.05
 """Share by which speed and rudder of two turns may differ and still be one."""
+BY_METHOD: Mapping[str, str] = {
+    "maneuvering": "one vehicle fitted to all runs",
+    "simulated": "each speed's own model flown",
+    "u_turn": "u-turn formula",
+    "steady": "formula of the settled circle",
+    "measured": "measured",
+}
+"""How the turns of a method are found, in words."""
 MAX_SPEEDS_LISTED = 4
 """Speeds that are listed one by one."""
 HOW = "one and a half circles, x_m and y_m logged"
@@ -182,6 +190,12 @@ class TurnPrediction(Plotted):
             },
             "warnings": [{"code": n.code, "message": n.message} for n in self.notes],
         }
+
+
+def found_by(methods: Iterable[str]) -> str:
+    """Return how turns were found, in words; circles that were measured are told apart, unless all were."""
+    kinds = sorted(set(methods))
+    return ", ".join(BY_METHOD[m] for m in kinds if m != "measured" or len(kinds) == 1)
 
 
 def settling_flight(because: tuple[str, ...], side: str, speed: float, rudder: float) -> str:

@@ -51,8 +51,8 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
     counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
     to.print(f"counted with: {'; '.join(counted)}")
     to.print(
-        f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of the models' errors; held: those that come "
-        f"to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
+        f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}; "
+        f"held: those that come to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
     )
     if rejected := schedule.provenance["draws_rejected"]:
         to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")

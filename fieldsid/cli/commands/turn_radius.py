@@ -172,9 +172,9 @@ def _written(
 
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
     from fieldsid.rounding import number
+    from fieldsid.turning.prediction import found_by
 
     times, angle = shown_in("rad")
-    methods = ", ".join(sorted({r.method for r in prediction.rows}))
     columns = ("side", "m/s", "radius m", "95 %", "model's", "deg/s", "u-turn s", "trust")
     rows = [
         (
@@ -191,14 +191,16 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
     ]
     to.print(
         table(
-            f"rudder {times * prediction.rudder_max:.4g} {angle}, {methods}",
+            f"rudder {times * prediction.rudder_max:.4g} {angle}, {found_by(r.method for r in prediction.rows)}",
             columns,
             rows,
         )
     )
     _render_measured(to, prediction)
     for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
-        to.print(f"extrapolated: {reason}")
+        of = sum(reason in r.because for r in prediction.rows)
+        share = "" if of == len(prediction.rows) else f" ({of} of {len(prediction.rows)} turns)"
+        to.print(f"extrapolated{share}: {reason}")
     for settling in prediction.settling:
         to.print(f"what would settle it: {settling}")
     for side, best in body["minimum"].items():
@@ -221,4 +223,10 @@ def _render_measured(to: Console, prediction: TurnPrediction) -> None:
         radius = with_error(circle.radius, circle.radius_std_error)
         rows.append((m.turn.run, number(times * m.turn.fin, 3), radius, number(m.predicted), band, f"{off:+.1f}"))
     to.print()
-    to.print(table("measured circles", ("run", "fin", "radius m", "predicted", "95 %", "off %"), rows))
+    to.print(
+        table(
+            "measured circles, and what the other runs alone predict",
+            ("run", "fin", "radius m", "predicted", "95 %", "off %"),
+            rows,
+        )
+    )

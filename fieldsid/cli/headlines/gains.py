@@ -38,6 +38,8 @@ def of_fit(body: Body) -> Headline:
 
 def of_turn(body: Body, models: Sequence[Path]) -> Headline:
     """Return the tightest turn of both sides with its band."""
+    from fieldsid.turning.prediction import found_by
+
     rows = body["rows"]
     tightest = min(rows, key=lambda r: float(r["radius_m"]))
     low, high = tightest["interval95"]
@@ -46,11 +48,13 @@ def of_turn(body: Body, models: Sequence[Path]) -> Headline:
         f"95 % {number(low, 3)} .. {number(high, 3)} m, {tightest['trust']}"
     )
     speeds = sorted({float(r["speed_m_s"]) for r in rows})
-    methods = ", ".join(sorted({str(r["method"]) for r in rows}))
-    circles = f"{counted(len(body['measured']), 'measured circle')}" if body["measured"] else "no circle given by `--measured`"
+    methods = [str(r["method"]) for r in rows]
+    taken = f"taken for {methods.count('measured')} of {len(rows)} turns" if "measured" in methods else "of none of these turns"
+    of = counted(len(body["measured"]), "measured circle")
+    circles = f"{of}, {taken}" if body["measured"] else "no circle given by `--measured`"
     times, unit = shown_in("rad")
     rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
-    rests = f"{named([str(m) for m in models])}, {rudder}; {methods} at {counted(len(speeds), 'speed')}; {circles}"
+    rests = f"{named([str(m) for m in models])}, {rudder}; {found_by(methods)}, {counted(len(speeds), 'speed')}; {circles}"
     return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
 
 
@@ -67,9 +71,8 @@ def of_design(body: Body, models: Sequence[Path]) -> Headline:
         f"least phase margin {least:.0f} deg" if isfinite(least) else "no loop crosses unity"
     )
     beyond = sum(not r["supported"] for r in rows)
-    rests = f"{named([str(m) for m in models])}, {counted(int(body['provenance']['draws']), 'draw')} of their errors" + (
-        f"; {beyond} of {len(rows)} rows without data" if beyond else ""
-    )
+    drawn = f"{counted(int(body['provenance']['draws']), 'draw')} of {body['provenance']['draws_of']}"
+    rests = f"{named([str(m) for m in models])}, {drawn}" + (f"; {beyond} of {len(rows)} rows without data" if beyond else "")
     next_ = pasted("schedule", "verify", body["file"]) if body["file"] else typed_with("-o", "gains.yaml")
     return Headline(says, rests, next_)
 
