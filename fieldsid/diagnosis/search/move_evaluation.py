@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, gains_training_evidence, is_accepted, leaves_error
+from fieldsid.diagnosis.evidence.acceptance import (
+    gains_any_evidence,
+    gains_training_evidence,
+    is_accepted,
+    leaves_error,
+    validation_error_ratio,
+)
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
     FittedProblem,
@@ -26,8 +32,9 @@ from fieldsid.diagnosis.search.add_effect import (
     is_redundant_start,
 )
 from fieldsid.diagnosis.search.search_state import SearchState
+from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
+from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import equivalent_solution, overlay_parameters, transfer_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
@@ -56,6 +63,9 @@ class MoveEvaluation(SearchState):
             self._fit_from_output_error(parent)
             self.tried.free_runs.screened.add(key)
             later = self._evaluate_moves(parent, by_effect(found))
+            if validation_error_ratio(parent, self.floor) > MAX_VALIDATION_ERROR_RATIO:
+                untried = [e for e in left if frozenset((*key, e.name)) not in self.tried]
+                self._evaluate_moves(parent, by_effect(moves_of_all_runs(parent, untried, self.parallel)), every=True)
             for other in self._other_solutions(parent):
                 self._fit_from_other(parent, other, left)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
