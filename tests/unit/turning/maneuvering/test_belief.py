@@ -81,7 +81,7 @@ def test_few_effective_draws_and_a_fit_like_no_vehicle_are_not_identified(monkey
     monkeypatch.setattr("fieldsid.turning.maneuvering.fit.FARTHEST_PRIOR_COST", 0.0)
     far = only_row()
     assert few.trust == far.trust == "extrapolated"
-    assert "independent" in " ".join(few.because)
+    assert "too much alike" in " ".join(few.because)
     assert "no vehicle" in " ".join(far.because)
 
 
