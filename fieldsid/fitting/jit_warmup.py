@@ -30,6 +30,7 @@ from fieldsid.noise.kalman.full import full_filter
 from fieldsid.noise.kalman.full_batched import full_filter_batched
 from fieldsid.noise.kalman.sensor_colour import sensor_colour_filter
 from fieldsid.noise.maximum_likelihood import estimate_noise
+from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.sandwich_covariance import score_covariance, score_covariance_kernel
 from fieldsid.noise.whiten import noise_vector, whiten
 from fieldsid.numerics.first_order_lag import first_order_lag, held_first_order_lag
@@ -112,7 +113,7 @@ class WarmupJob:
 
 WARMUP_JOBS = (
     WarmupJob(_linear, (linear_sensitivities, linear_motion, accumulate_normal_equations)),
-    WarmupJob(lambda: _whiten(DISTURBED), (disturbance_filter,)),
+    WarmupJob(lambda: _whiten(replace(DISTURBED, own_moment=0.01)), (disturbance_filter, base_responses)),
     WarmupJob(_nonlinear, (nonlinear_sensitivities, nonlinear_motion)),
     WarmupJob(_lag, (first_order_lag, held_first_order_lag)),
     WarmupJob(lambda: _estimate("disturbance"), (score_of_innovations,)),

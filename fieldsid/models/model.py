@@ -29,7 +29,8 @@ class Noise(Brief):
     """Noise of the measurement and of the motion.
 
     Standard deviations: angle (rad), rate (rad/s), disturbance (rad/s^2, an AR(1) moment of correlation time
-    `disturbance_time` s), and of coloured sensor noise with correlation time `coloured_time`.
+    `disturbance_time` s), of coloured sensor noise with correlation time `coloured_time`, and `own_moment` (rad/s^2) of a
+    constant moment that each run has of its own: its trim is not quite that of the next.
     """
 
     angle: float
@@ -39,6 +40,7 @@ class Noise(Brief):
     coloured_angle: float = 0.0
     coloured_rate: float = 0.0
     coloured_time: float = 1.0
+    own_moment: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, repr=False)

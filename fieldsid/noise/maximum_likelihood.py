@@ -11,9 +11,9 @@ import numpy.typing as npt
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.fisher_scoring import information, innovations_of
-from fieldsid.noise.innovations import innovations
 from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
+from fieldsid.noise.whiten import base_dynamics, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
@@ -34,9 +34,9 @@ GRADIENT_STEP = 1e-4
 
 
 def log_likelihood(
-    records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: FloatArray
+    records: Sequence[Record], dynamics: Sequence[tuple[float, float]], residuals: Sequence[FloatArray], noise: Noise
 ) -> float:
-    """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise vector (7,).
+    """Return the Gaussian log likelihood, up to its constant, of residuals [(2, n)] under a noise.
 
     Minus infinity where one of them is that of a motion without bound.
     """
@@ -44,9 +44,8 @@ def log_likelihood(
         return -np.inf
     total = 0.0
     for record, (a, k), e in zip(records, dynamics, residuals, strict=True):
-        out = np.empty((1, *e.shape))
-        logs = innovations(record.nominal_steps, record.ok, max(a, 1e-3), max(k, 0.0), noise, e[None], out)
-        total -= 0.5 * (logs + float(np.vdot(out, out)))
+        white, logs = whiten(record, noise, a, k, e[None])
+        total -= 0.5 * (logs + float(np.vdot(white, white)))
     return total
 
 
@@ -130,9 +129,7 @@ class _LogNoiseLikelihood:
         Where the likelihood is not above `least`, score and information are not computed.
         """
         count, noise = x.size, self.vector(x)
-        runs = [
-            (r, max(a, 1e-3), max(k, 0.0), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)
-        ]
+        runs = [(r, *base_dynamics(a, k), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)]
         here = [innovations_of(r, a, k, noise, self.place, e) for r, a, k, e in runs]
         total = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
         if not (np.isfinite(total) and total > least):

@@ -33,9 +33,10 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
     `compared_errors` for which validation error.
     """
     before, now = compared_errors(without, with_)
-    unseen, fitted = now.mean / before.mean, with_.train.mean / without.train.mean
+    was, left = (h.train_under(_common_own_moment(without, with_)) for h in (without, with_))
+    unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
-    explains = floor is not None and _explains_most((before, without.train), (now, with_.train), floor)
+    explains = floor is not None and _explains_most((before, was), (now, left), floor)
     return _keeps(before, now) and (lowers or explains)
 
 
@@ -43,11 +44,18 @@ def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, E
     """Return the validation errors that two models are compared by.
 
     They are those at the training runs' parameters; where these do not fall, and those at the parameters of all runs do or are at
-    least kept, the latter.
+    least kept, the latter. Both with moments of the runs' own of the smaller size that the two need: what a model lacks is no
+    trim that differs from run to run.
     """
-    pairs = tuple(zip(without.unseen_errors, with_.unseen_errors, strict=True))
+    std = _common_own_moment(without, with_)
+    pairs = tuple(zip(without.unseen_under(std), with_.unseen_under(std), strict=True))
     lower = next((pair for pair in pairs if pair[1].mean < pair[0].mean), None)
     return lower or next((pair for pair in pairs if _keeps(*pair)), pairs[0])
+
+
+def _common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
+    """Return the smaller standard deviation (rad/s^2) of the runs' own moments that two models need."""
+    return min(without.own_moment, with_.own_moment)
 
 
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:

@@ -23,8 +23,8 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
-from fieldsid.noise.whiten import noise_vector
+from fieldsid.noise.maximum_likelihood import log_likelihood
+from fieldsid.noise.own_moment import FIN_REPEATABILITY_RAD, MomentInformation, estimate_noise_of_runs, moment_information
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
 
@@ -73,6 +73,12 @@ class LikelihoodFit:
         """What the training runs know of the parameters."""
         return information(self.fitted.problem, self.fitted.x, self.noise)
 
+    @cached_property
+    def own_moments(self) -> tuple[MomentInformation, ...]:
+        """What each training run tells of a moment of its own."""
+        problem, x = self.fitted.problem, self.fitted.x
+        return moment_information(problem.records, dynamics_of(problem, x), residuals_of(problem, x), self.noise)
+
 
 def fit_output_error(
     problem: Problem,
@@ -101,7 +107,7 @@ def fit_maximum_likelihood(
     noise, likelihood = _noise_at(problem, x, start, floor, noise_kind)
     for _ in range(MAX_ALTERNATIONS):
         found = levenberg_marquardt(problem, x, noise, max_iterations=MAX_GLS_ITERATIONS, tolerance=LIKELIHOOD_COST_TOLERANCE)
-        new_noise, new = _noise_at(problem, found.x, noise, floor, noise_kind, wake=False)
+        new_noise, new = _noise_at(problem, found.x, noise, floor, noise_kind, reinitialise=False)
         if not new > likelihood:
             break
         gained, x, noise, likelihood = new - likelihood, found.x, new_noise, new
@@ -111,12 +117,18 @@ def fit_maximum_likelihood(
 
 
 def _noise_at(
-    problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, wake: bool = True
+    problem: Problem, x: FloatArray, start: Noise, floor: Noise, noise_kind: str, *, reinitialise: bool = True
 ) -> tuple[Noise, float]:  # fmt: skip
     residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
-    return estimate_noise(
-        problem.records, dynamics, residuals, noise_kind, start, floor=floor, reinitialise=wake, evaluations=problem.evaluations
-    )
+    return estimate_noise_of_runs(
+        problem.records, dynamics, residuals, noise_kind, start, floor, largest_own_moment(problem, x),
+        reinitialise=reinitialise, evaluations=problem.evaluations,
+    )  # fmt: skip
+
+
+def largest_own_moment(problem: Problem, x: FloatArray) -> float:
+    """Return the largest standard deviation (rad/s^2) of what runs differ by in their trims: that of a fin's middle."""
+    return FIN_REPEATABILITY_RAD * max(abs(problem.base_of(x, run).authority) for run in range(len(problem.records)))
 
 
 def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> LikelihoodFit:
@@ -155,8 +167,8 @@ def likelihood_at(problem: Problem, x: FloatArray, ml_fit: LikelihoodFit) -> flo
 
 def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArray:
     """Return each run's log likelihood, (R,)."""
-    residuals, dynamics, vector = residuals_of(problem, x), dynamics_of(problem, x), noise_vector(noise)
-    return np.array([log_likelihood([r], [d], [e], vector) for r, d, e in zip(problem.records, dynamics, residuals, strict=True)])
+    residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
+    return np.array([log_likelihood([r], [d], [e], noise) for r, d, e in zip(problem.records, dynamics, residuals, strict=True)])
 
 
 def measured_count(records: Sequence[Record]) -> int:

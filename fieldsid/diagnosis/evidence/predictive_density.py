@@ -21,15 +21,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, largest_own_moment
 from fieldsid.fitting.optimise.levenberg_marquardt import gram_products
 from fieldsid.fitting.predict.predict import values_at_speed
 from fieldsid.fitting.problem.problem import Problem, RunResult
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
-from fieldsid.noise.whiten import noise_vector
+from fieldsid.noise.maximum_likelihood import log_likelihood
+from fieldsid.noise.own_moment import estimate_noise_of_runs
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 
@@ -60,10 +60,11 @@ class ValidationRun:
 
 def log_predictive_density(
     ml_fit: LikelihoodFit, runs: Sequence[ValidationRun], records: Sequence[Record]
-) -> tuple[FloatArray, list[FloatArray]]:
+) -> tuple[FloatArray, list[FloatArray], float]:
     """Return the log predictive density of each validation run, (R,), in turn, under the noise that all of them support.
 
-    With it, each run's residual (2, n) at the parameters' posterior mean after all runs.
+    With it, each run's residual (2, n) at the parameters' posterior mean after all runs, and the standard deviation of the runs'
+    own moments (rad/s^2), which training and validation runs tell together.
 
     The parameters are those of the training runs. The noise is estimated from the validation runs: that of the training runs
     would penalise a model the more for a small error, the better it fitted there.
@@ -75,10 +76,11 @@ def log_predictive_density(
     _, led = _under(ml_fit.noise, runs, dynamics, known)
     found = []
     for residuals in (plain, led) if _differ(plain, led, ml_fit.floor) else (plain,):
-        noise, _ = estimate_noise(
-            records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, floor=ml_fit.floor, evaluations=evaluations
-        )
-        found.append(_under(noise, runs, dynamics, known))
+        noise, _ = estimate_noise_of_runs(
+            records, dynamics, residuals, ml_fit.noise_kind, ml_fit.noise, ml_fit.floor,
+            largest_own_moment(ml_fit.fitted.problem, ml_fit.fitted.x), ml_fit.own_moments, evaluations=evaluations,
+        )  # fmt: skip
+        found.append((*_under(noise, runs, dynamics, known), noise.own_moment))
     return max(found, key=lambda v: float(v[0].sum()))
 
 
@@ -120,13 +122,13 @@ def _under(
     noise: Noise, runs: Sequence[ValidationRun], dynamics: Sequence[tuple[float, float]], known: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return each run's log predictive density under a noise, and its residual at the posterior mean."""
-    vector, values, parts = noise_vector(noise), list[float](), list[FloatArray | None]()
+    values, parts = list[float](), list[FloatArray | None]()
     posterior_mean: FloatArray = np.zeros(known.shape[0])
     # in units of each parameter's own doubt: their sizes differ by ten powers of ten, and some move as one
     unit = 1.0 / np.sqrt(np.diag(known))
     posterior_precision = known * np.outer(unit, unit) + MIN_PRECISION * np.eye(unit.size)
     for run, d in zip(runs, dynamics, strict=True):
-        likelihood = log_likelihood(run.problem.records, [d], [run.residual], vector)
+        likelihood = log_likelihood(run.problem.records, [d], [run.residual], noise)
         product = gram_products(run.problem.records[0], noise, *d, run.linearisation)
         parts.append(product)
         if product is not None:

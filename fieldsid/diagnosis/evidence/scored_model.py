@@ -23,6 +23,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
     exchange_penalty,
     fit_maximum_likelihood,
     fit_output_error,
+    largest_own_moment,
     likelihood_at,
     likelihood_by_run,
     measured_count,
@@ -31,6 +32,7 @@ from fieldsid.diagnosis.evidence.predictive_density import ValidationRun, log_pr
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
+from fieldsid.fitting.predict.own_moment import FreeRun, free_run
 from fieldsid.fitting.predict.predict import frozen_problem, refit_nuisances, with_command_timing
 from fieldsid.fitting.predict.speed_correction import correct_speed, speed_sensitivity
 from fieldsid.fitting.problem.parameters import group_name
@@ -39,16 +41,22 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import Effect, definitions_of
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
+from fieldsid.noise.own_moment import disturbance_mean_std
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 
 ValidationFits = tuple[tuple[Problem, FloatArray], ...]
+FREE_RUNS = ("training_runs", "validation_runs", "settled_runs")
+"""What a scored model keeps of its free runs, whatever moments of their own the runs may have."""
 
 
 @dataclass(frozen=True)
 class ScoredModel:
     """A maximum-likelihood fit with its log likelihood by run, predictive density, penalty, and validation fits.
 
+    `own_moment` (rad/s^2) is the standard deviation of the moment that each run, of training and validation, has of its own, the
+    mean of its disturbance in it.
+    `settled_residuals` [(2, n)] are those of the validation runs at the parameters that all runs leave together.
     `output_error_fit` is the fit by output error, where its free run predicts the validation runs better.
     """
 
@@ -58,7 +66,8 @@ class ScoredModel:
     complexity_penalty: float
     validation: tuple[Record, ...]
     validation_fits: ValidationFits
-    settled_errors: Errors | None = None
+    own_moment: float = 0.0
+    settled_residuals: tuple[FloatArray, ...] = ()
     output_error_fit: FittedProblem | None = None
 
     @property
@@ -70,27 +79,71 @@ class ScoredModel:
     def model(self) -> Model:
         """The model of the reported fit."""
         fitted = self.reported_fit
-        return bare_model(fitted.problem, fitted.x, self.likelihood_fit.noise)
+        return bare_model(fitted.problem, fitted.x, self.noise)
+
+    @property
+    def noise(self) -> Noise:
+        """The noise of training and validation runs."""
+        return replace(self.likelihood_fit.noise, own_moment=self.own_moment)
 
     @property
     def errors(self) -> Pair:
-        """Errors on the training and on the validation runs, each run with its own start refitted."""
+        """Errors on the training and on the validation runs, each run with a start and a moment of its own."""
         return Pair(self.train, self.validation_errors)
 
     @cached_property
-    def train(self) -> Errors:
-        """Errors on the training runs."""
-        return training_errors(self.reported_fit)
+    def training_runs(self) -> tuple[FreeRun, ...]:
+        """Free runs on the training runs."""
+        return training_runs(self.reported_fit)
 
     @cached_property
-    def validation_errors(self) -> Errors:
-        """Errors on the validation runs."""
+    def validation_runs(self) -> tuple[FreeRun, ...]:
+        """Free runs on the validation runs."""
         flown = (
             self.validation_fits
             if self.output_error_fit is None
             else validation_fits(self.model, self.output_error_fit, self.validation)
         )
-        return validation_errors(flown, self.validation)
+        return validation_runs(flown, self.validation)
+
+    @cached_property
+    def settled_runs(self) -> tuple[FreeRun, ...]:
+        """Free runs on the validation runs at the parameters that all runs leave together."""
+        return tuple(
+            free_run(problem, x, 0, left, white_noise_floor([record]))
+            for (problem, x), left, record in zip(self.validation_fits, self.settled_residuals, self.validation, strict=True)
+        )
+
+    @cached_property
+    def train(self) -> Errors:
+        """Errors on the training runs."""
+        return self.train_under(self.own_moment)
+
+    @cached_property
+    def validation_errors(self) -> Errors:
+        """Errors on the validation runs."""
+        return errors_of(self.validation_runs, self.own_moment)
+
+    @cached_property
+    def settled_errors(self) -> Errors | None:
+        """Errors on the validation runs at the parameters that all runs leave together, None where there are none."""
+        return errors_of(self.settled_runs, self.own_moment) if self.validation else None
+
+    def with_own_moment(self, own_moment: float) -> ScoredModel:
+        """Return the model with another standard deviation (rad/s^2) of the runs' own moments, its free runs kept."""
+        other = replace(self, own_moment=own_moment)
+        other.__dict__.update({name: runs for name, runs in self.__dict__.items() if name in FREE_RUNS})
+        return other
+
+    def train_under(self, own_moment: float) -> Errors:
+        """Return the errors on the training runs where the runs' own moments have another standard deviation (rad/s^2)."""
+        return errors_of(self.training_runs, own_moment)
+
+    def unseen_under(self, own_moment: float) -> tuple[Errors, ...]:
+        """Return what `unseen_errors` does where the runs' own moments have another standard deviation (rad/s^2)."""
+        if not self.validation:
+            return (self.train_under(own_moment),)
+        return errors_of(self.validation_runs, own_moment), errors_of(self.settled_runs, own_moment)
 
     @property
     def selection_errors(self) -> Errors:
@@ -104,7 +157,7 @@ class ScoredModel:
         Training runs may leave a parameter open that one validation run settles, as two headings do a current: the first are
         then those of a chance value.
         """
-        return (self.selection_errors,) if self.settled_errors is None else (self.selection_errors, self.settled_errors)
+        return self.unseen_under(self.own_moment)
 
     def evaluate_errors(self, *, fitted: bool = False) -> ScoredModel:
         """Return itself with the selection errors computed, so that the process that fitted it computes them too.
@@ -139,7 +192,9 @@ def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredMo
     """Return a maximum-likelihood fit with its log likelihood by training run and log predictive density by validation run."""
     problem, x = ml_fit.fitted.problem, ml_fit.fitted.x
     flown = validation_fits(bare_model(problem, x, ml_fit.noise), ml_fit.fitted, validation)
-    density, settled = validation_log_density(ml_fit, validation, flown)
+    density, settled, own_moment = validation_log_density(ml_fit, validation, flown)
+    span = float(np.mean([r.time[-1] - r.time[0] for r in problem.records]))
+    own_moment = float(np.hypot(own_moment, disturbance_mean_std(ml_fit.noise, span)))
     return ScoredModel(
         ml_fit,
         likelihood_by_run(problem, x, ml_fit.noise),
@@ -147,7 +202,8 @@ def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredMo
         bic_penalty(ml_fit, validation),
         tuple(validation),
         flown,
-        pooled_errors(validation, settled) if validation else None,
+        min(own_moment, largest_own_moment(problem, x)),
+        tuple(settled),
     )
 
 
@@ -160,10 +216,10 @@ def validation_fits(model: Model, fitted: FittedProblem, validation: Sequence[Re
 
 def validation_log_density(
     ml_fit: LikelihoodFit, validation: Sequence[Record], flown: ValidationFits
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Return each validation run's log predictive density, (R,), and its residual (2, n) at the posterior mean of all runs."""
+) -> tuple[FloatArray, list[FloatArray], float]:
+    """Return what `log_predictive_density` does; without validation runs none, and the training runs' own moments."""
     if not validation:
-        return np.zeros(0), []
+        return np.zeros(0), [], ml_fit.noise.own_moment
     runs = [
         ValidationRun(
             p,
@@ -221,25 +277,25 @@ def _contradicts(h: ScoredModel, parent: ScoredModel) -> bool:
     return bool(next(costs) > next(costs))
 
 
-def validation_errors(flown: ValidationFits, validation: Sequence[Record]) -> Errors:
-    """Return the errors on the validation runs, each run's speed and start refitted."""
-    left = []
+def validation_runs(flown: ValidationFits, validation: Sequence[Record]) -> tuple[FreeRun, ...]:
+    """Return the free runs on the validation runs, each run's speed and start refitted."""
+    found = []
     for (flown_problem, start), record in zip(flown, validation, strict=True):
         floor = white_noise_floor([record])
         problem, x, _ = correct_speed(flown_problem, start, floor)
-        left.append(free_run_residual(problem, refit_nuisances(problem, x, 0, floor, rescan=False)))
-    return pooled_errors(validation, left)
+        x = refit_nuisances(problem, x, 0, floor, rescan=False)
+        found.append(free_run(problem, x, 0, free_run_residual(problem, x), floor))
+    return tuple(found)
 
 
-def training_errors(fitted: FittedProblem) -> Errors:
-    """Return the errors of a fit on the training runs, each run's start refitted."""
-    problem = fitted.problem
-    left = []
+def training_runs(fitted: FittedProblem) -> tuple[FreeRun, ...]:
+    """Return the free runs of a fit on the training runs, each run's start refitted."""
+    problem, found = fitted.problem, []
     for run, record in enumerate(problem.records):
-        left.append(
-            free_run_residual(problem, refit_nuisances(problem, fitted.x, run, white_noise_floor([record]), rescan=False), run)
-        )
-    return pooled_errors(problem.records, left)
+        floor = white_noise_floor([record])
+        x = refit_nuisances(problem, fitted.x, run, floor, rescan=False)
+        found.append(free_run(problem, x, run, free_run_residual(problem, x, run), floor))
+    return tuple(found)
 
 
 def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
@@ -261,6 +317,11 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     for record in (*records, *validation):
         total += 0.5 * own * np.log(max(measured_count([record]), 2)) + hidden
     return float(total) + exchange_penalty(ml_fit)
+
+
+def errors_of(runs: Sequence[FreeRun], own_moment: float) -> Errors:
+    """Return the errors of free runs whose own moments have a standard deviation (rad/s^2)."""
+    return pooled_errors([r.record for r in runs], [r.left(own_moment) for r in runs])
 
 
 def pooled_errors(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.fitting.covariance.output_error_covariance import coloured_covariance
 from fieldsid.fitting.fit import model_of
@@ -11,7 +14,7 @@ from fieldsid.fitting.optimise.levenberg_marquardt import covariance, levenberg_
 from fieldsid.fitting.optimise.residual_weights import white_weights
 from fieldsid.fitting.predict.predict import refit_nuisances
 from fieldsid.fitting.problem.estimator import Solution, shared_covariance
-from fieldsid.models.model import Model
+from fieldsid.models.model import Model, Noise
 from fieldsid.noise.white_floor import white_noise_floor
 
 
@@ -22,11 +25,15 @@ def final_model(h: ScoredModel) -> Model:
     under the noise of the maximum-likelihood fit.
     """
     fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
+    return replace(_with_covariance(h, fitted, noise), noise=h.noise)
+
+
+def _with_covariance(h: ScoredModel, fitted: FittedProblem, noise: Noise) -> Model:
     problem, layout = fitted.problem, fitted.problem.layout
     x = fitted.x.copy()
     x[: layout.shared] = [h.model.values[n] for n in layout.names]
     if np.array_equal(x, fitted.x):
-        return _by_likelihood(h)
+        return _by_likelihood(fitted, noise)
     for run, record in enumerate(problem.records):
         x = refit_nuisances(problem, x, run, white_noise_floor([record]))
     weights = white_weights(problem, x)
@@ -35,9 +42,8 @@ def final_model(h: ScoredModel) -> Model:
     return model_of(problem, Solution(found.x, shared_covariance(problem, full, found.free), noise, "output_error"))
 
 
-def _by_likelihood(h: ScoredModel) -> Model:
+def _by_likelihood(fitted: FittedProblem, noise: Noise) -> Model:
     """Return the model of the maximum-likelihood fit with its covariance."""
-    fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
     slots = tuple(range(len(fitted.x)))
     _, normal, _, _ = normal_equations(fitted.problem, fitted.x, noise, slots)
     solution = Solution(fitted.x, shared_covariance(fitted.problem, covariance(normal), slots), noise, "pem")

@@ -18,10 +18,11 @@ from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximu
 from fieldsid.diagnosis.evidence.scored_model import (
     ScoredModel,
     bare_model,
+    errors_of,
     score_model,
-    training_errors,
-    validation_errors,
+    training_runs,
     validation_fits,
+    validation_runs,
 )
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search.search import Search
@@ -59,7 +60,7 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     without one of its effects, are added to what the search has tried.
     """
     base = search.base()
-    best = start = FreeRunFit(base.reported_fit, base.errors, 1.0, _charge(search, base.reported_fit))
+    best = start = FreeRunFit(base.reported_fit, _as_modelled(base), 1.0, _charge(search, base.reported_fit))
     front, seen = [start], dict[frozenset[str], FreeRunFit]()
     for _ in range(MAX_EFFECTS):
         grown: dict[frozenset[str], FreeRunFit] = {}
@@ -134,11 +135,16 @@ def _scored(search: Search, fitted: FittedProblem) -> ScoredModel:
 def _evaluate(search: Search, fitted: FittedProblem) -> FreeRunFit:
     base = search.base()
     flown = validation_fits(bare_model(fitted.problem, fitted.x, base.likelihood_fit.noise), fitted, search.validation)
-    errors = Pair(training_errors(fitted), validation_errors(flown, search.validation))
+    errors = Pair(errors_of(training_runs(fitted), 0.0), errors_of(validation_runs(flown, search.validation), 0.0))
     charge = _charge(search, fitted)
     return FreeRunFit(
-        fitted, errors, _error_ratio(search, errors, base.errors) * charge / _charge(search, base.reported_fit), charge
+        fitted, errors, _error_ratio(search, errors, _as_modelled(base)) * charge / _charge(search, base.reported_fit), charge
     )
+
+
+def _as_modelled(h: ScoredModel) -> Pair:
+    """Return the errors of a model without moments of the runs' own: without noise all that is left is the model's."""
+    return Pair(h.train_under(0.0), h.unseen_under(0.0)[0])
 
 
 def _charge(search: Search, fitted: FittedProblem) -> float:
@@ -171,7 +177,7 @@ def _error_ratio(search: Search, new: Pair, old: Pair) -> float:
     No evidence charges an effect for the room it has to follow the training runs: what it predicts decides. Errors are resolved
     to a share of the base model's.
     """
-    base = search.base().errors
+    base = _as_modelled(search.base())
     sides = [
         np.hypot(now.mean, least) / np.hypot(before.mean, least)
         for now, before, whole in ((new.train, old.train, base.train), (new.validation, old.validation, base.validation))

@@ -35,6 +35,7 @@ class Search(MoveEvaluation):
         self._join_leaders()
         self._exchange_for_variants()
         self._drop_each()
+        self.share_own_moments()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -54,6 +55,7 @@ class Search(MoveEvaluation):
                 found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
             )
             self.tried[frozenset(found.names)] = found
+        self.share_own_moments()
         return self.best_admissible()
 
     def _expand(self) -> None:
@@ -62,6 +64,7 @@ class Search(MoveEvaluation):
         while (leading := self._next_to_expand()) is not None:
             self.forward_step(leading)
             self._drop_each()
+            self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
             if self._switch_noise_or_trim():
                 self.base()

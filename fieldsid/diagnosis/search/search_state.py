@@ -118,6 +118,15 @@ class SearchState:
         if not self.is_noiseless:
             self.floor = lowered_noise_floor(self.floor, self.records, residuals_of(fitted.problem, fitted.x))
 
+    def share_own_moments(self) -> None:
+        """Let no model have larger moments of the runs' own than the one of the highest evidence: the runs are the same.
+
+        A model that lacks an effect takes part of it for trims that differ from run to run.
+        """
+        least = self._most_evident().own_moment
+        larger = {name: h.with_own_moment(least) for name, h in self.tried.items() if h.own_moment > least}
+        self.tried.update(larger)
+
     def _keep(self, ml_fit: LikelihoodFit) -> ScoredModel:
         """Keep a fit where it has more evidence than the one known of its effects.
 

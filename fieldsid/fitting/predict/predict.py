@@ -14,7 +14,7 @@ from fieldsid.dynamics.free_run import effects_of, growing_hint
 from fieldsid.errors import DivergenceError, EffectError
 from fieldsid.fitting.initial.initial_state_prior import initial_state_prior
 from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
-from fieldsid.fitting.predict import command_timing, speed_correction
+from fieldsid.fitting.predict import command_timing, own_moment, speed_correction
 from fieldsid.fitting.problem.parameters import Parameter, ParameterLayout, SpeedGroups, layout_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
@@ -38,8 +38,9 @@ MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
 class Prediction(Brief):
     """Free run of a model on a record: angle and rate (n,) as measured would be, fin angle (n,), start and nuisances.
 
-    `faster` is the relative speed correction, see speed_correction.py. `as_logged` is the rms residual (rad, rad/s) with the
-    log's own speed and command times, None where both are unchanged.
+    `faster` is the relative speed correction, see speed_correction.py; `moment` (rad/s^2) the run's own, of standard deviation
+    `moment_std`, see own_moment.py. `as_logged` is the rms residual (rad, rad/s) with the model's trim and the log's speed and
+    command times, None where all are unchanged.
     """
 
     record: Record
@@ -50,6 +51,8 @@ class Prediction(Brief):
     nuisance: Mapping[str, float]
     faster: float = 0.0
     as_logged: tuple[float, float] | None = None
+    moment: float = 0.0
+    moment_std: float = 0.0
 
     @property
     def residual(self) -> FloatArray:
@@ -58,10 +61,14 @@ class Prediction(Brief):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What the run was taken to have done otherwise than its log has it: when its commands came, and how fast it was."""
+        """What the run was taken to have done otherwise than log and model have it: command times, speed, trim."""
         return tuple(
             n
-            for n in (command_timing.timing_note(self.record), speed_correction.speed_note(self.record, self.faster))
+            for n in (
+                command_timing.timing_note(self.record),
+                speed_correction.speed_note(self.record, self.faster),
+                own_moment.moment_note(self.record, self.moment, self.moment_std),
+            )
             if n is not None
         )
 
@@ -74,7 +81,10 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     as_timed = problem
     problem, x, faster = speed_correction.correct_speed(problem, x, floor)
     x = refit_nuisances(problem, x, 0, floor, rescan=False)
-    as_logged = None if as_timed is logged and not speed_correction.is_worth_reporting(faster) else _rms_as_logged(logged, x)
+    unmoved = as_timed is logged and not speed_correction.is_worth_reporting(faster) and model.noise.own_moment == 0.0
+    as_logged = None if unmoved else _rms_as_logged(logged, x)
+    x, moment = own_moment.with_own_moment(problem, x, model.noise.own_moment, floor)
+    x = refit_nuisances(problem, x, 0, floor, rescan=False) if moment else x
     motion, _ = problem.simulate(x, 0)
     if not np.isfinite(motion.rate).all():
         at = float(record.time[np.argmin(np.isfinite(motion.rate))])
@@ -87,7 +97,8 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     fin = fin_path(problem.records[0], problem.layout.effects, values)
     nuisance = {c.name: values[c.name] for e in problem.layout.effects for c in e.nuisance}
     path = np.append(fin.start, fin.end[-1])
-    return Prediction(problem.records[0], motion.angle, motion.rate, path, problem.state_of(x, 0), nuisance, faster, as_logged)
+    state, std = problem.state_of(x, 0), model.noise.own_moment
+    return Prediction(problem.records[0], motion.angle, motion.rate, path, state, nuisance, faster, as_logged, moment, std)
 
 
 def as_flown(model: Model, records: Sequence[Record]) -> tuple[Note, ...]:

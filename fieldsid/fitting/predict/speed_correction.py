@@ -115,7 +115,7 @@ def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> _Step
     slopes = np.zeros((x.size, *result.residual.shape))
     slopes[list(result.columns)] = result.sensitivity * record.ok
     columns = np.concatenate([slopes[shared:], np.tensordot(_moves(problem, x), slopes[:shared], axes=1)[None]])
-    weight = _weights(record, result.residual, floor)[:, None]
+    weight = channel_weights(record, result.residual, floor)[:, None]
     flat, left = (columns * weight).reshape(columns.shape[0], -1), (result.residual * weight).ravel()
     gram, right = flat @ flat.T, flat @ left
     gram[-1, -1] += MEASURED_SPEED_STD_ERROR**-2
@@ -143,7 +143,7 @@ def _step_that_gains(problem: Problem, x: FloatArray, faster: float, step: _Step
     return None
 
 
-def _weights(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
+def channel_weights(record: Record, residual: FloatArray, floor: Noise) -> FloatArray:
     """Return the weight of each channel (2,): over the rms of what is left of it, correlated samples counted once."""
     lags = round(MAX_CORRELATION_LAG_S / float(np.median(record.steps)))
     lengths = [correlation_length(e[ok], lags) if ok.any() else 1.0 for e, ok in zip(residual, record.ok, strict=True)]

@@ -83,9 +83,17 @@ class Problem:
             v[names.damping] * share ** v.get("damping_exponent", layout.groups.exponent),
             0.0 if names.stiffness is None else v[names.stiffness],
             authority,
-            v[names.trim] * (over_reference(authority, v[names.authority]) if layout.groups.trim_of_fin else 1.0),
+            v[names.trim] * self._trim_factor(v, authority),
             layout.groups.trim_of_fin,
         )
+
+    def _trim_factor(self, v: Values, authority: float) -> float:
+        return over_reference(authority, v[NAMES[self.layout.axis].authority]) if self.layout.groups.trim_of_fin else 1.0
+
+    def trim_factor(self, x: FloatArray, run: int) -> float:
+        """Return a run's trim moment over the trim parameter."""
+        v = dict(zip(self.layout.names, x[: self.layout.shared].tolist(), strict=True))
+        return self._trim_factor(v, v[self.authority_of(run)] * self.scales(run)[1] ** 2)
 
     def _counted(self, run: int) -> Record:
         """Return a run's record at the speed that the run counts as, which what changes within it is over."""

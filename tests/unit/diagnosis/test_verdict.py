@@ -21,7 +21,11 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
     monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
     monkeypatch.setattr(verdict, "added_effects", lambda *_of: ("servo_lag",))
     base = SimpleNamespace(
-        names=(), selection_errors=errors(before), train=errors(before), unseen_errors=(errors(before), errors(before))
+        names=(),
+        selection_errors=errors(before),
+        train=errors(before),
+        own_moment=0.0,
+        unseen_under=lambda _std: (errors(before), errors(before)),
     )
     found = SimpleNamespace(
         names=("servo_lag",),
@@ -29,7 +33,8 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
         train=errors(after),
         validation=(),
         validation_errors=errors(after),
-        unseen_errors=(errors(after), errors(settled or after)),
+        own_moment=0.0,
+        unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
     search = SimpleNamespace(floor=FLOOR, root=frozenset(), base=lambda: base, is_noiseless=noiseless)
     return verdict.verdict_of(search, found, SimpleNamespace(p=p, dependence=p), SimpleNamespace(noise=FLOOR)).word

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -19,11 +21,13 @@ from fieldsid.noise.sandwich_covariance import score_covariance
 from fieldsid.noise.whiten import noise_vector, whiten
 from fieldsid.numerics.jit import plain_of
 
+WHITE = Noise(0.005, 0.004)
 NOISES = {
     "disturbance": Noise(0.005, 0.004, 0.05, 0.8),
     "coloured": Noise(0.005, 0.004, 0.0, 1.0, 0.006, 0.003, 0.5),
     "both": Noise(0.005, 0.004, 0.05, 0.8, 0.006, 0.003, 0.5),
 }
+WITH_OWN_MOMENT = {f"{family} and own moment": replace(n, own_moment=0.03) for family, n in (*NOISES.items(), ("white", WHITE))}
 A, K = 1.2, 0.3
 
 
@@ -65,7 +69,15 @@ def dense(log: Record, noise: Noise) -> np.ndarray:
         for j, (row, sigma) in enumerate(((2, vector[2]), (3, vector[4]), (4, vector[5]))):
             states[row, 5 + 5 * i + j] = sigma * np.sqrt(1.0 - f[row, row] ** 2)
     loading = np.concatenate([np.array([r[ch] for r in rows]) for ch in range(2)])
-    return loading @ loading.T + np.diag(np.repeat(vector[:2] ** 2, n))
+    own = noise.own_moment * pushed(log).ravel()
+    return loading @ loading.T + np.diag(np.repeat(vector[:2] ** 2, n)) + np.outer(own, own)
+
+
+def pushed(log: Record) -> np.ndarray:
+    """Angle and rate (2, n) under a unit moment from rest, each sample by one exponential from the first."""
+    system = np.array([[0, 1, 0], [-K, -A, 1], [0, 0, 0]])
+    since = np.concatenate([[0.0], np.cumsum(log.nominal_steps)])
+    return np.array([(expm(system * t) @ [0.0, 0.0, 1.0])[:2] for t in since]).T
 
 
 def seen(log: Record) -> np.ndarray:
@@ -77,13 +89,14 @@ def seen(log: Record) -> np.ndarray:
     [record(gaps=False), record(gaps=True), settled_record(), settled_record(gaps=True)],
     ids=["even", "gaps", "settled", "settled with gaps"],
 )
-@pytest.mark.parametrize("family", NOISES)
+@pytest.mark.parametrize("family", WITH_OWN_MOMENT | NOISES)
 def test_innovations_have_the_products_and_determinant_of_the_dense_covariance(family, log):
     rng = np.random.default_rng(1)
     series = np.where(seen(log).reshape(2, -1), rng.standard_normal((3, 2, len(log))), 0.0)
-    white, logs = whiten(log, NOISES[family], A, K, series)
+    noise = (WITH_OWN_MOMENT | NOISES)[family]
+    white, logs = whiten(log, noise, A, K, series)
     keep = seen(log)
-    cov = dense(log, NOISES[family])[np.ix_(keep, keep)]
+    cov = dense(log, noise)[np.ix_(keep, keep)]
     flat = series.reshape(3, -1)[:, keep]
     mine = white.reshape(3, -1) @ white.reshape(3, -1).T
     np.testing.assert_allclose(mine, flat @ np.linalg.solve(cov, flat.T), rtol=1e-5)
@@ -116,13 +129,13 @@ def test_a_compiled_filter_gives_the_numbers_of_its_python_source(family, monkey
 
 
 def test_the_likelihood_is_that_of_the_dense_gaussian():
-    log, noise = record(gaps=True), NOISES["both"]
+    log, noise = record(gaps=True), WITH_OWN_MOMENT["both and own moment"]
     keep = seen(log)
     cov = dense(log, noise)[np.ix_(keep, keep)]
     e = np.zeros(80)
     e[keep] = np.random.default_rng(2).multivariate_normal(np.zeros(cov.shape[0]), cov)
     expected = -0.5 * (np.linalg.slogdet(cov)[1] + e[keep] @ np.linalg.solve(cov, e[keep]))
-    assert log_likelihood([log], [(A, K)], [e.reshape(2, -1)], noise_vector(noise)) == pytest.approx(expected, rel=1e-6)
+    assert log_likelihood([log], [(A, K)], [e.reshape(2, -1)], noise) == pytest.approx(expected, rel=1e-6)
 
 
 def moved(noise: np.ndarray, place: int, by: float) -> np.ndarray:
@@ -158,7 +171,7 @@ def test_the_score_is_the_slope_of_the_likelihood(family, log):
     total, score, fisher = informed(log, noise, PLACES[family], residual)
 
     def likelihood(v: np.ndarray) -> float:
-        return log_likelihood([log], [(A, K)], [residual], v)
+        return log_likelihood([log], [(A, K)], [residual], Noise(*v.tolist()))
 
     assert total == pytest.approx(likelihood(noise), rel=1e-9)  # where both are noisy no gain is kept
     slopes = [(likelihood(moved(noise, p, step)) - likelihood(moved(noise, p, -step))) / (2 * step) for p in PLACES[family]]

@@ -7,7 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis.evidence.acceptance import gains_evidence, is_accepted, keeps_error, leaves_error, lowers_error
+from fieldsid.diagnosis.evidence.acceptance import (
+    compared_errors,
+    gains_evidence,
+    is_accepted,
+    keeps_error,
+    leaves_error,
+    lowers_error,
+)
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
 from fieldsid.models.effect import effect_named
@@ -16,7 +23,12 @@ from fieldsid.models.model import Noise
 FLOOR = Noise(0.004, 0.002)
 
 
-def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None):
+def grown(errors, own_moment):
+    """Errors where the runs may have moments of their own: the larger those may be, the less is left."""
+    return Errors(errors.angle_rms_rad / (1.0 + own_moment), errors.rate_rms_rad_s)
+
+
+def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None, own_moment=0.0):
     """One with this much log evidence beyond the base, half of it learned, and errors over the floor.
 
     `settled` is the one on unseen runs with the numbers of all runs, by default that with those of the fitted.
@@ -32,6 +44,9 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None):
         selection_errors=errors[0],
         train=errors[1],
         unseen_errors=(errors[0], errors[2]),
+        own_moment=own_moment,
+        train_under=lambda std: grown(errors[1], std),
+        unseen_under=lambda std: (grown(errors[0], std), grown(errors[2], std)),
     )
 
 
@@ -61,6 +76,15 @@ def test_the_error_alone_is_not_enough(gain, paid):
 def test_an_addition_matters_on_fitted_or_on_unseen_runs_if_it_lowers_all_and_no_unseen_one_rises(over, train, counts):
     base = hypothesis(over=1.2, train=1.5)
     assert lowers_error(base, hypothesis("servo_lag", gain=50.0, over=over, train=train)) == counts
+
+
+def test_both_models_are_compared_with_the_smaller_moments_of_the_runs_own_that_they_need():
+    lacks, found = hypothesis(over=1.2, own_moment=2.0), hypothesis("current", gain=50.0, over=1.0, own_moment=0.1)
+    before, now = compared_errors(lacks, found)
+    assert before.angle_rms_rad == pytest.approx(1.2 * FLOOR.angle / 1.1)
+    assert now.angle_rms_rad == pytest.approx(FLOOR.angle / 1.1)
+    assert is_accepted(lacks, found)
+    assert not is_accepted(found, lacks)
 
 
 def test_numbers_of_every_runs_own_must_be_learned_on_the_runs_fitted_to():

@@ -115,8 +115,10 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
             log_evidence=evidence,
             log_likelihood_by_run=known,
             selection_errors=errors,
-            unseen_errors=(errors,),
             train=errors,
+            own_moment=0.0,
+            train_under=lambda _std: errors,
+            unseen_under=lambda _std: (errors,),
         )
 
     both, whole = ("stall", "current"), ("stall", "current", "delay")

@@ -26,7 +26,6 @@ from fieldsid.models.record import record_of
 from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
 from fieldsid.noise.noise_kinds import NOISE_KINDS, SINGLE_NOISE_KINDS
 from fieldsid.noise.white_floor import white_noise_floor
-from fieldsid.noise.whiten import noise_vector
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +105,7 @@ def test_the_noise_of_a_motion_without_bound_has_no_likelihood(away, family):
     with in_time(10):
         noise, likelihood = estimate_noise([away], [(1.0, 0.1)], [residual], family, start)
     assert (noise, likelihood) == (start, -np.inf)
-    assert log_likelihood([away], [(1.0, 0.1)], [residual], noise_vector(start)) == -np.inf
+    assert log_likelihood([away], [(1.0, 0.1)], [residual], start) == -np.inf
 
 
 @pytest.mark.parametrize("family", SINGLE_NOISE_KINDS)

@@ -102,7 +102,7 @@ def test_the_speed_found_is_at_the_minimum_of_what_the_page_says():
     problem, x = frozen_problem(TRUE, record, ())
     x = refit_nuisances(problem, x, 0, floor)
     moved, own, faster = correct_speed(problem, x, floor)
-    weight = speed_correction._weights(record, moved.residual(own, 0)[0], floor)[:, None]
+    weight = speed_correction.channel_weights(record, moved.residual(own, 0)[0], floor)[:, None]
     free = list(problem.layout.nuisances_of(0))
 
     def cost(v):

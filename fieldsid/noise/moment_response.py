@@ -1,0 +1,46 @@
+"""What a constant moment does to the linear base model, and series made free of what such a moment of random size has in common.
+
+A run's trim is not quite that of the next: a fin returns to its middle within a tenth of a degree, a payload shifts. A moment
+m ~ N(0, s^2) of the run's own adds m r to its residual, r the response of p' = -a p - k y + 1 from rest. Of the covariance that
+whitens all else to I it makes I + s^2 r r', whose inverse square root is I - (1 - (1 + s^2 r'r)^-1/2) r r' / r'r.
+Source: Woodbury's identity; a variance component of grouped data (Searle, Casella and McCulloch 1992, chapter 1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.noise.kalman.transition import transition
+from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
+
+
+@jit
+def base_responses(steps: FloatArray, a: float, k: float) -> FloatArray:
+    """Return angle and rate (3, 2, n) of the linear base: under a unit moment from rest, from a unit angle, from a unit rate."""
+    n, last_h = steps.shape[0] + 1, -1.0
+    out = np.zeros((3, 2, n))
+    out[1, 0, 0] = out[2, 1, 0] = 1.0
+    yy, yp, py, pp, yw, pw = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
+    for i in range(n - 1):
+        if abs(steps[i] - last_h) > 1e-7 * steps[i]:
+            last_h = steps[i]
+            yy, yp, py, pp, yw, pw = transition(a, k, last_h)
+        for row in range(3):
+            y, p, w = out[row, 0, i], out[row, 1, i], 1.0 * (row == 0)
+            out[row, 0, i + 1] = yy * y + yp * p + yw * w
+            out[row, 1, i + 1] = py * y + pp * p + pw * w
+    return out
+
+
+def without_common_moment(white: FloatArray, response: FloatArray, std: float) -> tuple[FloatArray, float]:
+    """Return whitened series (m, 2, n) with a moment of standard deviation std (rad/s^2) whitened too, and its log variance.
+
+    response (2, n) is that of a unit moment, whitened as the series are.
+    """
+    known = float(np.vdot(response, response))
+    if known <= 0.0:
+        return white, 0.0
+    grown = 1.0 + std**2 * known
+    along = np.tensordot(white, response, axes=2) * ((1.0 - grown**-0.5) / known)
+    return white - along[:, None, None] * response, float(np.log(grown))
