@@ -24,9 +24,9 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
-FIN_REPEATABILITY_RAD = 0.0017
-"""Largest standard deviation, as an angle of the fin, that the middle of a fin comes back to: a tenth of a degree, the dead band
-of a digital servo and its linkage. A moment that differs more from run to run is no trim."""
+FIN_REPEATABILITY_RAD = 0.0017 / np.sqrt(12.0)
+"""Largest standard deviation, as an angle of the fin, of where its middle comes back to: anywhere in a tenth of a degree, the
+dead band of a digital servo and its linkage. A moment that differs more from run to run is no trim."""
 MIN_OWN_MOMENT_GAIN = 0.5
 """Log likelihood that moments of the runs' own must gain: half a unit is what one parameter gains by chance."""
 STD_GRID = np.geomspace(1e-3, 1.0, 61)

@@ -44,8 +44,8 @@ def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, E
     """Return the validation errors that two models are compared by.
 
     They are those at the training runs' parameters; where these do not fall, and those at the parameters of all runs do or are at
-    least kept, the latter. Both with moments of the runs' own of the smaller size that the two need: what a model lacks is no
-    trim that differs from run to run.
+    least kept, the latter. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are
+    the same, and what a model lacks is no trim that differs from run to run.
     """
     std = _common_own_moment(without, with_)
     pairs = tuple(zip(without.unseen_under(std), with_.unseen_under(std), strict=True))
@@ -54,8 +54,8 @@ def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, E
 
 
 def _common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
-    """Return the smaller standard deviation (rad/s^2) of the runs' own moments that two models need."""
-    return min(without.own_moment, with_.own_moment)
+    """Return the standard deviation (rad/s^2) of the runs' own moments that the more evident of two models tells."""
+    return max((without, with_), key=lambda h: h.log_evidence).own_moment
 
 
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:

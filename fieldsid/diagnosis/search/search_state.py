@@ -119,13 +119,13 @@ class SearchState:
             self.floor = lowered_noise_floor(self.floor, self.records, residuals_of(fitted.problem, fitted.x))
 
     def share_own_moments(self) -> None:
-        """Let no model have larger moments of the runs' own than the one of the highest evidence: the runs are the same.
+        """Let every model have the moments of the runs' own that the one of the highest evidence tells: the runs are the same.
 
         A model that lacks an effect takes part of it for trims that differ from run to run.
         """
-        least = self._most_evident().own_moment
-        larger = {name: h.with_own_moment(least) for name, h in self.tried.items() if h.own_moment > least}
-        self.tried.update(larger)
+        told = self._most_evident().own_moment
+        others = {name: h.with_own_moment(told) for name, h in self.tried.items() if h.own_moment != told}
+        self.tried.update(others)
 
     def _keep(self, ml_fit: LikelihoodFit) -> ScoredModel:
         """Keep a fit where it has more evidence than the one known of its effects.

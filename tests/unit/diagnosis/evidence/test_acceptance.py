@@ -78,8 +78,9 @@ def test_an_addition_matters_on_fitted_or_on_unseen_runs_if_it_lowers_all_and_no
     assert lowers_error(base, hypothesis("servo_lag", gain=50.0, over=over, train=train)) == counts
 
 
-def test_both_models_are_compared_with_the_smaller_moments_of_the_runs_own_that_they_need():
-    lacks, found = hypothesis(over=1.2, own_moment=2.0), hypothesis("current", gain=50.0, over=1.0, own_moment=0.1)
+@pytest.mark.parametrize("lacking", [2.0, 0.01])
+def test_both_models_are_compared_with_the_moments_of_the_runs_own_that_the_more_evident_tells(lacking):
+    lacks, found = hypothesis(over=1.2, own_moment=lacking), hypothesis("current", gain=50.0, over=1.0, own_moment=0.1)
     before, now = compared_errors(lacks, found)
     assert before.angle_rms_rad == pytest.approx(1.2 * FLOOR.angle / 1.1)
     assert now.angle_rms_rad == pytest.approx(FLOOR.angle / 1.1)
