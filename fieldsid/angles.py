@@ -64,7 +64,11 @@ def parse_margin(text: str, option: str) -> float:
     """
     word = text.strip().lower()
     has_unit = any(word.endswith(u) for u in UNITS)
-    value = math.degrees(parse_angle(word if has_unit else f"{word}deg", option, math.inf, HEADING))
+    try:
+        bare = has_unit or math.isfinite(float(word))
+    except ValueError:
+        bare = False
+    value = math.degrees(parse_angle(f"{word}deg" if bare and not has_unit else text, option, math.inf, HEADING))
     if value < 0.0:
         raise UsageError("a phase margin is not below zero", found=f"{option} {text.strip()}", hint=f"write `{option} 45deg`")
     if has_unit:

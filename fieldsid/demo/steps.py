@@ -19,6 +19,7 @@ from fieldsid.maneuvers import pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.planning.design.leg import error_in_words
 from fieldsid.rounding import number, with_error
+from fieldsid.turning.known_radius import turn_words
 
 Result = briefs.Result
 NEAR_NOISE = 1.15
@@ -206,10 +207,10 @@ def _lawful(result: Result) -> str:
 def _turned(result: Result) -> str:
     rows = result["rows"]
     tightest = min(rows, key=lambda row: float(row["radius_m"]))
-    low, high = tightest["interval95"]
+    where = f"at {number(tightest['speed_m_s'], 2)} m/s to {tightest['side']}"
     return (
-        f"The tightest turn is {number(tightest['radius_m'], 3)} m at {number(tightest['speed_m_s'], 2)} m/s "
-        f"to {tightest['side']}, 95 % between {number(low, 3)} and {number(high, 3)} m, and it is {tightest['trust']}: "
+        f"The tightest turn is {turn_words(float(tightest['radius_m']), tightest['interval95'], where)}, and it is "
+        f"{tightest['trust']}: "
         "what was flown may never show a settled turn, and a wide band says so."
     )
 

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from fieldsid.errors import UsageError
 
 MAX_SPEEDS = 2000
+SLOWEST, FASTEST = 0.01, 15.0
+"""m/s: no fin steers below, and no vehicle under water goes beyond."""
 
 
 def speeds_of(given: str | Iterable[float] | None) -> list[float]:
@@ -15,8 +17,19 @@ def speeds_of(given: str | Iterable[float] | None) -> list[float]:
     if given is None:
         return []
     if not isinstance(given, str):
-        return [float(speed) for speed in given]
-    return _read(given) if given.strip() else []
+        return _possible([float(speed) for speed in given])
+    return _possible(_read(given)) if given.strip() else []
+
+
+def _possible(speeds: list[float]) -> list[float]:
+    for speed in speeds:
+        if speed > 0.0 and not SLOWEST <= speed <= FASTEST:
+            raise UsageError(
+                f"a speed of {speed:g} m/s cannot be right",
+                found=f"--speeds {','.join(f'{s:g}' for s in speeds[:4])}",
+                hint=f"give speeds in m/s, {SLOWEST:g} to {FASTEST:g}: `--speeds 1.0,1.5,2.0`",
+            )
+    return speeds
 
 
 def _read(text: str) -> list[float]:

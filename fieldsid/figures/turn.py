@@ -51,7 +51,8 @@ def draw_radius(prediction: TurnPrediction, ax: Axes) -> None:
 def _tightest(prediction: TurnPrediction) -> str:
     row = min(prediction.rows, key=lambda r: r.radius)
     rudder = f"{np.degrees(prediction.rudder_max):.0f}° of rudder"
-    return f"with {rudder} the tightest turn is {row.radius:.2f} m to {row.side} at {row.speed:.2f} m/s, {row.trust}"
+    radius = f"{row.radius:.2f} m" if not row.band_only else "between {:.2f} and {:.2f} m".format(*row.interval95)
+    return f"with {rudder} the tightest turn is {radius} to {row.side} at {row.speed:.2f} m/s, {row.trust}"
 
 
 def _band(prediction: TurnPrediction) -> str:

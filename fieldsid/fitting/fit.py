@@ -17,6 +17,7 @@ from fieldsid.fitting.checks.record_checks import record_checks
 from fieldsid.fitting.checks.score_tests import score_tests
 from fieldsid.fitting.covariance.noise_selection import residual_whiteness
 from fieldsid.fitting.estimates import estimates
+from fieldsid.fitting.fin_sense import fin_sense
 from fieldsid.fitting.initial.trim_speed_law import groups_by_trim
 from fieldsid.fitting.predict.predict import Prediction, refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
@@ -204,7 +205,7 @@ def model_of(problem: Problem, solution: Solution) -> Model:
         covariance=solution.covariance[np.ix_(order, order)],
         law=law,
         noise=solution.noise,
-        trained=trained(problem),
+        trained=trained(problem) | fin_sense(problem, solution),
         method=solution.method,
         runs=tuple(r.name for r in problem.records),
         info={"whiteness_p": p, "law_parameters": {n: {"value": values[n], "std_error": sigma[n]} for n in sorted(aside)}},

@@ -49,7 +49,8 @@ class Model(Displayed):
 
     `values` holds the base parameters at the law's reference speed and the effects' shared coefficients (SI,
     rad); `units` theirs; `covariance` (p, p) in the order of `free`, the names that were estimated. `trained`
-    says what the data reached: speed_low, speed_high, fin_max, rate_max (all in SI). `own` defines the effects that are not
+    says what the data reached: speed_low, speed_high, fin_max, rate_max (all in SI), and with what t-value `fin_t` they show
+    which way the fin turns, where the authority does not. `own` defines the effects that are not
     built in, as `models.definition` has it: a model that is read back uses these, whatever the folder it is used in holds.
     """
 

@@ -93,6 +93,8 @@ def planned(asked: PlanRequest, step: Callable[[], None] = lambda: None, ready: 
     `ready` is called once the request has been read and checked, before the search.
     """
     vehicle = _vehicle(asked.vehicle)
+    if asked.seed < 0:
+        raise UsageError("a seed is a whole number from zero", found=f"--seed {asked.seed}", hint="write `--seed 1`")
     if asked.model is not None and asked.prior is not None:
         raise UsageError("`--model` and `--prior` both say what is believed", found=f"--prior {asked.prior}", hint="give one")
     if asked.separate or asked.diagnosis is not None:

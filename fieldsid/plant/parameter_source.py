@@ -68,7 +68,7 @@ class ParameterSource(Brief):
         """What is said of models that are left out."""
         if not self.left_out:
             return ()
-        words = f"the sign of its {NAMES[self.axis].authority} is not known at a speed, and another than elsewhere: left out"
+        words = f"the sign of its {NAMES[self.axis].authority} is not known at a speed, and another than the fin's: left out"
         return (Note("model_left_out", f"{', '.join(self.left_out)}: {words}", {"models": list(self.left_out)}),)
 
     def fitted(self, *, weighted: bool = True) -> Laws:
@@ -257,7 +257,7 @@ def source_of_models(
     if not models:
         raise UsageError("nothing to work on", found="no model", hint="give models, or the files of models")
     axis, points = points_of(models, names)
-    kept = of_known_sign(axis, points)
+    kept = of_known_sign(axis, models, points)
     dropped = [i for i in range(len(models)) if i not in kept]
     taken = [p for i in kept for p in points[i]]
     ordered = [paths[i] for i in (*kept, *dropped)] if len(paths) == len(models) else paths
@@ -273,7 +273,7 @@ def source_of_laws(
         found = with_own_law(found, text)
     own = tuple(t.partition("=")[0] for t in laws)
     names, models = [n for n, _ in carried], [m for _, m in carried]
-    kept = of_known_sign(*points_of(models, names)) if carried else []
+    kept = of_known_sign(found.axis, models, points_of(models, names)[1]) if carried else []
     return ParameterSource(
         found.axis, found.points, tuple(models[i] for i in kept), tuple(names[i] for i in kept), found, tuple(paths), own,
         is_fit_file=True, left_out=tuple(n for i, n in enumerate(names) if i not in kept),

@@ -42,19 +42,27 @@ def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tupl
     return models[0].axis, tuple(tuple(_model_points(m, n)) for m, n in zip(models, names, strict=True))
 
 
-def of_known_sign(axis: Axis, points: Sequence[Sequence[Point]]) -> list[int]:
+def of_known_sign(axis: Axis, models: Sequence[Model], points: Sequence[Sequence[Point]]) -> list[int]:
     """Return the places of the models to take by the points of each: all, or those whose authority turns as the known ones do.
 
-    An authority that cannot be told from zero at a speed does not say which way the fin turns. Where those that can be told
-    disagree, or there is none, all stay, to be refused.
+    An authority that cannot be told from zero at a speed does not say which way the fin turns. Where none can be told, the runs
+    of all say it, if they do (`fin_t`). Where those that can be told disagree, or nothing tells, all stay, to be refused.
     """
     name = NAMES[axis].authority
     everywhere = [p for of_model in points for p in of_model if name in p.values]
-    known = {float(np.sign(p.values[name])) for p in everywhere if _sign_is_known(p, name)}
+    known = {float(np.sign(p.values[name])) for p in everywhere if _sign_is_known(p, name)} or _sign_of_runs(models)
     if len(known) != 1:
         return list(range(len(points)))
     (sign,) = known
-    return [i for i, of_model in enumerate(points) if all(sign * p.values.get(name, sign) > 0.0 for p in of_model)]
+    kept = [i for i, of_model in enumerate(points) if all(sign * p.values.get(name, sign) > 0.0 for p in of_model)]
+    return kept or list(range(len(points)))
+
+
+def _sign_of_runs(models: Sequence[Model]) -> set[float]:
+    """Return the sign of the authority that the runs of all models tell together, nothing where they do not."""
+    told = [t for m in models if np.isfinite(t := m.trained.get("fin_t", float("nan")))]
+    together = float(np.sum(told) / np.sqrt(len(told))) if told else 0.0
+    return {float(np.sign(together))} if abs(together) >= SIGN_STD_ERRORS else set()
 
 
 def _sign_is_known(point: Point, name: str) -> bool:

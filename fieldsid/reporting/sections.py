@@ -19,6 +19,7 @@ from fieldsid.trial_folder.journal import Entry
 from fieldsid.trial_folder.next_step import REPORT
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import FolderState, Item
+from fieldsid.turning.known_radius import BRACKETED, is_band_only, radius_cell, turn_words
 
 DONE = (0, 1)
 MOST_CANDIDATES = 12
@@ -75,11 +76,8 @@ def _split(shown: Shown) -> tuple[list[Any], list[Any]]:
 
 def _turn_verdict(body: Mapping[str, Any]) -> dict[str, str]:
     row = min(body["rows"], key=lambda r: float(r["radius_m"]))
-    low, high = row["interval95"]
-    says = (
-        f"{number(row['radius_m'], 3)} m at {number(row['speed_m_s'], 3)} m/s to {row['side']}, "
-        f"95 % {number(low, 3)} .. {number(high, 3)} m; {row['trust']}"
-    )
+    where = f"at {number(row['speed_m_s'], 3)} m/s to {row['side']}"
+    says = f"{turn_words(float(row['radius_m']), row['interval95'], where)}; {row['trust']}"
     return {"what": "tightest turn", "says": says, "state": "warn" if row["extrapolated"] else "good"}
 
 
@@ -242,13 +240,15 @@ def _radius(item: Item) -> dict[str, Any]:
     drawn, key = figures.radius(body)
     rows = [
         {
-            "side": r["side"], "speed": number(r["speed_m_s"], 3), "radius": number(r["radius_m"], 3),
+            "side": r["side"], "speed": number(r["speed_m_s"], 3), "radius": radius_cell(r["radius_m"], r["interval95"]),
             "interval": f"{number(r['interval95'][0], 3)} .. {number(r['interval95'][1], 3)}",
             "rate": number(np.degrees(r["yaw_rate_max_rad_s"]), 3), "trust": r["trust"],
         }
         for r in body["rows"]
     ]  # fmt: skip
-    return {"chart": drawn, "legend": key, "rows": rows, "rudder": number(body.get("rudder_max_rad")), "path": item.path}
+    bracketed = BRACKETED if any(is_band_only(r["radius_m"], r["interval95"]) for r in body["rows"]) else ""
+    rudder = number(body.get("rudder_max_rad"))
+    return {"chart": drawn, "legend": key, "rows": rows, "rudder": rudder, "path": item.path, "bracketed": bracketed}
 
 
 def _gains(item: Item) -> dict[str, Any]:

@@ -33,6 +33,8 @@ NEARBY = 0.9
 
 ACTUATOR = ("lag", "delay", "max_rate")
 """Coefficients of the actuator's effects that the plant holds."""
+LONGEST_LAG_S = 10.0
+"""No fin, link or autopilot that steers takes longer: what is above was meant in ms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,15 +171,22 @@ class FinLimits:
     latency: float | None = None
 
     def refuse_impossible(self) -> None:
-        """Raise UsageError for a lag, a delay or a latency below zero, and for a fin that does not move."""
-        for name, value in self.record().items():
-            if value is not None and not (0.0 <= value < np.inf and (name != "fin_rate_rad_s" or value > 0.0)):
-                least = "above zero" if name == "fin_rate_rad_s" else "zero or more"
+        """Raise UsageError for times below zero or longer than any fin or autopilot takes, and for a fin that does not move."""
+        times = {"--fin-lag": self.lag, "--delay": self.delay, "--latency": self.latency}
+        for option, value in times.items():
+            if value is not None and not 0.0 <= value <= LONGEST_LAG_S:
+                thousandth = 1e-3 * value if LONGEST_LAG_S < value <= 1e3 * LONGEST_LAG_S else 0.1
                 raise UsageError(
-                    f"`{name}` must be a number, {least}",
-                    found=f"{name} = {value:g}",
-                    hint="leave it out to take the models' own",
+                    f"`{option}` must be a number, 0 to {LONGEST_LAG_S:g} s",
+                    found=f"{option} {value:g}",
+                    hint=f"in s: `{option} {thousandth:.4g}` is {1e3 * thousandth:.4g} ms; or leave it out",
                 )
+        if self.rate is not None and not 0.0 < self.rate < np.inf:
+            raise UsageError(
+                "`--fin-rate` must be a number, above zero",
+                found=f"--fin-rate {self.rate:g} rad/s",
+                hint="write `--fin-rate 60deg`, or leave it out to take the models' own",
+            )
 
     def record(self) -> dict[str, float | None]:
         """Return what is said, by the names a schedule's file has."""

@@ -58,7 +58,7 @@ def design_schedule(
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
     if not 0.0 < fin_limit <= 1.5708:
         hint = in_radians("--fin-limit", fin_limit)
-        raise UsageError("the fin limit must be an angle in rad", found=f"{fin_limit:g}", hint=hint)
+        raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-limit {fin_limit:g}", hint=hint)
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
     plants, refused = plants_of(source, limits, runs, length), False

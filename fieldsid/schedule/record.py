@@ -186,7 +186,7 @@ def _row(r: Mapping[str, Any]) -> Row:
         raise ValueError(f"speed_m_s = {speed:g} is not above zero")
     return Row(
         speed, gains, number("feed_forward_rad"), number("reference_gain"), number("fin_limit_rad"),
-        number("depth_gain"), bool(r["supported"]), number("slowed"), number("phase_margin_deg"), margin("gain_margin_db"),
+        number("depth_gain"), bool(r["supported"]), number("slowed"), margin("phase_margin_deg"), margin("gain_margin_db"),
         margin("delay_margin_s"), number("draws_held"), margin("settling_s"),
     )  # fmt: skip
 

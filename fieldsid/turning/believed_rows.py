@@ -8,14 +8,13 @@ import numpy as np
 
 from fieldsid.errors import ModelError
 from fieldsid.plant.parameter_source import ParameterSource
+from fieldsid.turning.known_radius import MAX_KNOWN_WIDTH, is_band_only
 from fieldsid.turning.maneuvering.belief import Belief, BelievedTurn
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 from fieldsid.turning.prediction import SIDES, TurnRow, settling_flight
 from fieldsid.turning.steady.blended_turns import blended_radius
 from fieldsid.turning.steady.speed_loss import SurgeModel
 
-MAX_IDENTIFIED_WIDTH = 0.35
-"""Widest band of a turn that counts as identified, over the radius."""
 LEAST_EFFECTIVE = 10.0
 """Independent draws: with fewer the median is off by more than 0.4 of the spread, and the spread itself by more than a fifth."""
 MAX_UNSETTLED = 0.05
@@ -76,7 +75,6 @@ def _believed_row(
 
 def _missing(turn: BelievedTurn, *, flown: bool, usual: bool) -> tuple[str, ...]:
     """Return why a turn is not taken as identified; empty where the runs reached it and its band is narrow."""
-    low, high = turn.interval95
     short = {
         "a turn this tight was not flown": turn.curvature_covered >= MIN_COVERED_SHARE,
         "a fin angle this large was not flown": turn.fin_covered >= MIN_COVERED_SHARE,
@@ -84,13 +82,13 @@ def _missing(turn: BelievedTurn, *, flown: bool, usual: bool) -> tuple[str, ...]
         "the draws are too much alike to tell how wide the band is": turn.effective >= LEAST_EFFECTIVE,
         "the fit lies where no vehicle of the ensemble does": usual,
     }
-    return (*(says for says, fine in short.items() if not fine), *doubts_of_draws(high - low, turn.radius, turn.unsettled))
+    return (*(says for says, fine in short.items() if not fine), *doubts_of_draws(turn.radius, turn.interval95, turn.unsettled))
 
 
-def doubts_of_draws(width: float, radius: float, unsettled: float) -> tuple[str, ...]:
-    """Return what the draws say against taking a turn as identified: a wide band (m), or a share of them that never settles."""
+def doubts_of_draws(radius: float, band: tuple[float, float], unsettled: float) -> tuple[str, ...]:
+    """Return what the draws say against taking a turn as identified: a wide band (m, m), or draws that never settle."""
     doubts = {
-        f"the band is wider than {MAX_IDENTIFIED_WIDTH:.0%} of the radius": width <= MAX_IDENTIFIED_WIDTH * radius,
+        f"the band is wider than {MAX_KNOWN_WIDTH:.0%} of the radius": not is_band_only(radius, band),
         f"{unsettled:.0%} of what the runs allow has no settled turn there": unsettled <= MAX_UNSETTLED,
     }
     return tuple(says for says, fine in doubts.items() if not fine)

@@ -9,6 +9,7 @@ from typing import Any
 
 from fieldsid.display import Displayed, Plotted
 from fieldsid.logs.run import Note
+from fieldsid.turning.known_radius import is_band_only
 from fieldsid.turning.measured.measured_turn import MeasuredTurn
 from fieldsid.turning.steady.speed_loss import SurgeModel
 
@@ -61,6 +62,11 @@ class TurnRow(Displayed):
         """Whether the turn lies beyond what the data reached."""
         return bool(self.because)
 
+    @property
+    def band_only(self) -> bool:
+        """Whether the data tell the band of the radius, and no number in it."""
+        return is_band_only(self.radius, self.interval95)
+
     def record(self) -> dict[str, Any]:
         """Return the row as `--json` prints it."""
         return {
@@ -80,6 +86,7 @@ class TurnRow(Displayed):
             "predicted_m": self.predicted,
             "predicted95": list(self.predicted95),
             "model_radius_m": self.of_model,
+            "band_only": self.band_only,
             "method": self.method,
             "extrapolated": self.extrapolated,
             "trust": self.trust,

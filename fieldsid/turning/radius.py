@@ -222,7 +222,7 @@ def _row(
     simulated = method == "simulated"
     value = _median(radius * spread) if simulated else float(radius[0])
     interval = _interval(radius * spread, value)
-    because = (*coverage.missing, *(_doubts(radius, interval, value) if simulated else ()))
+    because = (*coverage.missing, *_doubts(radius, interval, value))
     return TurnRow(
         speed=float(speed),
         side=side,
@@ -247,7 +247,7 @@ def _row(
 def _doubts(radius: FloatArray, interval: tuple[float, float], value: float) -> tuple[str, ...]:
     """Return what the draws themselves say against taking a turn as identified."""
     unsettled = float(np.mean(~np.isfinite(radius)))
-    return doubts_of_draws(interval[1] - interval[0], value, unsettled)
+    return doubts_of_draws(value, interval, unsettled)
 
 
 def _median(draws: FloatArray) -> float:
@@ -304,8 +304,8 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
         raise UsageError("a table cannot be simulated", found="no model", hint="give model files, or `--method u_turn`")
     if not 0.0 < rudder_max <= 1.5708:
         raise UsageError(
-            "the rudder limit must be an angle in rad",
-            found=f"{rudder_max:g}",
+            "the rudder held in a turn lies above 0 and at most at 90 deg",
+            found=f"--rudder-max {rudder_max:g}",
             hint=in_radians("--rudder-max", rudder_max),
         )
     if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):

@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 
 def line(found: TurnPrediction) -> str:
     """Return rudder, method, the span of the radii over that of the speeds, and what the rows rest on."""
-    radii, speeds = [r.radius for r in found.rows], [r.speed for r in found.rows]
-    span = f"{number(min(radii), 3)} .. {number(max(radii), 3)} m at {min(speeds):.2f} .. {max(speeds):.2f} m/s"
+    ends = [r.interval95 if r.band_only else (r.radius, r.radius) for r in found.rows]
+    speeds = [r.speed for r in found.rows]
+    low, high = number(min(e[0] for e in ends), 3), number(max(e[1] for e in ends), 3)
+    radii = f"{'95 % in ' if any(r.band_only for r in found.rows) else ''}{low} .. {high} m"
+    span = f"{radii} at {min(speeds):.2f} .. {max(speeds):.2f} m/s"
     trust = ", ".join(dict.fromkeys(r.trust for r in found.rows))
     more = joined(trust, counted(len(found.measured), "measured circle"), counted(len(found.notes), "warning"))
     return f"rudder {found.rudder_max:.4g} rad, {_methods(found)}: radius {span}, {more}"
@@ -27,10 +30,14 @@ def line(found: TurnPrediction) -> str:
 
 def page(found: TurnPrediction) -> Page:
     """Return a row for each speed and side, the measured circles, and why rows are extrapolated."""
+    from fieldsid.turning.known_radius import BRACKETED, radius_cell
+
     rows = tuple(
         (
             r.side,
-            *(number(v, 3) for v in (r.speed, r.radius, *r.interval95, r.yaw_rate_max, r.u_turn_time)),
+            number(r.speed, 3),
+            radius_cell(r.radius, r.interval95),
+            *(number(v, 3) for v in (*r.interval95, r.yaw_rate_max, r.u_turn_time)),
             r.trust,
         )
         for r in found.rows
@@ -48,7 +55,8 @@ def page(found: TurnPrediction) -> Page:
     )
     because = dict.fromkeys(b for r in found.rows for b in r.because)
     settle = next((r.settle_with for r in found.rows if r.because), "")
-    closing = (*(f"extrapolated: {b}" for b in because), *((f"what would settle it: {settle}",) if settle else ()))
+    bracketed = (BRACKETED,) if any(r.band_only for r in found.rows) else ()
+    closing = (*bracketed, *(f"extrapolated: {b}" for b in because), *((f"what would settle it: {settle}",) if settle else ()))
     measured = Block("Measured circles", circles, ("", "fin rad", "radius m", "predicted", "95 %"))
     title = f"Turns with {found.rudder_max:.4g} rad of rudder, {_methods(found)}"
     return Page(title, warned(found.notes), (Block("Radius", rows, heads), measured), closing)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def line(row: TurnRow) -> str:
     """Return speed, side, radius with its interval, the time of a u-turn, and what the row rests on."""
     low, high = (number(v, 3) for v in row.interval95)
-    radius = f"radius {number(row.radius, 3)} m ({low} .. {high})"
+    radius = f"radius between {low} and {high} m" if row.band_only else f"radius {number(row.radius, 3)} m ({low} .. {high})"
     return f"{row.speed:.2f} m/s, {row.side}: {radius}, u-turn in {number(row.u_turn_time, 3)} s, {row.method}, {row.trust}"
 
 

@@ -70,6 +70,23 @@ def test_text_fits_80_columns_and_says_what_would_settle_it(run_cli, tmp_path):
     assert all(row.split()[-1] in {"measured", "identified", "extrapolated"} for row in rows)
 
 
+def test_a_band_too_wide_for_a_number_is_told_as_a_band_everywhere(run_cli, tmp_path):
+    asked = ("turn-radius", table(tmp_path), "--rudder-max", "0.26", "--speeds", "1.5")
+    answer, body = run_cli(*asked), run_cli(*asked, "--json").json
+    assert all(r["band_only"] and r["trust"] == "extrapolated" and r["radius_m"] > 0.0 for r in body["rows"])
+    assert any("the band is wider than" in b for b in body["rows"][0]["because"])
+    low, high = body["rows"][0]["interval95"]
+    assert high - low > 0.35 * body["rows"][0]["radius_m"]
+    headline, _, following = answer.out.splitlines()[:3]
+    assert headline.startswith("tightest turn between ")
+    assert headline.endswith("extrapolated: one and a half circles tell it")
+    assert following.startswith("next: sysid plan --axis yaw --speeds 1.5 ")
+    assert "--radius" in following
+    rows = [line for line in answer.out.splitlines() if line.startswith(("port", "starboard"))]
+    assert all("(" in row for row in rows)
+    assert "radius in brackets: these runs tell the band" in answer.out
+
+
 @pytest.mark.parametrize(("old", "new", "word"), [("-0.86", "0.86", "sign of b2"), ("1.11", "-1.11", "a22 <= 0")])
 def test_impossible_parameters_are_refused(run_cli, tmp_path, old, new, word):
     path = table(tmp_path)

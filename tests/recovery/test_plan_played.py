@@ -41,17 +41,20 @@ NAMED = {"yaw_rad": "heading", "pitch_rad": "pitch", "y_m": "track", "x_m": "are
 def written(tmp_path_factory):
     """The leg and its files, each read back anew by its own interpreter."""
     made = replace(plan(leg()), envelope=LIMITS, course=COURSE)
-    folder = tmp_path_factory.mktemp("plan")
-    stem = write_all(made, folder)[0].with_suffix("")
+    stem = write_all(made, tmp_path_factory.mktemp("plan"))[0].with_suffix("")
+    return made, players_of(made, stem)
+
+
+def players_of(made, stem):
+    """The files of the first leg of a plan, each to be read back anew by its own interpreter."""
     name = lambda end: stem.with_name(f"{stem.name}_{end}")  # noqa: E731
     run_up = RUN_UP_S * made.legs[0].speed
-    players = {
+    return {
         "dune": lambda: dune(name("dune.ini"), run_up),
         "ros2": lambda: ros2(name("bag"), run_up),
         "ardupilot": lambda: ardupilot(name("ardupilot.lua"), COURSE),
         "moos": lambda: moos(name("moos_timer_script.moos"), name("moos_oparea.bhv"), COURSE),
     }
-    return made, players
 
 
 def flown(player, speed, seconds, *, gain=1.0, stuck=None, elevator=None, fins=None, sea=CALM):
@@ -78,12 +81,15 @@ def over_ground(truth):
     return truth | {"surge_m_s": along}
 
 
-def first_broken(truth, conditions, run_up):
-    """When the truth passes the first of the limits, and which; None where it never does."""
+def first_broken(truth, conditions, run_up, *, level=False):
+    """When the truth passes the first of the limits, and which; None where it never does.
+
+    A deviation is from the attitude that the window begins with, or from level and the course where `level`.
+    """
     broken = []
     for a in conditions:
         values = truth[a.signal] - (run_up if a.signal == "x_m" else 0.0)
-        moved = values - values[0] if a.signal in ("yaw_rad", "pitch_rad", "roll_rad") else values
+        moved = values - values[0] if a.signal in ("yaw_rad", "pitch_rad", "roll_rad") and not level else values
         outside = {
             "below": moved < a.limit,
             "above": moved > a.limit,
@@ -106,13 +112,11 @@ def test_every_abort_fires_when_its_limit_is_passed_and_not_before(written, targ
         # it knows its speed over ground only, and the way along from where it was started
         truth, run_up = over_ground(truth), truth["x_m"][0]
         breaks = "surge_m_s" if fault.startswith("current") else breaks
-    wanted = first_broken(truth, aborts_of(one, made.envelope), run_up)
+    wanted = first_broken(truth, aborts_of(one, made.envelope), run_up, level=target == "moos")
     assert (wanted and wanted[1]) == breaks
     assert (player.aborted is None) == (wanted is None)
     if wanted is not None:
-        # a helm watches from when the fin is taken from the autopilot on, not before
-        due = max(wanted[0], one.window.lead) if target == "moos" else wanted[0]
-        assert player.aborted[0] == pytest.approx(due, abs=0.15)
+        assert player.aborted[0] == pytest.approx(wanted[0], abs=0.15)
         assert target != "ardupilot" or player.aborted[1] == NAMED[wanted[1]]
         assert player.step(player.aborted[0] + 0.05, _seen(truth)) is None
 
@@ -121,6 +125,34 @@ def _seen(truth):
     from truth.vehicle import SEEN, Measured
 
     return Measured(*(float(truth[name][-1]) for name in SEEN))
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize(("spec", "fault", "breaks"), [
+    ("square_pulses", {"gain": -1.0}, "yaw_rad"),
+    ("doublet", {"sea": Sea(current=(0.0, 0.9))}, "y_m"),
+])  # fmt: skip
+def test_a_limit_passed_while_the_autopilot_steers_ends_the_maneuver_too(tmp_path, target, spec, fault, breaks):
+    """Between two pulses, and after the last one as long as the window lasts: a helm looked only while the fin was overridden."""
+    one = leg(spec)
+    made = replace(plan(one), envelope=LIMITS, course=COURSE)
+    player = players_of(made, write_all(made, tmp_path)[0].with_suffix(""))[target]()
+    commanded, step = [], player.step
+
+    def heard(t, seen):
+        commanded.append((t, step(t, seen)))
+        return commanded[-1][1]
+
+    player.step = heard
+    truth, run_up = flown(player, one.speed, one.window.length, **fault), RUN_UP_S * one.speed
+    if target == "ardupilot":
+        truth, run_up = over_ground(truth), truth["x_m"][0]
+    wanted = first_broken(truth, aborts_of(one, made.envelope), run_up, level=target == "moos")
+    if target != "ardupilot" or breaks == "yaw_rad":  # a current is a speed over ground to it
+        assert wanted is not None
+        assert wanted[1] == breaks
+        assert next(fin for t, fin in reversed(commanded) if t < wanted[0] - 0.2) is None
+    assert player.aborted[0] == pytest.approx(wanted[0], abs=0.15)
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -104,7 +104,7 @@ def command(
     body["skipped_runs"] = skips.records
     if output is not None:
         body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
-    headline, notes = of_turn(body, models), prediction.notes
+    headline, notes = of_turn(body, models, source), prediction.notes
     result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
     return result
@@ -172,6 +172,7 @@ def _written(
 
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
     from fieldsid.rounding import number
+    from fieldsid.turning.known_radius import BRACKETED, radius_cell
     from fieldsid.turning.prediction import found_by
 
     times, angle = shown_in("rad")
@@ -180,7 +181,7 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
         (
             r.side,
             number(r.speed, 3),
-            number(r.radius, 3),
+            radius_cell(r.radius, r.interval95),
             f"{number(r.interval95[0], 3)} .. {number(r.interval95[1], 3)}",
             number(r.of_model, 3),
             number(r.yaw_rate_max * 57.29577951308232, 3),
@@ -196,6 +197,8 @@ def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) ->
             rows,
         )
     )
+    if any(r.band_only for r in prediction.rows):
+        to.print(BRACKETED)
     _render_measured(to, prediction)
     for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
         of = sum(reason in r.because for r in prediction.rows)

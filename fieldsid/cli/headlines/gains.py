@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.cli.voice import shown_in
 from fieldsid.rounding import number, with_error
+
+if TYPE_CHECKING:
+    from fieldsid.plant.parameter_source import ParameterSource
 
 TARGET = "ros2"
 SLOWER = 60.0
@@ -36,17 +40,15 @@ def of_fit(body: Body) -> Headline:
     return Headline(says, rests, pasted("schedule", "design", body["file"], "-o", "gains.yaml"))
 
 
-def of_turn(body: Body, models: Sequence[Path]) -> Headline:
-    """Return the tightest turn of both sides with its band."""
+def of_turn(body: Body, models: Sequence[Path], source: ParameterSource) -> Headline:
+    """Return the tightest turn of both sides with its band; where the band alone is known, the circles to fly come next."""
+    from fieldsid.turning.known_radius import turn_words
     from fieldsid.turning.prediction import found_by
 
     rows = body["rows"]
     tightest = min(rows, key=lambda r: float(r["radius_m"]))
-    low, high = tightest["interval95"]
-    says = (
-        f"tightest turn {number(tightest['radius_m'], 3)} m to {tightest['side']} at {number(tightest['speed_m_s'], 3)} m/s, "
-        f"95 % {number(low, 3)} .. {number(high, 3)} m, {tightest['trust']}"
-    )
+    where = f"to {tightest['side']} at {number(tightest['speed_m_s'], 3)} m/s"
+    says = f"tightest turn {turn_words(float(tightest['radius_m']), tightest['interval95'], where)}, {tightest['trust']}"
     speeds = sorted({float(r["speed_m_s"]) for r in rows})
     methods = [str(r["method"]) for r in rows]
     taken = f"taken for {methods.count('measured')} of {len(rows)} turns" if "measured" in methods else "of none of these turns"
@@ -55,7 +57,21 @@ def of_turn(body: Body, models: Sequence[Path]) -> Headline:
     times, unit = shown_in("rad")
     rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
     rests = f"{named([str(m) for m in models])}, {rudder}; {found_by(methods)}, {counted(len(speeds), 'speed')}; {circles}"
+    if tightest["band_only"]:
+        return Headline(f"{says}: one and a half circles tell it", rests, _circles(tightest, body["rudder_max_rad"], source))
     return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
+
+
+def _circles(row: Mapping[str, Any], rudder: float, source: ParameterSource) -> str:
+    """Return the plan of the circles that settle a row, by the model of its speed."""
+    speed = float(row["speed_m_s"])
+    known = (
+        ("--model", source.paths[max(source.near(speed), key=lambda n: n[1])[0]])
+        if source.models and not source.is_fit_file
+        else ()
+    )
+    fin = f"{rudder:.4g}rad"
+    return pasted("plan", "--axis", "yaw", "--speeds", f"{speed:.4g}", *known, "--radius", "--fin-max", fin, "-o", "plan")
 
 
 def of_design(body: Body, models: Sequence[Path]) -> Headline:

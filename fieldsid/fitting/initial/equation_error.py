@@ -28,7 +28,7 @@ def equation_error_start(records: Sequence[Record], layout: ParameterLayout) -> 
     base += [*dict.fromkeys(group_name(names.authority, groups, i) for i in range(len(groups.speeds))), names.trim]
     rows, targets = [], []
     for run, record in enumerate(records):
-        block, target = _windows(record, stiff=names.stiffness is not None)
+        block, target = integrated_windows(record, stiff=names.stiffness is not None)
         full = np.zeros((len(target), len(base)))
         share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
         full[:, 0] = block[:, 0] * share
@@ -87,8 +87,8 @@ def _share(speed: float, reference: float) -> float:
     return float(speed / reference) if ok else 1.0
 
 
-def _windows(record: Record, *, stiff: bool) -> tuple[FloatArray, FloatArray]:
-    """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of one run."""
+def integrated_windows(record: Record, *, stiff: bool) -> tuple[FloatArray, FloatArray]:
+    """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of one run; no angle where not `stiff`."""
     h = record.steps
     rate, ok = _rate(record)
     angle = (

@@ -14,6 +14,9 @@ from fieldsid.planning.flight.closed_loop import Response, respond
 from fieldsid.planning.flight.operating_point import OperatingPoint
 from fieldsid.planning.flight.rule_flight import fly_operating_points
 
+LONGEST_WINDOW_S = 300.0
+"""No maneuver of the catalogue has a longer period."""
+
 
 @dataclass(frozen=True, slots=True)
 class Window:
@@ -40,6 +43,12 @@ class Window:
                 f"a command rate of {self.rate_hz:g} Hz cannot be right",
                 found=f"--rate {self.rate_hz:g}",
                 hint="for example `--rate 20`",
+            )
+        if not self.length <= LONGEST_WINDOW_S:
+            raise UsageError(
+                f"a window of {self.length:g} s cannot be meant",
+                found=f"--window {self.length:g}, at most {LONGEST_WINDOW_S:g} s",
+                hint="for example `--window 33`",
             )
         if self.excitation < 2.0:
             raise UsageError(

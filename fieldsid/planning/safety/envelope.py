@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from math import degrees
 
 import numpy as np
 
@@ -19,7 +20,22 @@ LARGEST_FIN = 0.7
 LARGEST_SPEED = 15.0
 MOST_TURNS = 4.0
 """Turns that a deviation of heading may be: more was meant in degrees."""
+LEAST_FIN = 0.01
+"""rad: what trims and the play of a linkage are of."""
 NOT_LIMITED = "NOT LIMITED"
+_NO_LIMIT = ", or leave it out where there is no limit"
+OPTIONS: Mapping[str, tuple[str, str, str]] = {
+    "fin": ("--fin-max", "rad", "write `--fin-max 15deg`, or leave it out: the vehicle's own limit, else 0.26 rad"),
+    "fin_rate": ("--fin-rate", "rad/s", "write `--fin-rate 60deg`, or leave it out: the vehicle's own, else no limit"),
+    "heading": ("--max-heading", "rad", "write `--max-heading 60deg`, or `--max-heading none` where there is no limit"),
+    "track": ("--max-track", "m", f"write `--max-track 20`{_NO_LIMIT}"),
+    "pitch": ("--max-pitch", "rad", "write `--max-pitch 30deg`, or `--max-pitch none` where there is no limit"),
+    "roll": ("--max-roll", "rad", f"write `--max-roll 20deg`{_NO_LIMIT}"),
+    "area_length": ("--area", "m long", f"write `--area 200x60`{_NO_LIMIT}"),
+    "area_width": ("--area", "m wide", f"write `--area 200x60`{_NO_LIMIT}"),
+    "share": ("--risk", "", "no maneuver is without risk: write `--risk 0.01`, or leave it out for 0.05"),
+}
+"""Of each limit: the option, its unit, and what to write instead of zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +63,7 @@ class Envelope:
     def __post_init__(self) -> None:
         for name in ("fin", "fin_rate", "heading", "track", "pitch", "roll", "area_length", "area_width", "share"):
             _positive(name, getattr(self, name))
+        _refuse_idle(self.fin)
         _at_most("fin", self.fin, LARGEST_FIN, "rad", "fin angle")
         for name in ("pitch", "roll"):
             _at_most(name, getattr(self, name), np.pi / 2, "rad", f"{name} limit")
@@ -172,8 +189,16 @@ def check_room(envelope: Envelope, speeds: tuple[float, ...], run_up_s: float, s
 
 def _positive(name: str, value: float | None) -> None:
     if value is not None and not value > 0:
+        option, unit, hint = OPTIONS[name]
+        raise UsageError(f"`{option}` must be above zero", found=f"{option} {value:.4g} {unit}".rstrip(), hint=hint)
+
+
+def _refuse_idle(fin: float) -> None:
+    if fin < LEAST_FIN:
         raise UsageError(
-            f"the limit `{name}` must be above zero", found=f"{name} = {value:g}", hint="leave it out where there is no limit"
+            f"a fin of {degrees(fin):.2g} deg at most turns no vehicle",
+            found=f"--fin-max {fin:.3g} rad, least {degrees(LEAST_FIN):.2g} deg",
+            hint=OPTIONS["fin"][2],
         )
 
 

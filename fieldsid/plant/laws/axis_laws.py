@@ -24,6 +24,8 @@ from fieldsid.plant.points import Point, check_authority, distinct_speeds
 from fieldsid.rounding import nine_digits
 
 KIND = "fieldsid/fit"
+LARGEST_COEFFICIENT = 1e6
+"""Of a law of one's own, SI: no vehicle damps or turns so fast."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -92,6 +94,12 @@ def with_own_law(laws: Laws, text: str) -> Laws:
         raise UsageError(
             f"`--law {text}` is not NAME=c0[,c1]", found=str(error), hint="write `--law a22=1` or `--law b2=-0.23,-0.33`"
         ) from error
+    if not np.all(np.abs(coefficients) <= LARGEST_COEFFICIENT):
+        raise UsageError(
+            f"`--law {text}` is not a law of numbers that can be meant",
+            found=f"{numbers}; numbers are at most {LARGEST_COEFFICIENT:g}",
+            hint="write `--law a22=1` or `--law b2=-0.23,-0.33`",
+        )
     if name not in NAMES[laws.axis].base or coefficients.size > 2:
         raise UsageError(f"`--law {text}` is not NAME=c0[,c1]", found=name, hint=f"names: {', '.join(NAMES[laws.axis].base)}")
     size = coefficients.size

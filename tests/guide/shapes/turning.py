@@ -155,6 +155,8 @@ class Turn(Shape):
     """Its band."""
     model_radius_m: Number
     """Radius of the identified yaw model by itself."""
+    band_only: bool
+    """Whether `interval95` is wider than 35 % of `radius_m`: what is known is the band, and no number in it."""
     method: Literal["u_turn", "steady", "simulated", "maneuvering", "measured"]
     """Where the radius comes from."""
     extrapolated: bool

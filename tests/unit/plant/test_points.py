@@ -136,6 +136,21 @@ def test_a_joint_model_that_disagrees_at_one_of_its_speeds_is_left_out_and_weak_
         source_of_models(models[1:], ["b", "c"])
 
 
+@pytest.mark.parametrize(("t_values", "kept"), [((-2.5, -3.0, -1.0), ["a", "c"]), ((2.5, 3.0, 1.0), ["b"])])
+def test_where_no_model_knows_the_sign_of_its_fin_the_runs_of_all_tell_it(t_values, kept):
+    unclear = [authority_model(1.0, -0.5, 0.4), authority_model(1.5, 20.0, 750.0), authority_model(2.0, -2.0, 5.0)]
+    models = [replace(m, trained={"fin_t": t}) for m, t in zip(unclear, t_values, strict=True)]
+    source = source_of_models(models, ["a", "b", "c"])
+    assert list(source.names) == kept
+    assert sorted((*source.names, *source.left_out)) == ["a", "b", "c"]
+
+
+def test_runs_that_do_not_tell_the_sign_of_the_fin_leave_it_refused():
+    unclear = [authority_model(1.0, -0.5, 0.4), authority_model(1.5, 20.0, 750.0)]
+    with pytest.raises(DataError, match="sign of b2"):
+        source_of_models([replace(m, trained={"fin_t": -1.5}) for m in unclear], ["a", "b"])
+
+
 def test_a_model_that_is_left_out_stays_so_in_a_fit_file_and_is_named(tmp_path):
     odd = joint_model((1.2, 1.5), (0.003, -0.001), 0.4)
     given = {"odd": odd, "a": authority_model(1.0, -0.5, 0.02), "c": authority_model(2.0, -2.0, 0.05)}
