@@ -20,7 +20,8 @@ from fieldsid.models.record import knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
 
-BLOCK_S = 0.2
+BLOCK_S, BLOCK_SHARE = 0.2, 0.2
+"""Block means are of 0.2 s, or of a fifth of the time in which the rate of a slow vehicle changes: its speed is slower still."""
 LEAST_SAMPLES = 40
 LEAST_TURN_RAD_S = 0.03
 TYPICAL_LOSS = 0.15
@@ -148,7 +149,7 @@ def _case(run: Run) -> _Case | None:
         if angle_only
         else np.interp(record.time, record.time[record.rate_ok], record.rate[record.rate_ok])
     )
-    width = block_width(record.steps, BLOCK_S)
+    width = block_width(record.steps, max(BLOCK_S, BLOCK_SHARE * _time_of_change(record.time, rate)))
     none = np.full(len(record), np.nan)
     thrust = record.signals.get("thrust")
     start = float(np.median(thrust[: max(10, thrust.size // 20)])) if thrust is not None else 0.0
@@ -159,6 +160,16 @@ def _case(run: Run) -> _Case | None:
     if blocks[0].size < LEAST_SAMPLES or float(np.max(np.abs(blocks[3]))) < LEAST_TURN_RAD_S:
         return None
     return _Case(*blocks)
+
+
+def _time_of_change(time: FloatArray, rate: FloatArray) -> float:
+    """Return the rms of a rate over that of its derivative, s, in block means: noise makes it shorter."""
+    width = block_width(np.diff(time), BLOCK_S)
+    blocks, at = block_means(rate, width), block_means(time, width)
+    if blocks.size < LEAST_SAMPLES:
+        return 0.0
+    change = float(np.sqrt(np.mean(np.gradient(blocks, at) ** 2)))
+    return float(np.sqrt(np.mean(blocks**2))) / change if change > 0.0 else 0.0
 
 
 def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:
