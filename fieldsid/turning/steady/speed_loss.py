@@ -21,7 +21,9 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
 
 BLOCK_S, BLOCK_SHARE = 0.2, 0.2
-"""Block means are of 0.2 s, or of a fifth of the time in which the rate of a slow vehicle changes: its speed is slower still."""
+"""Block means are of 0.2 s, or of a fifth of the time in which a slow vehicle takes up its largest rate: its speed is slower."""
+LEAST_BLOCKS = 200
+"""A run keeps so many blocks, however slow it is."""
 LEAST_SAMPLES = 40
 LEAST_TURN_RAD_S = 0.03
 TYPICAL_LOSS = 0.15
@@ -163,13 +165,14 @@ def _case(run: Run) -> _Case | None:
 
 
 def _time_of_change(time: FloatArray, rate: FloatArray) -> float:
-    """Return the rms of a rate over that of its derivative, s, in block means: noise makes it shorter."""
+    """Return the largest rate over its largest derivative, s, in block means: noise makes it shorter; it leaves blocks enough."""
     width = block_width(np.diff(time), BLOCK_S)
     blocks, at = block_means(rate, width), block_means(time, width)
     if blocks.size < LEAST_SAMPLES:
         return 0.0
-    change = float(np.sqrt(np.mean(np.gradient(blocks, at) ** 2)))
-    return float(np.sqrt(np.mean(blocks**2))) / change if change > 0.0 else 0.0
+    change = float(np.max(np.abs(np.gradient(blocks, at))))
+    longest = float(time[-1] - time[0]) / LEAST_BLOCKS / BLOCK_SHARE
+    return min(float(np.max(np.abs(blocks))) / change, longest) if change > 0.0 else 0.0
 
 
 def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:
