@@ -43,6 +43,12 @@ class Vehicle:
         """Return the fin limit of an axis (`yaw` or `pitch`) in rad."""
         return self.rudder_max_rad if axis == "yaw" else self.elevator_max_rad
 
+    @property
+    def signal_limits(self) -> dict[str, float]:
+        """The fin limits in rad by signal, without those that are not stated."""
+        limits = {"rudder_rad": self.rudder_max_rad, "elevator_rad": self.elevator_max_rad}
+        return {signal: limit for signal, limit in limits.items() if limit is not None}
+
 
 class _Fields(StrictModel):
     """The keys of vehicle.yaml."""

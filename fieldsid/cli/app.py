@@ -29,7 +29,13 @@ Python's own threshold the collector takes a fifth of the time of compiling, a t
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line and return its exit code; data go to stdout, all else to stderr."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        return _answered(list(sys.argv[1:] if argv is None else argv))
+    finally:
+        _forget_voice()
+
+
+def _answered(arguments: list[str]) -> int:
     raised: Exception | None = None
     try:
         code = _dispatch(arguments)
@@ -121,6 +127,14 @@ def _dispatch(arguments: list[str]) -> int:
     else:
         result = run(arguments)
     return result if isinstance(result, int) else DONE
+
+
+def _forget_voice() -> None:
+    """Let `--quiet` and `--deg` of this command line say nothing of what the process prints next."""
+    if "fieldsid.cli.voice" in sys.modules:
+        from fieldsid.cli.voice import take
+
+        take(())
 
 
 def _tell_refused(raised: Exception | None) -> None:

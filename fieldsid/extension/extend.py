@@ -131,18 +131,37 @@ def _extension(
     """Return the extension from a model without the new effects to one with them, both fitted by one search."""
     learned, judged = work.records, work.validation
     work.update_noise_floor(after.likelihood_fit.fitted)
+    # as `diagnose` has it: what runs without noise leave over is no colour of a sensor's
+    ended_with = after.likelihood_fit if work.is_noiseless else joint_noise_fit(after.likelihood_fit, work.parallel)
+    noise = ended_with.noise
     gain = Gain(
         added=tuple(e.name for e in new),
         before=before.errors,
         after=after.errors,
-        noise_floor=reported_noise_floor(work.floor, joint_noise_fit(after.likelihood_fit, work.parallel).noise),
+        noise_floor=reported_noise_floor(work.floor, noise),
         unseen=bool(judged),
         learned_on=tuple(r.name for r in learned),
         judged_on=tuple(r.name for r in (judged or learned)),
     )
     model, ended = final_model(after), after.reported_fit
     on_bound = tuple(p.name for p in ended.problem.layout.on_bound(ended.x))
-    return Extension(model, gain, after.log_evidence - before.log_evidence, (*notes, *as_flown(model, judged)), on_bound)
+    notes = (*notes, *forms_taken(model, new), *as_flown(model, judged))
+    return Extension(model, gain, after.log_evidence - before.log_evidence, notes, on_bound)
+
+
+def forms_taken(model: Model, new: Sequence[Effect]) -> tuple[Note, ...]:
+    """Return a note for each effect that a model holds in a form which is not the textbook's, with the form in words."""
+    notes = []
+    for effect in new:
+        own, textbook = effect.names & set(model.values), {c.name for c in effect.coefficients}
+        form = next((v for v in effect.variants if {c.name for c in v.coefficients} | (textbook - set(v.without)) == own), None)
+        if form is not None and own != textbook:
+            words = (
+                f"`{effect.name}` has more evidence here in a form that is not the textbook's ({form.says}: "
+                f"{', '.join(sorted(own - textbook))}): where `diagnose` judged another form, its error is another"
+            )
+            notes.append(Note("form_taken", words, {"effect": effect.name, "coefficients": sorted(own)}))
+    return tuple(notes)
 
 
 def base_from(work: Search, parent: Model) -> ScoredModel:

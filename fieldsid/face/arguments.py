@@ -58,10 +58,7 @@ def length_of(vehicle: Vehicle | File | None) -> float | None:
 
 def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:
     """Return the fin limits of a vehicle in rad by signal, without those it does not state."""
-    if vehicle is None:
-        return {}
-    limits = {"rudder_rad": vehicle.rudder_max_rad, "elevator_rad": vehicle.elevator_max_rad}
-    return {signal: limit for signal, limit in limits.items() if limit is not None}
+    return {} if vehicle is None else vehicle.signal_limits
 
 
 def rudder_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[str], None]) -> float:

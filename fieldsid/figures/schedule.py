@@ -14,7 +14,8 @@ from fieldsid.schedule.optimum import DRAWS_MARGIN_SHARE
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import STEPS_RAD, Check, Verification
 
-SHOWN_S = 25.0
+SHOWN_SHARE = 25.0 / 60.0
+"""Of a flight: a step that serves has settled by then."""
 LEAST_SCALE_DEG = 1.0
 """A feed-forward that differs by less than fins are rigged to is drawn as what it is: level."""
 LEAST_LEG_DEG = 0.5
@@ -31,13 +32,14 @@ def figure(schedule: Schedule, verification: Verification) -> Figure:
     draw_margins(schedule, verification.scheduled, margins)
     draw_leg([(f.speed, f.leg) for f in verification.flown], verification.disturbance, leg)
     *steps, fin = np.ravel(right.subplots(4, 1))
+    until = SHOWN_SHARE * max(f.pace.flight for f in verification.flown)
     for at, (size, ax) in enumerate(zip(STEPS_RAD[schedule.axis], steps, strict=True)):
-        draw_steps([(f.speed, f.scheduled[at], f.constant[at]) for f in verification.flown], size, ax)
+        draw_steps([(f.speed, f.scheduled[at], f.constant[at]) for f in verification.flown], size, until, ax)
     steps[0].set_title(
         f"steps with the {schedule.kind} schedule; thin: one constant gain, kp = {verification.constant_row.gains.kp:.3g}",
         loc="left", fontsize=10,
     )  # fmt: skip
-    draw_fin(schedule, [(f.speed, f.scheduled[1], f.scheduled[2]) for f in verification.flown], fin)
+    draw_fin(schedule, [(f.speed, f.scheduled[1], f.scheduled[2]) for f in verification.flown], until, fin)
     return sheet
 
 
@@ -98,12 +100,12 @@ def _asked(schedule: Schedule, ax: Axes) -> None:
     ax.axhline(of_draws, color="0.3", linewidth=1.0, linestyle=":", label="of 95 % of the draws")
 
 
-def draw_fin(schedule: Schedule, steps: Sequence[tuple[float, Steps, Steps]], ax: Axes) -> None:
-    """Draw the fin in the standard step, thin in the large one, at every speed, with its limits and how long it is at them."""
+def draw_fin(schedule: Schedule, steps: Sequence[tuple[float, Steps, Steps]], until: float, ax: Axes) -> None:
+    """Draw the fin in the standard step, thin in the large one, for `until` s, with its limits and how long it is at them."""
     limit = max(schedule.column("fin_limit_rad"))
     for (_, usual, large), colour in zip(steps, _colours([u for u, _, _ in steps]), strict=True):
         for shown, width in ((large, 0.6), (usual, 1.4)):
-            keep = shown.time <= SHOWN_S
+            keep = shown.time <= until
             ax.plot(shown.time[keep], np.degrees(shown.fin[keep, 0]), color=colour, linewidth=width)
     for sign in (-1.0, 1.0):
         ax.axhline(sign * np.degrees(limit), color="0.3", linewidth=1.0, linestyle="-.")
@@ -117,13 +119,13 @@ def draw_fin(schedule: Schedule, steps: Sequence[tuple[float, Steps, Steps]], ax
     canvas.dress(ax, x="time, s", y="fin, deg")
 
 
-def draw_steps(steps: Sequence[tuple[float, Steps, Steps]], size: float, ax: Axes) -> None:
+def draw_steps(steps: Sequence[tuple[float, Steps, Steps]], size: float, until: float, ax: Axes) -> None:
     """Draw a step at every speed, dark to light from slow to fast, with the 5 % corridor; thin with one constant gain."""
     ax.axhspan(0.95 * np.degrees(size), 1.05 * np.degrees(size), color="0.92", linewidth=0)
     for (speed, own, constant), colour in zip(steps, _colours([u for u, _, _ in steps]), strict=True):
         label = f"{speed:.2f} m/s" if speed in (steps[0][0], steps[-1][0]) else None
         for shown, width in ((constant, 0.5), (own, 1.4)):
-            keep = shown.time <= SHOWN_S
+            keep = shown.time <= until
             angle = np.degrees(shown.angle[keep, 0])
             ax.plot(shown.time[keep], angle, color=colour, linewidth=width, label=label if width > 1 else None)
     ax.set_ylim(-0.1 * np.degrees(size), 1.4 * np.degrees(size))

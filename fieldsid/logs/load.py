@@ -17,7 +17,7 @@ from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
 from fieldsid.logs.reader import Reader, ReadOptions, reader_of
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import OF_LIMITS, Note, Run
 
 MAPPING_FILE = "mapping.yaml"
 
@@ -52,13 +52,23 @@ def load_run(
     raw = reader.read(path, chosen, options)
     run = assemble(raw, chosen, path, options, part=part, max_gap_s=max_gap_s)
     if raw.finished:
-        return run
+        return _judged_anew(run, fin_max_rad or {})
     from fieldsid.logs.doctor.examine import examine
     from fieldsid.logs.doctor.stated import stated_by
 
     return Run(
         run.name, run.time, run.signals, path, (*notes, *run.notes, *examine(run, fin_max_rad or {}, stated_by(chosen, raw)))
     )
+
+
+def _judged_anew(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
+    """Return an imported run with what was found then, but for what hangs on fin limits: they may have been corrected since."""
+    kept = tuple(n for n in run.notes if n.code not in OF_LIMITS)
+    if not fin_max_rad:
+        return replace(run, notes=kept)
+    from fieldsid.logs.doctor.limit_findings import limit_findings
+
+    return replace(run, notes=(*kept, *limit_findings(run, fin_max_rad)))
 
 
 def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], options: ReadOptions) -> str:

@@ -64,6 +64,8 @@ class Note(Brief):
 
 SIMULATED = "simulated"
 """Code of the note of a run that a model made."""
+OF_LIMITS = ("saturated", "fin_limit")
+"""Codes of the notes that hang on the fin limits: a run keeps those of its import, and is judged by the limits of the day."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

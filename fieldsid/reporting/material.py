@@ -69,16 +69,17 @@ def material_of(state: FolderState) -> Material:
             f"there is nothing to report in `{state.folder}`", found=found, hint="begin with `sysid import LOG -o runs/`"
         )
     skipped: list[str] = []
-    runs = _runs(state, skipped)
+    vehicle = find_vehicle(state.folder)
+    runs = _runs(state, vehicle, skipped)
     axes = tuple(a for axis in ("yaw", "pitch") if (a := _axis(state, axis, runs, skipped)) is not None)
     notes = state.folder / "notes.md"
     return Material(
         state, tuple(runs), axes, notes.read_text(encoding="utf-8", errors="replace") if notes.is_file() else "",
-        find_vehicle(state.folder), tuple(skipped), next_step(state),
+        vehicle, tuple(skipped), next_step(state),
     )  # fmt: skip
 
 
-def _runs(state: FolderState, skipped: list[str]) -> list[Run]:
+def _runs(state: FolderState, vehicle: Vehicle | None, skipped: list[str]) -> list[Run]:
     places = [state.place(i) for i in state.of_kind(RUN)]
     if not places:  # the runs that the models name
         sources = [s.path for i in state.of_kind(MODEL) for s in i.sources if s.path is not None]
@@ -87,10 +88,10 @@ def _runs(state: FolderState, skipped: list[str]) -> list[Run]:
         said = "those that the model was not fitted to come first, then others evenly by name"
         skipped.append(f"{len(places) - MOST_RUNS} of {len(places)} runs are not drawn: {said}")
         places = _chosen(places, _fitted_to(state))
-    found = []
+    found, limits = [], {} if vehicle is None else vehicle.signal_limits
     for place in places:
         try:
-            found.append(load_run(place))
+            found.append(load_run(place, fin_max_rad=limits))
         except FieldsidError as error:
             skipped.append(f"{place.name}: {error.what}")
     return found

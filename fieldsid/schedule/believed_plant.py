@@ -24,7 +24,7 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
     hull = np.array([coefficients(v) for v in (belief.fitted.vector, *taken)])
     which = np.arange(draws) % near.count
     zero = np.zeros(draws)
-    way = -float(np.sign(near.slow_authority[0]))
+    way = -float(np.sign(near.authority[0]))  # as the runs were read: what a model's sway makes of it in the end may differ
     damping, authority, slow, by_rate, by_fin = _about_straight(hull, near.speed)
     return LinearPlant(
         axis=Axis.YAW,

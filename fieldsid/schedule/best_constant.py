@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fieldsid.schedule.flown.pace import Pace
 from fieldsid.schedule.flown.response import LIMIT_CYCLE_SHARE, about_rest, settling, step_response, swing
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
@@ -18,12 +19,12 @@ MARGIN_ROUNDING_DEG = 1.0
 FIN_ROUNDING = 1e-6
 
 
-def best_constant(schedule: Schedule, plants: Sequence[LinearPlant], *, step: float, seconds: float) -> Row:
+def best_constant(schedule: Schedule, plants: Sequence[LinearPlant], paces: Sequence[Pace], *, step: float) -> Row:
     """Return the gains that settle soonest at the slowest of the speeds of plants, within 95 % of the draws of each.
 
-    They have to keep the margin that the schedule keeps, and to ask for no more than the fin's limit in the step where the
-    schedule does not: a faster loop without that is no better one. Feed-forward and reference
-    gain are left to `held_at`: the trim is known at every speed. Where nothing holds everywhere it is what holds at most speeds.
+    Each is flown at its pace. They have to keep the margin that the schedule keeps, and to ask for no more than the fin's limit
+    in the step where the schedule does not: a faster loop without that is no better one. Feed-forward and reference gain are
+    left to `held_at`: the trim is known at every speed. Where nothing holds everywhere it is what holds at most speeds.
     """
     most = max(max(r.fin_limit, abs(r.gains.kp) * step) for r in schedule.rows) * (1.0 + FIN_ROUNDING)
     multiples = [replace(r, gains=r.gains.times(f)) for r in schedule.rows for f in MULTIPLES]
@@ -33,8 +34,9 @@ def best_constant(schedule: Schedule, plants: Sequence[LinearPlant], *, step: fl
 
     def cost(row: Row) -> tuple[int, float]:
         slowest, lost = 0.0, 0
-        for plant in few:
-            steps = step_response(plant, held_at(row, schedule, plant.speed), reference=step, seconds=seconds)
+        for plant, pace in zip(few, paces, strict=True):
+            held = held_at(row, schedule, plant.speed)
+            steps = step_response(plant, held, reference=step, seconds=pace.flight, step_s=pace.step)
             kept = (swing(steps.angle, step) <= LIMIT_CYCLE_SHARE) & (margins(plant, row.gains).phase_deg >= margin)
             lost += int(np.mean(kept) < HELD_SHARE)
             slowest = max(slowest, worst_of(settling(steps.time, about_rest(steps.angle, step), step), most=True))

@@ -21,6 +21,7 @@ from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.registry import near
 from fieldsid.schedule.controller import KINDS, Gains
+from fieldsid.schedule.flown.pace import full_bandwidth, pace_of
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
 from fieldsid.schedule.optimum import (
@@ -37,8 +38,8 @@ INTEGRAL_SHARE = 0.1
 """Integral corner over the proportional loop's crossover: a tenth costs six degrees of phase."""
 LEAST_HELD = 0.5
 """P and PI that hold fewer of the draws are refused: no proportional gain holds an unstable hull."""
-FLOWN_TIMES, FLOWN_S = 25.0, (20.0, 60.0)
-"""A step is flown for so many times 1/bandwidth of the full fin, within these seconds."""
+FLOWN_TIMES, LEAST_SHARE = 25.0, 1.0 / 3.0
+"""A step is flown for so many times 1/bandwidth of the full fin: within this share of what its pace has and all of that."""
 PROPORTIONAL, RATE_FED = ("p", "pi"), ("pd", "pid")
 MOST_DAMPING = 3.0
 DesignAttempt = Callable[[float, float], Gains]
@@ -147,13 +148,10 @@ def _found(family: LinearPlant, wish: Wish, fin_limit: float) -> Found | None:
 
 def _demand(family: LinearPlant, wish: Wish, fin_limit: float) -> Demand:
     allowed = _overshoot_of(min(wish.damping, DRAWS_MARGIN_SHARE * wish.phase_margin_deg / 100.0))
-    seconds = float(np.clip(FLOWN_TIMES / _full_bandwidth(family.one(), wish, fin_limit), *FLOWN_S))
-    return Demand(_damping_floor(wish), wish.phase_margin_deg, wish.largest_error, allowed, fin_limit, seconds)
-
-
-def _full_bandwidth(one: LinearPlant, wish: Wish, fin_limit: float) -> float:
-    """Return the bandwidth (rad/s) that uses the full fin at the largest error: faster would only saturate."""
-    return float(np.sqrt(max(one.stiffness[0], 0.0) + abs(one.slow_authority[0]) * fin_limit / wish.largest_error))
+    pace = pace_of(family, fin_limit, wish.largest_error)
+    wanted = FLOWN_TIMES / max(full_bandwidth(family, fin_limit, wish.largest_error), FLOWN_TIMES / pace.flight)
+    pace = replace(pace, flight=max(wanted, LEAST_SHARE * pace.flight))
+    return Demand(_damping_floor(wish), wish.phase_margin_deg, wish.largest_error, allowed, fin_limit, pace)
 
 
 def _unstable(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
@@ -219,7 +217,7 @@ def _proportional(plant: LinearPlant, wish: Wish, fin_limit: float) -> DesignAtt
 
 def _rate(plant: LinearPlant, wish: Wish, fin_limit: float) -> DesignAttempt:
     a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
-    omega = wish.bandwidth if wish.bandwidth is not None else _full_bandwidth(plant, wish, fin_limit)
+    omega = wish.bandwidth if wish.bandwidth is not None else full_bandwidth(plant, fin_limit, wish.largest_error)
 
     def gains(share: float, more: float) -> Gains:
         w = omega * share

@@ -18,6 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.controller import Gains, least_damping
+from fieldsid.schedule.flown.pace import Pace
 from fieldsid.schedule.flown.response import LIMIT_CYCLE_SHARE, about_rest, lateness, overshoot, settling, step_response, swing
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
@@ -57,7 +58,7 @@ class Demand:
     """What gains have to leave: damping of the estimate's poles, phase margin (deg) of the estimate, the step (rad) flown.
 
     `draws_overshoot` is the share by which 95 % of the draws may overshoot; `fin_limit` (rad) bounds the fin; a step is flown
-    for `seconds`.
+    at `pace`.
     """
 
     damping: float
@@ -65,7 +66,7 @@ class Demand:
     step: float
     draws_overshoot: float
     fin_limit: float
-    seconds: float
+    pace: Pace
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +185,7 @@ def _lateness_and_lack(family: LinearPlant, gains: Gains, demand: Demand) -> tup
 def _step(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[FloatArray, FloatArray]:
     reference_gain = float(family.stiffness[0]) / float(family.slow_authority[0])
     row = Row(family.speed, gains, -float(family.offset[0]), reference_gain, demand.fin_limit)
-    steps = step_response(family, row, reference=demand.step, seconds=demand.seconds)
+    steps = step_response(family, row, reference=demand.step, seconds=demand.pace.flight, step_s=demand.pace.step)
     return steps.time, steps.angle
 
 

@@ -15,7 +15,7 @@ from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule.believed_plant import LAG, RATE, believed_plant
 from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at, plants_at
-from fieldsid.turning.maneuvering.belief import Belief, believe, like_no_vehicle, not_fitted
+from fieldsid.turning.maneuvering.belief import Belief, believe, fitted_to, like_no_vehicle, not_fitted
 from fieldsid.turning.maneuvering.equations import coefficients
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
 
@@ -98,13 +98,14 @@ def plants_of(source: ParameterSource, limits: FinLimits, runs: Sequence[Run], l
     if source.axis is not Axis.YAW or not any(model.effects for model in source.models):
         return models_plants(source, limits, runs)
     try:
+        fitted = fitted_to(runs, source.models, length)
+        if fitted is not None and not fitted.is_usual:
+            return models_plants(source, limits, runs, like_no_vehicle(fitted, length))
         belief = believe(runs, source.models, length)
     except ModelError as error:
         return models_plants(source, limits, runs, not_fitted(error, runs))
     if belief is None:
         return models_plants(source, limits, runs)
-    if not belief.fitted.is_usual:
-        return models_plants(source, limits, runs, like_no_vehicle(belief.fitted, length))
     return Plants(source, limits, None, belief)
 
 

@@ -15,8 +15,6 @@ from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import (
     DEPTH_STEP_M,
-    DEPTH_STEP_S,
-    LONGEST_STEP_S,
     READ_OFF,
     STEP_ANGLE_RAD,
     STEPS_RAD,
@@ -90,9 +88,7 @@ def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...
 def _settles(checked: Verification, step: float) -> str:
     """Return how long a step (deg) takes to settle where it takes longest, by the estimate and over the draws."""
     slowest, latest = max(c.settling for c in checked.scheduled), max(c.settling_most for c in checked.scheduled)
-    by_draws = (
-        f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {LONGEST_STEP_S:.0f} s"
-    )
+    by_draws = f"in {latest:.1f} s by the slowest draw" if isfinite(latest) else f"by some draws not within {_longest(checked)}"
     return f"a {step:.0f} deg step settles within {slowest:.1f} s at every speed" + (f", {by_draws}" if checked.spread else "")
 
 
@@ -110,11 +106,13 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     if unheld.draws_held < HELD_SHARE and not found and checked.spread:
         found.append(f"at {number(unheld.speed, 3)} m/s it holds {100 * unheld.draws_held:.0f} % of the draws it was designed on")
     if not isfinite(slowest.settling):
-        found.append(f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {LONGEST_STEP_S:.0f} s")
+        found.append(
+            f"at {number(slowest.speed, 3)} m/s a {step:.0f} deg step is not within 5 % after {slowest.steps[1].flown:.0f} s"
+        )
     deepest = max((c for c in checked.scheduled if schedule.depth), key=lambda c: c.depth_settling, default=None)
     if deepest is not None and not isfinite(deepest.depth_settling):
         where = f"at {number(deepest.speed, 3)} m/s a {DEPTH_STEP_M:.0f} m depth step"
-        found.append(f"{where} is not within 5 % after {DEPTH_STEP_S:.0f} s")
+        found.append(f"{where} is not within 5 % after {deepest.depth_flown:.0f} s")
     return found
 
 
@@ -126,7 +124,9 @@ def against_constant(checked: Verification) -> str:
     wanted = margin_kept(checked.schedule)
     if least < min(wanted, checked.weakest("phase_margin_deg").phase_least_deg - MARGIN_ROUNDING_DEG):
         return f"no one gain for all speeds keeps the schedule's margin: the best, {named}, has {least:.0f} deg at least"
-    times = f"the slowest step settles in {_seconds(own)} with the schedule, {_seconds(other)} with {named}"
+    never = f"more than {_longest(checked)}"
+    ours, theirs = (f"{value:.1f} s" if isfinite(value) else never for value in (own, other))
+    times = f"the slowest step settles in {ours} with the schedule, {theirs} with {named}"
     if any(c.hunts for c in checked.constant):
         return f"no one gain for all speeds comes to rest at every speed: the best, {named}, does not"
     if other < own:
@@ -134,8 +134,10 @@ def against_constant(checked: Verification) -> str:
     return f"against the best constant gain: {times}"
 
 
-def _seconds(value: float) -> str:
-    return f"{value:.1f} s" if isfinite(value) else f"more than {LONGEST_STEP_S:.0f} s"
+def _longest(checked: Verification) -> str:
+    """Return how long the standard steps that did not settle were flown, in words."""
+    unsettled = [c.steps[1].flown for c in (*checked.scheduled, *checked.constant) if not isfinite(c.settling_most)]
+    return f"{min(unsettled, default=0.0):.0f} s"
 
 
 def rests_on(checked: Verification, schedule: Schedule, source: ParameterSource) -> str:

@@ -17,6 +17,7 @@ from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.worker_pool import parallel_map
 from fieldsid.schedule.best_constant import best_constant, held_at
+from fieldsid.schedule.flown.pace import LONGER, Pace, pace_of
 from fieldsid.schedule.flown.response import (
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
@@ -48,15 +49,11 @@ STEPS_RAD = {
 """A small, the standard and a large step: 5, 20 and 90 deg of heading, 2, 10 and 20 deg of pitch."""
 FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
-STEP_DURATION_S = 60.0
-LONGEST_STEP_S = 240.0
-"""A large hull with small fins needs 50 s for 90 deg of heading: a step is flown longer until it has come to rest."""
 FLIGHT_ERROR_SHARE = 0.01
 """What a flight is off its model's by, over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less
 than said, which is half a swing of settling where an overshoot just touches the corridor."""
 AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
-DEPTH_STEP_S = 120.0
 PITCH_LIMIT_RAD = 0.3490658503988659
 
 
@@ -67,7 +64,8 @@ class StepCheck(Brief):
     Those of the draws are about where each comes to rest; `off` (rad) is how far that is from what was asked, by 95 % of them:
     what a trim that is not known to better leaves. `settling_median` and `settling95` (s) are the middle of the draws and the
     band that holds 95 % of them: settling jumps by half a swing where an overshoot just leaves the corridor. `swing` is what
-    still swings in the last quarter, peak to peak as a share of the step, by 95 % of the draws. Overshoot and settling are NaN
+    still swings in the last quarter, peak to peak as a share of the step, by 95 % of the draws; `flown` (s) how long they were
+    flown. Overshoot and settling are NaN
     where what was flown does not say them (`_with_what_is_known`).
     """
 
@@ -80,6 +78,7 @@ class StepCheck(Brief):
     settling95: tuple[float, float]
     swing: float
     off: float
+    flown: float
 
     def record(self) -> dict[str, Any]:
         """Return the step by its fields' names with units."""
@@ -88,7 +87,7 @@ class StepCheck(Brief):
             "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
             "settling_most_s": self.settling_most, "settling_median_s": self.settling_median,
             "settling_interval95_s": list(self.settling95), "swing_percent": 100 * self.swing,
-            "steady_error_most_rad": self.off,
+            "steady_error_most_rad": self.off, "flown_s": self.flown,
         }  # fmt: skip
 
 
@@ -120,6 +119,7 @@ class Check(Displayed):
     leg_fin_rms: float
     depth_overshoot: float
     depth_settling: float
+    depth_flown: float
 
     @property
     def overshoot(self) -> float:
@@ -159,6 +159,7 @@ class Check(Displayed):
             "fin_offset_error_rad": self.bent_error, "fin_offset_error_unknown_rad": self.bent_error_unknown,
             "leg_rms_rad": self.leg_rms, "leg_fin_rms_rad": self.leg_fin_rms,
             "depth_overshoot_percent": 100 * self.depth_overshoot, "depth_settling_s": self.depth_settling,
+            "depth_flown_s": self.depth_flown,
         }  # fmt: skip
 
 
@@ -175,9 +176,10 @@ READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyTyp
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FlownSet(Brief):
-    """One speed (m/s) as the estimate flies it: the three steps under the schedule and the constant gain, the straight leg."""
+    """One speed (m/s) as the estimate flies it, at its pace: steps under the schedule and the constant gain, the straight leg."""
 
     speed: float
+    pace: Pace
     scheduled: tuple[Steps, Steps, Steps]
     constant: tuple[Steps, Steps, Steps]
     leg: Steps
@@ -258,15 +260,17 @@ def verify_schedule(
         of = plants_of(source, limits, runs, schedule.provenance.get("length_m"))
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
-    seen = of.tightest_flown
-    constant = best_constant(schedule, plants, step=STEP_ANGLE_RAD[schedule.axis], seconds=STEP_DURATION_S)
+    seen, size = of.tightest_flown, STEP_ANGLE_RAD[schedule.axis]
+    paces = [pace_of(plant, schedule.at(plant.speed).fin_limit, size) for plant in plants]
+    constant = best_constant(schedule, plants, paces, step=size)
 
     def checked(i: int) -> tuple[Check, Check, FlownSet]:
-        (speed, knot), plant, noise = places[i], plants[i], of.noise_at(places[i][0])
-        one, steps, leg = _check(plant, schedule.at(speed), schedule.rows, schedule, noise, seen, knot=knot, constant=False)
+        speed, knot = places[i]
+        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), seen, knot=knot)
+        one, steps, leg = _check(flight, schedule.at(speed), schedule.rows, constant=False)
         held = held_at(constant, schedule, speed)
-        other, theirs, _ = _check(plant, held, (held,), schedule, noise, seen, knot=knot, constant=True)
-        return one, other, FlownSet(speed, steps, theirs, leg)
+        other, theirs, _ = _check(flight, held, (held,), constant=True)
+        return one, other, FlownSet(speed, paces[i], steps, theirs, leg)
 
     scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
@@ -290,43 +294,49 @@ def stated_limits(schedule: Schedule) -> FinLimits:
     return FinLimits(a.get("lag_s"), a.get("delay_s"), a.get("fin_rate_rad_s"), a.get("latency_s"))
 
 
-def _check(
-    plant: LinearPlant,
-    row: Row,
-    rows: Sequence[Row],
-    schedule: Schedule,
-    noise: Noise | None,
-    seen: float,
-    *,
-    knot: bool,
-    constant: bool,
-) -> tuple[Check, tuple[Steps, Steps, Steps], Steps]:
+@dataclass(frozen=True, slots=True)
+class _Flight:
+    """What is flown at one speed: its plant and pace, the schedule, the models' noise, the curvature (1/m) that runs held."""
+
+    plant: LinearPlant
+    pace: Pace
+    schedule: Schedule
+    noise: Noise | None
+    seen: float
+    knot: bool
+
+
+def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) -> tuple[Check, tuple[Steps, Steps, Steps], Steps]:
+    plant, pace, schedule = flight.plant, flight.pace, flight.schedule
     phase, gain, delay = control_margins(plant, row.gains)
     found = margins(plant, row.gains)
     least_phase, least_gain, least_delay = found.worst()
-    flights = [_flown_to_rest(plant, rows, size) for size in STEPS_RAD[schedule.axis]]
+    flights = [_flown_to_rest(plant, rows, size, pace) for size in STEPS_RAD[schedule.axis]]
     small, usual, large = (_step(s, size) for s, size in zip(flights, STEPS_RAD[schedule.axis], strict=True))
-    large = _with_what_is_known(large, flights[2], plant, seen)
+    large = _with_what_is_known(large, flights[2], plant, flight.seen)
     known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
-    bent, unknown = (step_response(one, r, reference=0.0, seconds=STEP_DURATION_S, offset=FIN_OFFSET_RAD) for r in (known, rows))
-    leg = straight_leg(one, rows, noise)
-    depth_over, depth_settled = _depth(one, rows) if schedule.depth else (float("nan"), float("nan"))
+    bent, unknown = (
+        step_response(one, r, reference=0.0, seconds=pace.flight, offset=FIN_OFFSET_RAD, step_s=pace.step) for r in (known, rows)
+    )
+    leg = straight_leg(one, rows, flight.noise, pace)
+    depth_over, depth_settled = _depth(one, rows, pace) if schedule.depth else (float("nan"), float("nan"))
     check = Check(
-        row.speed, knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
+        row.speed, flight.knot, row.supported, constant, phase, gain, delay, least_phase, least_gain, least_delay,
         int(np.sum(found.phase_deg < 0.0)),
         (small, usual, large), float(np.min(flights[2].speed[:, 0])),
         float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
-        float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled,
+        float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled, pace.leg,
     )  # fmt: skip
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
 
 
-def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row] | Row, size: float) -> Steps:
-    """Return a step flown longer where it has not come to rest: what is slow does then, what hunts goes on."""
-    for seconds in (STEP_DURATION_S, 2.0 * STEP_DURATION_S, LONGEST_STEP_S):
-        flight = step_response(plant, rows, reference=size, seconds=seconds)
-        if worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
+def _flown_to_rest(plant: LinearPlant, rows: Sequence[Row] | Row, size: float, pace: Pace) -> Steps:
+    """Return a step flown longer where it has not come to rest where it should: what is slow does then, what hunts goes on."""
+    for times in LONGER:
+        flight = step_response(plant, rows, reference=size, seconds=times * pace.flight, step_s=pace.step)
+        there = np.isfinite(settling(flight.time, flight.angle[:, :1], size)[0])
+        if there and worst_of(swing(flight.angle, size), most=True) <= AT_REST_SHARE:
             break
     return flight
 
@@ -344,7 +354,8 @@ def _step(flown: Steps, size: float) -> StepCheck:
         float(np.quantile(of, share, method="closest_observation"))
         for of, share in ((wide, 0.025), (settled, 0.5), (narrow, 0.975))
     )
-    return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], middle, (low, high), most[2], most[3])
+    seconds = float(flown.time[-1])
+    return StepCheck(size, float(over[0]), most[0], float(settled[0]), most[1], middle, (low, high), most[2], most[3], seconds)
 
 
 def _with_what_is_known(step: StepCheck, flown: Steps, plant: LinearPlant, seen: float) -> StepCheck:
@@ -367,7 +378,7 @@ def _trimmed(row: Row, fin: float) -> Row:
     return replace(row, feed_forward=row.feed_forward + fin)
 
 
-def _depth(one: LinearPlant, rows: Sequence[Row]) -> tuple[float, float]:
-    steps = depth_response(one, rows, step=DEPTH_STEP_M, seconds=DEPTH_STEP_S, pitch_limit=PITCH_LIMIT_RAD)
+def _depth(one: LinearPlant, rows: Sequence[Row], pace: Pace) -> tuple[float, float]:
+    steps = depth_response(one, rows, step=DEPTH_STEP_M, seconds=pace.leg, pitch_limit=PITCH_LIMIT_RAD, step_s=pace.step)
     settled = settling(steps.time, steps.depth, DEPTH_STEP_M)
     return float(overshoot(steps.depth, DEPTH_STEP_M)[0]), float(settled[0])

@@ -13,7 +13,7 @@ from fieldsid.artifacts import read_yaml
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
-from fieldsid.logs.run import SIMULATED
+from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
 from fieldsid.trial_folder.make import RUNS
@@ -22,8 +22,6 @@ METADATA_KEY = b"fieldsid"
 LOG, RUN, MODEL, PLANNED = "log", "run", "model", "planned"
 SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
 """Kinds of files that a user writes: they are read, and made of nothing."""
-BEYOND = ("saturated", "fin_limit")
-"""Codes of the findings that a fin went beyond its limit."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -110,7 +108,7 @@ def _item(path: Path, name: str, folder: Path) -> Item | None:
     if path.name.endswith(".parquet") and (head := _run_head(path)) is not None:
         notes = head.get("notes") or ()
         made = any(note.get("code") == SIMULATED for note in notes)
-        told = [n["data"] for n in notes if n.get("code") in BEYOND and "reach_rad" in (n.get("data") or {})]
+        told = [n["data"] for n in notes if n.get("code") in OF_LIMITS and "reach_rad" in (n.get("data") or {})]
         fins = {str(d["signal"]): float(d["reach_rad"]) for d in told}
         return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs"), folder), fins=fins)
     kind = own_kind(path) if path.suffix in (".yaml", ".yml") else None

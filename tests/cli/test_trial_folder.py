@@ -234,6 +234,25 @@ def test_status_tells_a_fin_limit_that_the_runs_contradict_until_it_is_corrected
     assert told["code"] == "vehicle"
 
 
+def test_what_was_beyond_a_limit_that_is_corrected_is_no_longer_said(run_cli, folder):
+    vehicle = folder / "vehicle.yaml"
+    vehicle.write_text(vehicle.read_text().replace("rudder_max_rad: 0.436", "rudder_max_rad: 0.1"))
+    for run in sorted((folder / "runs").iterdir()):
+        save_run(load_run(run), folder / "logs" / f"{run.stem}.csv")
+    assert "[saturated]" in run_cli("import", "logs/pulses_1.0.csv", "-o", "runs", "--force").err
+    identify = ("identify", "runs/pulses_1.0.parquet", "--axis", "yaw", "--json", "--force")
+
+    def told(*words):
+        body = run_cli(*words).json
+        return {w["code"] for f in body["fits"] for w in f["warnings"]}
+
+    assert "fin_at_limit" in told(*identify)
+    assert load_run(folder / "runs" / "pulses_1.0.parquet", fin_max_rad={"rudder_rad": 0.1}).notes[-1].code == "saturated"
+    vehicle.write_text(vehicle.read_text().replace("rudder_max_rad: 0.1", "rudder_max_rad: 0.4"))
+    assert not {"saturated", "fin_at_limit", "fin_limit"} & told(*identify)
+    assert "saturated" not in {n.code for n in load_run(folder / "runs" / "pulses_1.0.parquet").notes}
+
+
 def test_status_writes_nothing(run_cli, folder):
     before = (folder / "journal.jsonl").read_bytes()
     assert run_cli("status").code == 0

@@ -9,7 +9,7 @@ from cli import trial
 from rich.console import Console
 
 from fieldsid.cli.console import folded, shows_progress, table
-from fieldsid.cli.voice import take, voice
+from fieldsid.cli.voice import Voice, take, voice
 
 LONG = "run7: " + "the fin was at its limit for a long time, which says less of the authority; " * 3 + "[saturated]"
 
@@ -18,6 +18,11 @@ LONG = "run7: " + "the fin was at its limit for a long time, which says less of 
 def afterwards():
     yield
     take([])
+
+
+def test_the_voice_of_a_command_ends_with_it(run_cli):
+    run_cli("effects", "list", "--quiet", "--deg")
+    assert voice() == Voice()
 
 
 def test_a_quiet_command_does_not_say_where_it_goes_on_from(run_cli, tmp_path):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from fieldsid.plant.parameter_source import ParameterSource
     from fieldsid.schedule.record import Schedule
-    from fieldsid.schedule.verify import Check, Verification
+    from fieldsid.schedule.verify import Check, StepCheck, Verification
 
 SLOWED_SHARE = 0.995
 """Below it a row's share is not printed as 1.00."""
@@ -103,6 +103,7 @@ def render_verify(to: Console, checked: Verification, body: Mapping[str, Any]) -
 def _verify_row(check: Check, constant: Check) -> tuple[str, ...]:
     from fieldsid.rounding import number
 
+    small, usual, large = check.steps
     gain = "none" if check.gain_least_db == float("inf") else f"{check.gain_least_db:.1f}"
     return (
         number(check.speed, 3),
@@ -112,21 +113,22 @@ def _verify_row(check: Check, constant: Check) -> tuple[str, ...]:
         f"{check.delay_least_s:.2f}",
         f"{100 * check.overshoot:.0f}",
         f"{100 * check.overshoot_most:.0f}",
-        _settles(check.steps[0].settling),
-        _settles(check.settling),
-        _settles(check.settling_most),
-        _settles(check.steps[2].settling),
-        _settles(constant.settling),
+        _settles(small.settling, small),
+        _settles(usual.settling, usual),
+        _settles(usual.settling_most, usual),
+        _settles(large.settling, large),
+        _settles(constant.settling, constant.steps[1]),
         "knot" if check.knot else "",
     )
 
 
-def _settles(seconds: float) -> str:
+def _settles(seconds: float, step: StepCheck) -> str:
+    """Return how long a step takes to settle; that it was flown so long in vain; nothing where it is not said."""
     from math import isnan
 
     if isnan(seconds):
         return "-"
-    return f"{seconds:.1f}" if seconds != float("inf") else "never"
+    return f"{seconds:.1f}" if seconds != float("inf") else f">{step.flown:.0f}"
 
 
 def render_export(to: Console, body: Mapping[str, Any]) -> None:

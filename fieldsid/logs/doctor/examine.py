@@ -10,6 +10,7 @@ from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
 from fieldsid.logs.doctor.course_findings import course_findings
 from fieldsid.logs.doctor.fin_findings import fin_findings
+from fieldsid.logs.doctor.limit_findings import limit_findings
 from fieldsid.logs.doctor.pair_findings import pair_findings
 from fieldsid.logs.doctor.signal_findings import signal_findings
 from fieldsid.logs.doctor.stated import Stated
@@ -17,10 +18,6 @@ from fieldsid.logs.run import Note, Run
 
 JITTER_LIMIT = 0.2
 """Standard deviation of the sampling step over its median."""
-BEYOND_SHARE = 0.05
-"""Share of a run in which a command may be beyond the fin's limit."""
-FIN_ZERO = 0.0175
-"""How far off the zero of a fin may be, in rad: commands about a trim reach so far beyond the limit."""
 GAP_FACTOR = 2.5
 """A step longer than this many medians is a gap."""
 _FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
@@ -85,38 +82,4 @@ def _fins(run: Run, limits: Mapping[str, float]) -> list[Note]:
         found.append(Note("no_fin", message, {"signals": [s for s in run.signals if run.has(s)]}))
     if not any(run.has(s) for s in MAIN if s not in _FINS):
         found.append(Note("no_motion", "neither an angle nor a rate of yaw or pitch is in the log; map one of them", {}))
-    for fin, limit in limits.items():
-        found += _beyond(run, fin, limit)
-    return found
-
-
-def _beyond(run: Run, fin: str, limit: float) -> list[Note]:
-    """Return that a fin was measured, or commanded for long, beyond its limit (rad)."""
-    measured, stated = f"{fin.removesuffix('_rad')}_measured_rad", f"`{fin.removesuffix('_rad')}_max_rad` of vehicle.yaml"
-    name = measured if run.has(measured) else fin
-    if not run.has(name) or (share := _share(run, name, limit)) <= BEYOND_SHARE:
-        return []
-    reach = float(np.nanmax(np.abs(run[name])))
-    message = (
-        f"{name} goes to {reach:.3g} rad, beyond the fin's limit of {limit:.3g} rad for {100 * share:.0f} % of the run (limit "
-        f"{100 * BEYOND_SHARE:.0f} %): "
-    )
-    data = {"signal": name, "value": share, "limit": BEYOND_SHARE, "reach_rad": reach}
-    if name == measured:
-        return [Note("fin_limit", f"{message}correct {stated}", data)]
-    advice = f"where the fin goes so far, correct {stated}; where it stopped, the log does not show it: log the measured fin"
-    return [Note("saturated", message + advice, data)]
-
-
-def _share(run: Run, name: str, limit: float) -> float:
-    return float(np.mean(np.abs(run[name][np.isfinite(run[name])]) > limit + FIN_ZERO))
-
-
-def share_beyond(run: Run, fin: str, limit: float) -> float:
-    """Return the share of a run in which a fin's command is beyond its limit (rad); one that is at it shows where the fin is.
-
-    Nothing is hidden where the fin itself was measured.
-    """
-    if run.has(f"{fin.removesuffix('_rad')}_measured_rad") or fin.endswith("_measured_rad"):
-        return 0.0
-    return _share(run, fin, limit)
+    return [*found, *limit_findings(run, limits)]

@@ -17,7 +17,7 @@ def compile_loops() -> None:
     none, push, out = np.zeros((1, GAIN_COLUMNS)), np.zeros(2), np.zeros((1, 2, OUT_COLUMNS))
     p, time = np.ones(COEFFICIENTS), np.array([0.0, STEP_S])
     time.setflags(write=False)  # as that of a run is
-    simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2))
+    simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2), STEP_S)
     settle(p, 1.0, 0.0)
     close_loop(np.zeros((1, PLANT_COLUMNS)), none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
     close_hull_loop(np.ones((1, COEFFICIENTS)), np.ones((1, SETTINGS)), none, 0.0, 1.0, STEP_S, push, out)

@@ -12,12 +12,12 @@ from fieldsid.display import Brief
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.flown.closed_loop_kernel import OUT_COLUMNS, close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
+from fieldsid.schedule.flown.pace import STEP_S
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.record import Row
 
-STEP_S = 0.02
-HULL_STEP_S = 0.04
-"""Of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth (test_hull_flights.py)."""
+HULL_STEPS = 2.0
+"""Steps of a plant in one of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth."""
 SETTLING_BAND = 0.05
 FASTEST_LAG_S = 1e-6
 TAIL_SHARE = 0.25
@@ -96,73 +96,92 @@ def steady_error(values: FloatArray, wanted: float) -> FloatArray:
 
 
 def step_response(
-    plant: LinearPlant, rows: Sequence[Row] | Row, *, reference: float, seconds: float, offset: float = 0.0
+    plant: LinearPlant,
+    rows: Sequence[Row] | Row,
+    *,
+    reference: float,
+    seconds: float,
+    offset: float = 0.0,
+    step_s: float = STEP_S,
 ) -> Steps:
     """Return the response of every draw of a plant to a step of the reference (rad) at time 0, under a row's gains or rows'.
 
-    `offset` (rad) is added to the fin: a bent fin, on top of the plant's own trim.
+    `offset` (rad) is added to the fin: a bent fin, on top of the plant's own trim. `step_s` (s) is the plant's time step.
     """
-    return _run(plant, rows, reference, 0.0, seconds, offset, 0.0)
+    return _run(plant, rows, _Flight(seconds, step_s, reference=reference, offset=offset))
 
 
-def depth_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, step: float, seconds: float, pitch_limit: float) -> Steps:
-    """Return the response to a step of the wanted depth (m) through pitch, z' = -u theta, pitch asked within pitch_limit."""
-    return _run(plant, rows, 0.0, step, seconds, 0.0, pitch_limit)
-
-
-def leg_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, push: FloatArray) -> Steps:
-    """Return a straight leg under a disturbance moment push (t,) rad/s^2, a value for each 0.02 s."""
-    return _run(plant, rows, 0.0, 0.0, STEP_S * (push.size - 1), 0.0, 0.0, push)
-
-
-def _run(
+def depth_response(
     plant: LinearPlant,
     rows: Sequence[Row] | Row,
-    reference: float,
-    depth: float,
+    *,
+    step: float,
     seconds: float,
-    offset: float,
     pitch_limit: float,
-    push: FloatArray | None = None,
+    step_s: float = STEP_S,
 ) -> Steps:
+    """Return the response to a step of the wanted depth (m) through pitch, z' = -u theta, pitch asked within pitch_limit."""
+    return _run(plant, rows, _Flight(seconds, step_s, depth=step, pitch_limit=pitch_limit))
+
+
+def leg_response(plant: LinearPlant, rows: Sequence[Row] | Row, *, push: FloatArray, step_s: float = STEP_S) -> Steps:
+    """Return a straight leg under a disturbance moment push (t,) rad/s^2, a value for each time step of `step_s` s."""
+    return _run(plant, rows, _Flight(step_s * (push.size - 1), step_s), push)
+
+
+@dataclass(frozen=True, slots=True)
+class _Flight:
+    """What is flown for `seconds` in steps of `step` s: reference (rad), depth (m) within a pitch (rad), fin offset (rad)."""
+
+    seconds: float
+    step: float
+    reference: float = 0.0
+    depth: float = 0.0
+    pitch_limit: float = 0.0
+    offset: float = 0.0
+
+    def times(self, steps: float = 1.0) -> FloatArray:
+        """Return the times (t,) s of a flight in steps of so many of its own."""
+        whole = steps * self.step
+        return whole * np.arange(round(self.seconds / whole) + 1, dtype=np.float64)
+
+
+def _run(plant: LinearPlant, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None = None) -> Steps:
     if plant.hull is not None:
-        return _run_hulls(plant, plant.hull, rows, reference, seconds, offset, push)
+        return _run_hulls(plant, plant.hull, rows, flight, push)
     plants = np.column_stack(
         [
-            plant.damping, plant.stiffness, plant.authority, plant.offset + offset, plant.quadratic, plant.beyond_square,
+            plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, plant.quadratic, plant.beyond_square,
             plant.crossflow, plant.cross_damping, plant.cross_rate, plant.cross_fin, plant.cross_quadratic,
-            np.exp(-STEP_S / np.maximum(plant.lag, FASTEST_LAG_S)), np.round(plant.delay / STEP_S),
-            np.minimum(plant.fin_rate, 1e6) * STEP_S, plant.powers, plant.speed_loss,
+            np.exp(-flight.step / np.maximum(plant.lag, FASTEST_LAG_S)), np.round(plant.delay / flight.step),
+            np.minimum(plant.fin_rate, 1e6) * flight.step, plant.powers, plant.speed_loss,
         ]
     )  # fmt: skip
-    table = _table(rows)
-    count = round(seconds / STEP_S) + 1
-    out = np.zeros((plant.count, count, OUT_COLUMNS))
-    pushed = np.zeros(count) if push is None else push
-    close_loop(np.ascontiguousarray(plants), table, reference, depth, pitch_limit, plant.speed, STEP_S, pushed, out)
-    angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
-    return Steps(STEP_S * np.arange(count, dtype=np.float64), angle, fin, deep, speed)
+    time = flight.times()
+    out = np.zeros((plant.count, time.size, OUT_COLUMNS))
+    pushed = np.zeros(time.size) if push is None else push
+    asked = (flight.reference, flight.depth, flight.pitch_limit)
+    close_loop(np.ascontiguousarray(plants), _table(rows), *asked, plant.speed, flight.step, pushed, out)
+    return _steps(time, out)
 
 
 def _run_hulls(
-    plant: LinearPlant,
-    hull: FloatArray,
-    rows: Sequence[Row] | Row,
-    reference: float,
-    seconds: float,
-    offset: float,
-    push: FloatArray | None,
+    plant: LinearPlant, hull: FloatArray, rows: Sequence[Row] | Row, flight: _Flight, push: FloatArray | None
 ) -> Steps:
     """Return the flights of a plant's vehicles in surge, sway and yaw."""
     way = np.where(plant.authority < 0.0, 1.0, -1.0)
     limited = np.minimum(plant.fin_rate, 1e6)
-    settings = np.column_stack([way, plant.offset + offset, np.maximum(plant.lag, FASTEST_LAG_S), limited, plant.delay])
-    count = round(seconds / HULL_STEP_S) + 1
-    pushed = np.zeros(count) if push is None else np.interp(HULL_STEP_S * np.arange(count), STEP_S * np.arange(push.size), push)
-    out = np.zeros((plant.count, count, OUT_COLUMNS))
-    close_hull_loop(np.ascontiguousarray(hull), settings, _table(rows), reference, plant.speed, HULL_STEP_S, pushed, out)
+    settings = np.column_stack([way, plant.offset + flight.offset, np.maximum(plant.lag, FASTEST_LAG_S), limited, plant.delay])
+    time, step = flight.times(HULL_STEPS), HULL_STEPS * flight.step
+    pushed = np.zeros(time.size) if push is None else np.interp(time, flight.times(), push)
+    out = np.zeros((plant.count, time.size, OUT_COLUMNS))
+    close_hull_loop(np.ascontiguousarray(hull), settings, _table(rows), flight.reference, plant.speed, step, pushed, out)
+    return _steps(time, out)
+
+
+def _steps(time: FloatArray, out: FloatArray) -> Steps:
     angle, fin, deep, speed = (np.ascontiguousarray(out[:, :, j].T) for j in range(OUT_COLUMNS))
-    return Steps(HULL_STEP_S * np.arange(count, dtype=np.float64), angle, fin, deep, speed)
+    return Steps(time, angle, fin, deep, speed)
 
 
 def _table(rows: Sequence[Row] | Row) -> FloatArray:

@@ -6,10 +6,11 @@ off by on hulls of the ensemble and on the field vehicle (`FORM_LOG_SD`, `UNSEEN
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,20 +21,21 @@ from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.yaw_plant import steady_fins
-from fieldsid.turning.maneuvering.equations import coefficients, simulate
+from fieldsid.turning.maneuvering.equations import coefficients, longest_step, simulate
 from fieldsid.turning.maneuvering.fit import FARTHEST_PRIOR_COST, Fitted, fit_maneuvering
 from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
 from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
 from fieldsid.turning.model_error import STALL_LOG_SD
 from fieldsid.turning.steady.transient import Transient, read_off
 
+T = TypeVar("T")
 SEED = 20240511
 FORM_LOG_SD = 0.025
 """Log error of the equations where the turn was flown: 0.4 % on the ensemble (seed 1), 0.5 to 4 % on a vehicle outside it."""
 UNSEEN_LOG_SD = 0.16
 """More for each share of the turn's curvature that was not flown: with pulses alone the ensemble (seed 1) was off by 10 %."""
-TRACK_STEP_S = 0.05
-MAX_TRACK_S = 240.0
+TRACK_STEPS = 4800
+"""Of a turn through 180 deg: four minutes of a vehicle, 200 lengths of a ship."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,16 +108,17 @@ class Belief:
         return largest
 
     def _transient(self, entry: float, fin: float, side: float) -> Transient:
-        time = np.arange(0.0, MAX_TRACK_S, TRACK_STEP_S)
+        best = coefficients(self.fitted.vector)
+        step = longest_step(float(best[0]), entry)
+        time = step * np.arange(TRACK_STEPS, dtype=np.float64)
         time.setflags(write=False)  # as that of a run is: what is compiled for one serves the other
         path = np.full((time.size - 1, 2), fin)
         path[0, 0] = 0.0
-        best = coefficients(self.fitted.vector)
         first = np.array([[entry, 0.0, 0.0]])
-        motion = simulate(best, entry, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size))
+        motion = simulate(best, entry, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), step)
         u, v, heading = motion[SURGE], motion[SWAY], motion[HEADING]
         along, across = u * np.cos(heading) - v * np.sin(heading), u * np.sin(heading) + v * np.cos(heading)
-        whole = np.cumsum(np.stack([along, across, np.hypot(u, v)]), axis=1) * TRACK_STEP_S
+        whole = np.cumsum(np.stack([along, across, np.hypot(u, v)]), axis=1) * step
         track = np.concatenate([heading[None], whole - whole[:, :1]]).T[:, :, None]
         return read_off(time, track, side)
 
@@ -125,18 +128,29 @@ def believe(runs: Sequence[Run], models: Sequence[Model], length: float | None, 
 
     Raises ModelError where the fit or its posterior has no finite solution.
     """
-    flown = usable_runs(runs, models)
-    if not flown:
+    fitted = fitted_to(runs, models, length, seed)
+    if fitted is None:
         return None
+    known = _Known(usable_runs(runs, models), length, seed)
+    return Belief(fitted, _finite(lambda: _drawn(known), known.flown), tuple(models))
+
+
+def fitted_to(runs: Sequence[Run], models: Sequence[Model], length: float | None, seed: int = SEED) -> Fitted | None:
+    """Return the fit that a belief rests on, without its draws, which take longer; None and errors as `believe`."""
+    flown = usable_runs(runs, models)
+    return _finite(lambda: _fitted(_Known(flown, length, seed)), flown) if flown else None
+
+
+def _finite(of: Callable[[], T], flown: Sequence[FlownRun]) -> T:
+    """Return what a function of some runs finds; raises ModelError where that is nothing finite."""
     try:
-        fitted, posterior = _found(_Known(flown, length, seed))
+        return of()
     except np.linalg.LinAlgError as error:
         raise ModelError(
             "surge, sway and yaw cannot be fitted to all runs at once",
             found=f"{error} ({', '.join(r.name for r in flown)})",
-            hint="look at these runs with `sysid check`, and leave out what no vehicle does",
+            hint="look at these runs with `sysid inspect`, and leave out what no vehicle does",
         ) from error
-    return Belief(fitted, posterior, tuple(models))
 
 
 def not_fitted(error: ModelError, runs: Sequence[Run]) -> Note:
@@ -152,7 +166,7 @@ def like_no_vehicle(fitted: Fitted, length: float | None) -> Note:
     words = (
         "what all runs together make of surge, sway and yaw lies where no vehicle does: "
         f"{away:.0f} from the vehicles known, 999 of 1000 lie below {FARTHEST_PRIOR_COST:.0f} ({', '.join(runs)}); "
-        f"each speed's own model is taken instead: {hint}look at the runs with `sysid check`, or fly a zig-zag"
+        f"each speed's own model is taken instead: {hint}look at the runs with `sysid inspect`, or fly a zig-zag"
     )
     return Note("like_no_vehicle", words, {"runs": runs, "value": away, "limit": FARTHEST_PRIOR_COST})
 
@@ -177,10 +191,15 @@ class _Known:
 
 
 @lru_cache(maxsize=4)
-def _found(known: _Known) -> tuple[Fitted, Posterior]:
-    """Return fit and draws; a turn, the gains and their check of one morning rest on the same runs."""
-    fitted = fit_maneuvering(known.flown, known.length)
-    return fitted, draw_posterior(fitted, np.random.default_rng(known.seed))
+def _fitted(known: _Known) -> Fitted:
+    """Return the fit; a turn, the gains and their check of one morning rest on the same runs."""
+    return fit_maneuvering(known.flown, known.length)
+
+
+@lru_cache(maxsize=4)
+def _drawn(known: _Known) -> Posterior:
+    """Return the draws."""
+    return draw_posterior(_fitted(known), np.random.default_rng(known.seed))
 
 
 def _fin(models: Sequence[Model], speed: float, rudder: float, side: float) -> float:

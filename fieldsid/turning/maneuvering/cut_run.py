@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.turning.maneuvering.equations import simulate
+from fieldsid.turning.maneuvering.equations import longest_step, simulate
 from fieldsid.turning.maneuvering.flown import HEADING, RATE, SURGE, SWAY, FlownRun
 
 OWN = 3
@@ -30,18 +30,22 @@ LARGEST_RESIDUAL = 1e6
 
 @dataclass(frozen=True, slots=True)
 class CutRun:
-    """A run whose segments begin at samples `begins` (m,), the nuisances (3 + 3 m,) measured there, one over their spread."""
+    """A run whose segments begin at samples `begins` (m,), the nuisances (3 + 3 m,) measured there, one over their spread.
+
+    `longest` is the longest time step, s.
+    """
 
     run: FlownRun
     begins: npt.NDArray[np.int64]
     first: FloatArray
     weight: FloatArray
+    longest: float
 
     def misfit(self, p: FloatArray, local: FloatArray) -> FloatArray:
         """Return measured less simulated (4, n) with coefficients p and nuisances `local`, NaN where nothing was measured."""
         run, states = self.run, local[OWN:].reshape(-1, 3)
         straight = max(float(local[0]), LEAST_STRAIGHT_M_S)
-        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust)
+        out = simulate(p, straight, states, self.begins, run.time, run.fin, run.thrust, self.longest)
         out[RATE] += local[1]
         out[HEADING] += local[1]
         out[SWAY] += local[2]
@@ -76,8 +80,8 @@ def _square_sum(misfit: FloatArray, measured: FloatArray, spread: FloatArray) ->
     return total
 
 
-def cut_run(run: FlownRun, segment_s: float) -> CutRun:
-    """Return a run cut into segments of about `segment_s`."""
+def cut_run(run: FlownRun, segment_s: float, length: float) -> CutRun:
+    """Return a run cut into segments of about `segment_s`, of a vehicle about `length` m long."""
     begins = run.begins(segment_s)
     states = np.zeros((begins.size, 3))
     for i, begin in enumerate(begins):
@@ -89,4 +93,6 @@ def cut_run(run: FlownRun, segment_s: float) -> CutRun:
             elif channel == SURGE:
                 states[i, j] = run.speed
     spread = np.concatenate([[run.speed_sd, run.rate_bias_sd, SWAY_BIAS_SD], np.full(states.size, STATE_SD)])
-    return CutRun(run, begins, np.concatenate([[run.speed, 0.0, 0.0], states.ravel()]), 1.0 / spread)
+    return CutRun(
+        run, begins, np.concatenate([[run.speed, 0.0, 0.0], states.ravel()]), 1.0 / spread, longest_step(length, run.speed)
+    )

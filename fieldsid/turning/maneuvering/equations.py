@@ -32,7 +32,10 @@ LOGARITHMS = {
 }  # fmt: skip
 IN_LOGARITHM = np.array([n in LOGARITHMS for n in NAMES])
 REFERENCE_SPEED_M_S = 1.5
-STEP_S = 0.05
+LENGTHS_A_STEP = 1.0 / 24.0
+"""The longest time step, in the time that the hull takes over its own length: its modes turn by less than a fifth in it."""
+FINEST_STEP_S = 0.05
+"""A step that logs of vehicles have, and that the smallest of them need no finer."""
 STATIONS = np.linspace(-0.45, 0.45, 10)
 HEIGHTS = 0.1 * np.sqrt(1.0 - np.abs(2.0 * STATIONS) ** 3)
 SUMS = np.concatenate([np.zeros((1, 4)), np.cumsum(HEIGHTS[:, None] * STATIONS[:, None] ** np.arange(4), axis=0)])
@@ -102,10 +105,12 @@ def simulate(
     time: FloatArray,
     fin: FloatArray,
     thrust: FloatArray,
+    longest: float,
 ) -> FloatArray:
     """Return surge, sway, rate and heading (4, n) of a run in segments that begin at samples `begins` with states (m, 3).
 
-    fin (n-1, 2) rad at either end of each interval before the servo's lag, thrust (n,) over the straight run's.
+    fin (n-1, 2) rad at either end of each interval before the servo's lag, thrust (n,) over the straight run's; `longest` (s) is
+    the longest time step (`longest_step`).
     """
     count = time.size
     out = np.empty((4, count))
@@ -113,6 +118,7 @@ def simulate(
     angle = fin[0, 0]
     segment = 0
     lift = rudder_lift(p, straight)
+    last, keep, half = 0.0, 0.0, 0.0
     for i in range(count):
         if segment < begins.size and i == begins[segment]:
             u, v, r = first[segment, 0], first[segment, 1], first[segment, 2]
@@ -121,9 +127,10 @@ def simulate(
         if i == count - 1:
             break
         whole = time[i + 1] - time[i]
-        pieces = max(math.ceil(whole / STEP_S - 1e-6), 1)
+        pieces = max(math.ceil(whole / longest - 1e-6), 1)
         h = whole / pieces
-        keep, half = math.exp(-h / p[14]), math.exp(-0.5 * h / p[14])
+        if h != last:
+            last, keep, half = h, math.exp(-h / p[14]), math.exp(-0.5 * h / p[14])
         for j in range(pieces):
             asked = fin[i, 0] + (fin[i, 1] - fin[i, 0]) * (j + 0.5) / pieces
             between = angle + min(max((asked - angle) * (1.0 - half), -0.5 * h * p[16]), 0.5 * h * p[16])
@@ -163,6 +170,11 @@ def settle(p: FloatArray, straight: float, fin: float) -> FloatArray:
                 return np.array([u, v, r])
             low, high = 1e9, -1e9
     return np.full(3, np.nan)
+
+
+def longest_step(length: float, speed: float) -> float:
+    """Return the longest time step (s) for a hull of a length (m) at a speed (m/s)."""
+    return max(LENGTHS_A_STEP * length / speed, FINEST_STEP_S)
 
 
 def coefficients(theta: FloatArray) -> FloatArray:

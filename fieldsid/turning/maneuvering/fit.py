@@ -190,7 +190,8 @@ class _Problem:
 
 
 def _problem(runs: Sequence[FlownRun], segment_s: float, mean: FloatArray, precision: FloatArray) -> _Problem:
-    return _Problem(tuple(cut_run(r, segment_s) for r in runs), segment_s, mean, precision)
+    length = float(np.exp(mean[0]))
+    return _Problem(tuple(cut_run(r, segment_s, length) for r in runs), segment_s, mean, precision)
 
 
 def _normal(cut: CutRun, vector: FloatArray, local: FloatArray, noise: FloatArray) -> _Normal:

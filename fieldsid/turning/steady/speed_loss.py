@@ -20,7 +20,10 @@ from fieldsid.models.record import knows_speed, record_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.block_means import block_means, block_width
 
-BLOCK_S = 0.2
+BLOCK_S, BLOCK_SHARE = 0.2, 0.2
+"""Block means are of 0.2 s, or of a fifth of the time in which a slow vehicle takes up its largest rate: its speed is slower."""
+LEAST_BLOCKS = 200
+"""A run keeps so many blocks, however slow it is."""
 LEAST_SAMPLES = 40
 LEAST_TURN_RAD_S = 0.03
 TYPICAL_LOSS = 0.15
@@ -148,7 +151,7 @@ def _case(run: Run) -> _Case | None:
         if angle_only
         else np.interp(record.time, record.time[record.rate_ok], record.rate[record.rate_ok])
     )
-    width = block_width(record.steps, BLOCK_S)
+    width = block_width(record.steps, max(BLOCK_S, BLOCK_SHARE * _time_of_change(record.time, rate)))
     none = np.full(len(record), np.nan)
     thrust = record.signals.get("thrust")
     start = float(np.median(thrust[: max(10, thrust.size // 20)])) if thrust is not None else 0.0
@@ -159,6 +162,17 @@ def _case(run: Run) -> _Case | None:
     if blocks[0].size < LEAST_SAMPLES or float(np.max(np.abs(blocks[3]))) < LEAST_TURN_RAD_S:
         return None
     return _Case(*blocks)
+
+
+def _time_of_change(time: FloatArray, rate: FloatArray) -> float:
+    """Return the largest rate over its largest derivative, s, in block means: noise makes it shorter; it leaves blocks enough."""
+    width = block_width(np.diff(time), BLOCK_S)
+    blocks, at = block_means(rate, width), block_means(time, width)
+    if blocks.size < LEAST_SAMPLES:
+        return 0.0
+    change = float(np.max(np.abs(np.gradient(blocks, at))))
+    longest = float(time[-1] - time[0]) / LEAST_BLOCKS / BLOCK_SHARE
+    return min(float(np.max(np.abs(blocks))) / change, longest) if change > 0.0 else 0.0
 
 
 def _filled(run: Run, name: str, none: FloatArray) -> FloatArray:

@@ -106,6 +106,8 @@ class StepCheck(Shape):
     """What still swings in the last quarter of the flight, peak to peak."""
     steady_error_most_rad: Number
     """How far from what was asked it comes to rest, by 95 % of the draws: the error of the trim."""
+    flown_s: Number
+    """How long it was flown."""
 
 
 class Check(Shape):
@@ -157,6 +159,8 @@ class Check(Shape):
     """Overshoot of a step of depth."""
     depth_settling_s: Number
     """Its settling time."""
+    depth_flown_s: Number
+    """How long it was flown."""
 
 
 class Worst(Shape):

@@ -34,7 +34,7 @@ def run(p, fin, seconds=20.0, step=0.1, simulated=simulate):
     time = np.arange(0.0, seconds, step)
     path = np.full((time.size - 1, 2), fin)
     first = np.array([[1.5, 0.0, 0.0]])
-    return simulated(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size))
+    return simulated(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), 0.05)
 
 
 def test_a_straight_run_stays_straight_and_keeps_its_speed():
@@ -88,7 +88,7 @@ def test_growth_is_that_of_a_small_disturbance():
     time = np.arange(0.0, 6.0, 0.05)
     first = np.array([[1.5, 0.0, 1e-9]])
     path = np.zeros((time.size - 1, 2))
-    rate = simulate(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size))[2]
+    rate = simulate(p, 1.5, first, np.zeros(1, dtype=np.int64), time, path, np.ones(time.size), 0.05)[2]
     assert np.log(rate[-1] / rate[-21]) == pytest.approx(growth, rel=0.02)
 
 
