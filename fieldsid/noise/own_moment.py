@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
@@ -24,9 +25,11 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
-FIN_REPEATABILITY_RAD = 0.0017 / np.sqrt(12.0)
-"""Largest standard deviation, as an angle of the fin, of where its middle comes back to: anywhere in a tenth of a degree, the
-dead band of a digital servo and its linkage. A moment that differs more from run to run is no trim."""
+DEAD_BAND_RAD = 0.0017
+"""A tenth of a degree: the dead band of a digital servo and its linkage, anywhere in which the middle of a fin may lie."""
+FIN_REPEATABILITY_RAD = DEAD_BAND_RAD / sqrt(12.0)
+"""The standard deviation of that, the largest of the runs' own moments as an angle of the fin: one that differs more from run to
+run is no trim."""
 MIN_OWN_MOMENT_GAIN = 0.5
 """Log likelihood that moments of the runs' own must gain: half a unit is what one parameter gains by chance."""
 STD_GRID = np.geomspace(1e-3, 1.0, 61)

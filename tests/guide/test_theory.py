@@ -14,6 +14,7 @@ from fieldsid.fitting.checks import parameter_checks, score_tests
 from fieldsid.fitting.covariance import reml
 from fieldsid.fitting.predict import speed_correction
 from fieldsid.fitting.problem import parameters
+from fieldsid.noise import own_moment
 from fieldsid.schedule import verify
 from fieldsid.turning import model_error, paper_formulas, radius
 
@@ -37,6 +38,7 @@ NUMBERS = {
     "p-value below which `auto` takes no residual for a disturbance": auto_method.MIN_P_VALUE,
     "free-run error of `pem` over that of output error, for `auto`, where a test rejects": auto_method.MAX_FREE_RUN_RATIO,
     "share that a measured speed is off by": speed_correction.MEASURED_SPEED_STD_ERROR,
+    "dead band in which the middle of a fin lies, rad": own_moment.DEAD_BAND_RAD,
     "shortest delay that is said, s": score_tests.MIN_DELAY_S,
     "correlation that is said": parameter_checks.MAX_CORRELATION,
     "width of a group of speeds, log": parameters.GROUP_WIDTH,
