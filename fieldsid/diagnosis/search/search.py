@@ -146,12 +146,13 @@ class Search(MoveEvaluation):
         """Start again under another kind of noise (once each), or under the other trim law, where that fits better.
 
         A missing effect may have biased the first choice. Likelihoods compare only under one kind of noise, and a disturbance
-        that stands for coloured sensor noise lets the heading drift at no cost. The best model is kept, fitted again.
+        that stands for coloured sensor noise lets the heading drift at no cost. The kind is asked of the most evident model, in
+        whose residuals the least is missing. The best model is kept, fitted again.
         """
         if not self.budget.remaining():
             return False
         found = self.best_admissible()
-        noise = partial(fit_other_noise, found, self.floor, self.tried.noise_kinds, self.parallel)
+        noise = partial(fit_other_noise, self._most_evident(), self.floor, self.tried.noise_kinds, self.parallel)
         ml_fit, again = self.trim_laws.best_alternative(
             found, self.tried, self.floor, self.resolution_floor, self.parallel, noise
         )
