@@ -14,7 +14,7 @@ import numpy as np
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import is_accepted
+from fieldsid.diagnosis.evidence.acceptance import common_own_moment, is_accepted
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
@@ -130,6 +130,8 @@ def _extension(
 ) -> Extension:  # fmt: skip
     """Return the extension from a model without the new effects to one with them, both fitted by one search."""
     learned, judged = work.records, work.validation
+    told = common_own_moment(before, after)
+    before, after = before.with_own_moment(told), after.with_own_moment(told)
     work.update_noise_floor(after.likelihood_fit.fitted)
     # as `diagnose` has it: what runs without noise leave over is no colour of a sensor's
     ended_with = after.likelihood_fit if work.is_noiseless else joint_noise_fit(after.likelihood_fit, work.parallel)

@@ -104,7 +104,7 @@ def command(
     body["skipped_runs"] = skips.records
     if output is not None:
         body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
-    headline, notes = of_turn(body, models, source), prediction.notes
+    headline, notes = of_turn(body, models), prediction.notes
     result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
     return result

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.cli.voice import shown_in
 from fieldsid.rounding import number, with_error
-
-if TYPE_CHECKING:
-    from fieldsid.plant.parameter_source import ParameterSource
 
 TARGET = "ros2"
 SLOWER = 60.0
@@ -40,8 +36,8 @@ def of_fit(body: Body) -> Headline:
     return Headline(says, rests, pasted("schedule", "design", body["file"], "-o", "gains.yaml"))
 
 
-def of_turn(body: Body, models: Sequence[Path], source: ParameterSource) -> Headline:
-    """Return the tightest turn of both sides with its band; where the band alone is known, the circles to fly come next."""
+def of_turn(body: Body, models: Sequence[Path]) -> Headline:
+    """Return the tightest turn of both sides with its band; where the band alone is known, what tells the radius."""
     from fieldsid.turning.known_radius import turn_words
     from fieldsid.turning.prediction import found_by
 
@@ -57,21 +53,8 @@ def of_turn(body: Body, models: Sequence[Path], source: ParameterSource) -> Head
     times, unit = shown_in("rad")
     rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
     rests = f"{named([str(m) for m in models])}, {rudder}; {found_by(methods)}, {counted(len(speeds), 'speed')}; {circles}"
-    if tightest["band_only"]:
-        return Headline(f"{says}: one and a half circles tell it", rests, _circles(tightest, body["rudder_max_rad"], source))
+    says += ": one and a half circles tell it" if tightest["band_only"] else ""
     return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
-
-
-def _circles(row: Mapping[str, Any], rudder: float, source: ParameterSource) -> str:
-    """Return the plan of the circles that settle a row, by the model of its speed."""
-    speed = float(row["speed_m_s"])
-    known = (
-        ("--model", source.paths[max(source.near(speed), key=lambda n: n[1])[0]])
-        if source.models and not source.is_fit_file
-        else ()
-    )
-    fin = f"{rudder:.4g}rad"
-    return pasted("plan", "--axis", "yaw", "--speeds", f"{speed:.4g}", *known, "--radius", "--fin-max", fin, "-o", "plan")
 
 
 def of_design(body: Body, models: Sequence[Path]) -> Headline:

@@ -33,7 +33,7 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
     `compared_errors` for which validation error.
     """
     before, now = compared_errors(without, with_)
-    was, left = (h.train_under(_common_own_moment(without, with_)) for h in (without, with_))
+    was, left = (h.train_under(common_own_moment(without, with_)) for h in (without, with_))
     unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
     explains = floor is not None and _explains_most((before, was), (now, left), floor)
@@ -47,13 +47,13 @@ def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, E
     least kept, the latter. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are
     the same, and what a model lacks is no trim that differs from run to run.
     """
-    std = _common_own_moment(without, with_)
+    std = common_own_moment(without, with_)
     pairs = tuple(zip(without.unseen_under(std), with_.unseen_under(std), strict=True))
     lower = next((pair for pair in pairs if pair[1].mean < pair[0].mean), None)
     return lower or next((pair for pair in pairs if _keeps(*pair)), pairs[0])
 
 
-def _common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
+def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
     """Return the standard deviation (rad/s^2) of the runs' own moments that the more evident of two models tells."""
     return max((without, with_), key=lambda h: h.log_evidence).own_moment
 
