@@ -6,6 +6,9 @@ whose jump was made at some time since the sample before, by half a step h/2 on 
 
     T_hat - 2 s_T <= T <= T_hat + 2 s_T + h/2,    s_T = s_a / a^2
 
+A measured fin is straight between samples, where it in truth moved at some time between them: with n changes of the fin that are
+alike, (sum |d|)^2 / sum d^2 of its changes d, their mean time is off by h / sqrt(12 n), and s_T^2 larger by the square of that.
+
 Where h > T_hat, and what is open is no less than T_hat itself, a vehicle that answers at once fits too: the gain is known, the
 damping from below alone. A model with a lag or a hidden state has slower poles than that of the hull, and is not asked.
 """
@@ -40,7 +43,8 @@ def sampling_findings(model: Model, records: Sequence[Record]) -> tuple[Note, ..
     if not damping * step > 1.0:
         return ()
     constant = 1.0 / damping
-    of_fit = INTERVAL_STD_ERRORS * float(np.nan_to_num(model.std_error(names.damping))) * constant**2
+    of_time = float(np.nan_to_num(model.std_error(names.damping))) * constant**2
+    of_fit = INTERVAL_STD_ERRORS * float(np.hypot(of_time, 0.0 if is_held else step / np.sqrt(12.0 * _changes(records))))
     longest = constant + of_fit + (0.5 * step if is_held else 0.0)
     name, run = model.shown(names.damping), ", ".join(repr(r.name) for r in records)
     apart = f"samples {step:.3g} s apart"
@@ -63,6 +67,13 @@ def sampling_findings(model: Model, records: Sequence[Record]) -> tuple[Note, ..
             {"value": damping, "low": 1.0 / longest, "limit": 1.0 / step, "run": records[0].name},
         ),
     )
+
+
+def _changes(records: Sequence[Record]) -> float:
+    """Return how many changes of the fin, all alike, would tell as much as those of some runs."""
+    moves = np.concatenate([np.abs(np.diff(r.fin)) for r in records])
+    squares = float(moves @ moves)
+    return max(float(moves.sum()) ** 2 / squares, 1.0) if squares > 0.0 else 1.0
 
 
 def _open(step: float, *, is_held: bool) -> str:

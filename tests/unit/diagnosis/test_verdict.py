@@ -25,6 +25,7 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
         selection_errors=errors(before),
         train=errors(before),
         own_moment=0.0,
+        log_evidence=0.0,
         unseen_under=lambda _std: (errors(before), errors(before)),
     )
     found = SimpleNamespace(
@@ -34,6 +35,7 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
         validation=(),
         validation_errors=errors(after),
         own_moment=0.0,
+        log_evidence=50.0,
         unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
     search = SimpleNamespace(floor=FLOOR, root=frozenset(), base=lambda: base, is_noiseless=noiseless)

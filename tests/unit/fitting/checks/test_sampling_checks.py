@@ -40,10 +40,13 @@ def glider(damping: float, step: float, *, measured: bool, seed: int = 1, gain: 
     return Run("glider", time, {"yaw_rad": angle[every] + 0.01 * random.standard_normal(time.size), name: fin[every]})
 
 
-@pytest.mark.parametrize(("damping", "measured"), [(1.0, False), (10.0, False), (45.0, False), (45.0, True)])
-def test_a_time_constant_far_below_the_sampling_is_refused_with_its_gain_and_a_true_bound(damping, measured):
+@pytest.mark.parametrize(
+    ("damping", "measured", "seed"),
+    [(1.0, False, 1), (10.0, False, 1), (45.0, False, 1), (45.0, True, 1), (45.0, True, 3), (45.0, True, 6)],
+)
+def test_a_time_constant_far_below_the_sampling_is_refused_with_its_gain_and_a_true_bound(damping, measured, seed):
     with pytest.raises(DataError, match=r"4\.5 s apart do not tell a time constant") as refused:
-        identify([glider(damping, 4.5, measured=measured)], Axis.YAW)
+        identify([glider(damping, 4.5, measured=measured, seed=seed)], Axis.YAW)
     gain, bound = (float(refused.value.found.split(s)[1].split()[0]) for s in ("b2/a22 = ", "a22 is above "))
     assert gain == pytest.approx(-0.25, rel=0.1)
     assert 0.0 < bound < damping
