@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fieldsid.models.record import Record
 from fieldsid.noise.kalman.transition import transition
+from fieldsid.noise.whiten import base_dynamics
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 
@@ -76,7 +77,7 @@ def score_covariance(record: Record, noise: FloatArray, damping: float, stiffnes
     """Return J' W S W J (P, P) of one run for weighted sensitivities W J (P, 2, n) under a noise vector (7,)."""
     out = np.zeros((weighted.shape[0], weighted.shape[0]))
     score_covariance_kernel(
-        record.nominal_steps, record.ok, max(damping, 1e-3), max(stiffness, 0.0), noise,
+        record.nominal_steps, record.ok, *base_dynamics(damping, stiffness), noise,
         np.ascontiguousarray(weighted), out,
     )  # fmt: skip
     return np.asarray(out + np.tril(out, -1).T)

@@ -14,7 +14,7 @@ from fieldsid.models.record import Record
 from fieldsid.noise.innovations import innovations
 from fieldsid.noise.maximum_likelihood import estimate_noise
 from fieldsid.noise.noise_kinds import JOINT_NOISE, NOISE_KINDS
-from fieldsid.noise.whiten import noise_vector
+from fieldsid.noise.whiten import base_dynamics, noise_vector
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.ljung_box import MIN_WHITENESS_P, ljung_box_p
 
@@ -47,7 +47,7 @@ def linearise_runs(problem: Problem, x: FloatArray) -> list[LinearisedRun]:
     for run, record in enumerate(problem.records):
         r = problem.linearise(x, run)
         lines.append(
-            LinearisedRun(record, max(r.base.damping, 1e-3), max(r.base.stiffness, 0.0), r.stack, np.array(r.columns, dtype=int))
+            LinearisedRun(record, *base_dynamics(r.base.damping, r.base.stiffness), r.stack, np.array(r.columns, dtype=int))
         )
     return lines
 
