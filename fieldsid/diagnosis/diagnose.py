@@ -155,6 +155,7 @@ def _diagnosis(end: _SearchResult, skipped: Mapping[str, str], notes: tuple[Note
             *flown,
             *([SEARCH_ENDED] if work.budget.is_exhausted and leaves_error(found, work.floor) else []),
         ),
+        noiseless=work.is_noiseless,
     )
 
 
@@ -241,6 +242,7 @@ def body_of(d: Diagnosis) -> dict[str, Any]:
         "base": _pair(d.base),
         "final": _pair(d.final),
         "noise_floor": {"angle_rad": d.noise_floor.angle, "rate_rad_s": d.noise_floor.rate},
+        "noiseless": d.noiseless,
         "candidates": [
             {
                 "effect": c.effect,

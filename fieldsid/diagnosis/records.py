@@ -11,6 +11,7 @@ from fieldsid.display import Brief, Displayed, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
+from fieldsid.rounding import number
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -29,6 +30,11 @@ class Errors(Brief):
             if isfinite(rms) and sigma > 0.0
         ]
         return float((sum(parts) / len(parts)) ** 0.5) if parts else float("nan")
+
+    def sized(self, angle: str = "rad", factor: float = 1.0) -> str:
+        """Return the errors of the measured channels in their units, in another unit of angle where factor has rad in it."""
+        parts = ((self.angle_rms_rad, angle), (self.rate_rms_rad_s, f"{angle}/s"))
+        return " and ".join(f"{number(factor * rms, 2)} {unit}" for rms, unit in parts if isfinite(rms))
 
     @property
     def mean(self) -> float:
@@ -71,7 +77,10 @@ class Candidate(Displayed):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Diagnosis(Plotted):
-    """The verdict, what led to it, and the model with the named effects added."""
+    """The verdict, what led to it, and the model with the named effects added.
+
+    `noiseless`: the logs show almost no noise, so that errors are told in their units and not over the noise floor.
+    """
 
     axis: Axis
     verdict: str
@@ -87,3 +96,4 @@ class Diagnosis(Plotted):
     next_maneuver: Mapping[str, Any] | None = None
     skipped: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
+    noiseless: bool = False

@@ -18,7 +18,7 @@ from fieldsid.diagnosis.evidence.acceptance import common_own_moment, is_accepte
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood, fit_output_error
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
-from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO
@@ -59,9 +59,15 @@ class Gain(Brief):
     judged_on: tuple[str, ...]
 
     @property
-    def over_floor(self) -> tuple[float, float]:
-        """The error before and after over the noise floor, on unseen data where there are any."""
+    def judged(self) -> tuple[Errors, Errors]:
+        """The error before and after, on unseen data where there are any."""
         before, after = (p.validation if self.unseen else p.train for p in (self.before, self.after))
+        return before, after
+
+    @property
+    def over_floor(self) -> tuple[float, float]:
+        """The same over the noise floor."""
+        before, after = self.judged
         return before.over(self.noise_floor), after.over(self.noise_floor)
 
     def left(self, *, kept: bool) -> tuple[float, float]:

@@ -9,8 +9,9 @@ from textwrap import fill
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fieldsid.diagnosis import Diagnosis
+from fieldsid.diagnosis import Diagnosis, Pair
 from fieldsid.figures import canvas, where
+from fieldsid.models.model import Noise
 from fieldsid.rounding import probability
 
 MOST_BARS = 10
@@ -22,14 +23,16 @@ MOST_TIMES = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """One candidate: its error over the noise floor on fitted and on unseen runs, share explained, probability, if it is named.
+    """One candidate: its error on fitted and on unseen runs, in words, the share explained, the probability, if it is named.
 
-    The model as it is has no probability. worse: it raises the error, and explains nothing.
+    The errors are over the noise floor, in a log without noise over those of the model as it is, which has no probability.
+    worse: it raises the error, and explains nothing.
     """
 
     effect: str
     fitted: float
     unseen: float
+    says: str
     explained: float
     probability: float | None
     named: bool
@@ -44,7 +47,7 @@ def figure(found: Diagnosis) -> Figure:
     sure = f", probability {probability(chances[0])}" if found.effects and chances[0] == max(chances) else ""
     says = f"{found.axis.value}, {found.verdict}: {found.says}{sure}"
     sheet.suptitle(fill(says, TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
-    draw(bars_of(found), left)
+    draw(bars_of(found), left, noiseless=found.noiseless)
     where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in found.where[:MOST_BARS]], right)
     most = f"the model as it is fails most at {found.where[0].condition}" if found.where else "the model as it is fails nowhere"
     right.set_title(f"{most}\nbeside a bar: rms there over that of the whole run", loc="left", fontsize=10)
@@ -53,29 +56,26 @@ def figure(found: Diagnosis) -> Figure:
 
 def bars_of(found: Diagnosis) -> list[Bar]:
     """Return the bars of a diagnosis: the model as it is, then the candidates in their order."""
-    floor = found.noise_floor
-    base = Bar("model as it is", found.base.train.over(floor), found.base.validation.over(floor), 0.0, None, named=False)
     named = "+".join(found.effects)
+    base = [found.base.train, found.base.validation]
+    whole = [Noise(e.angle_rms_rad, e.rate_rms_rad_s) if found.noiseless else found.noise_floor for e in base]
+
+    def bar(effect: str, errors: Pair, explained: float, p: float | None, *, worse: bool = False) -> Bar:
+        sides = (errors.train, errors.validation)
+        fitted, unseen = (e.over(one) for e, one in zip(sides, whole, strict=True))
+        judged = isfinite(unseen)
+        says = sides[judged].sized() if found.noiseless else f"{unseen if judged else fitted:.2f} x"
+        return Bar(effect, fitted, unseen, says, explained, p, named=bool(named) and effect == named, worse=worse)
+
     return [
-        base,
-        *(
-            Bar(
-                c.effect,
-                c.errors.train.over(floor),
-                c.errors.validation.over(floor),
-                c.explained,
-                c.probability,
-                named=bool(named) and c.effect == named,
-                worse=c.worse,
-            )
-            for c in found.candidates
-        ),
+        bar("model as it is", found.base, 0.0, None),
+        *(bar(c.effect, c.errors, c.explained, c.probability, worse=c.worse) for c in found.candidates),
     ]
 
 
-def draw(bars: list[Bar], ax: Axes) -> None:
-    """Draw the error over the noise floor of each candidate: bars for unseen runs, rings for fitted ones, the floor at 1."""
-    canvas.dress(ax, x="free-run error over the noise floor")
+def draw(bars: list[Bar], ax: Axes, *, noiseless: bool = False) -> None:
+    """Draw the error of each candidate: bars for unseen runs, rings for fitted ones, the noise floor, if any, at 1."""
+    canvas.dress(ax, x=f"free-run error over {'that of the model as it is' if noiseless else 'the noise floor'}")
     judged = any(isfinite(b.unseen) for b in bars)
     errors = [b.unseen if judged else b.fitted for b in bars]
     rows = list(range(len(bars)))[::-1]
@@ -85,19 +85,20 @@ def draw(bars: list[Bar], ax: Axes) -> None:
     if judged:
         fitted = [b.fitted for b in bars]
         ax.plot(fitted, rows, "o", markerfacecolor="white", markeredgecolor="0.25", markersize=6, label="fitted runs")
-    ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
+    if not noiseless:
+        ax.axvline(1.0, color=canvas.SECOND, linewidth=1.4, linestyle="--", label="noise floor")
     for row, b, error in zip(rows, bars, errors, strict=True):
         place = (min(max(error, b.fitted), end), row)
-        ax.annotate(words_of(b, error), place, xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
+        ax.annotate(words_of(b), place, xytext=(7, 0), textcoords="offset points", va="center", fontsize=8.5)
     ax.set_yticks(rows, [fill(b.effect.replace("+", " +"), LABEL_WIDTH) for b in bars], fontsize=9)
     ax.set_xlim(0.0, 1.95 * end)
     ax.grid(visible=False, axis="y")
     canvas.legend_above(ax, 3)
 
 
-def words_of(b: Bar, error: float) -> str:
-    """Return the label of a bar: the error over the floor, the share of the excess explained if any, the probability."""
+def words_of(b: Bar) -> str:
+    """Return the label of a bar: the error, the share of the excess explained if any, the probability."""
     if b.probability is None:
-        return f"{error:.2f} x"
+        return b.says
     does = "worse" if b.worse else f"{100 * b.explained:.0f} % explained"
-    return f"{error:.2f} x, {does}, probability {probability(b.probability)}"
+    return f"{b.says}, {does}, probability {probability(b.probability)}"

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from fieldsid.extension import Gain, Generation
 from fieldsid.figures import canvas
+from fieldsid.rounding import MANY
 
 LABEL_WIDTH = 18
 
@@ -58,7 +59,10 @@ def folded(text: str) -> str:
 def summary(gains: Sequence[Gain]) -> str:
     """Return the whole fall in words."""
     where = "unseen runs" if gains[-1].unseen else "the runs fitted to"
-    return f"error on {where} from {gains[0].over_floor[0]:.2f} to {gains[-1].over_floor[1]:.2f} x the noise floor"
+    before, after = gains[0].over_floor[0], gains[-1].over_floor[1]
+    if before < MANY:
+        return f"error on {where} from {before:.2f} to {after:.2f} x the noise floor"
+    return f"error on {where} from {' to '.join(e.sized('deg', degrees(1.0)) for e in (gains[0].judged[0], gains[-1].judged[1]))}"
 
 
 def falls_of(gains: Sequence[Gain], channel: str) -> list[Fall]:

@@ -12,6 +12,7 @@ from fieldsid.extension import Generation
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.reporting.chart import Band, Panel, Series, bars, chart, legend, thinned
+from fieldsid.rounding import MANY
 
 DEG = np.degrees(1.0)
 MOST_BARS = 8
@@ -57,9 +58,12 @@ def fall(line: Sequence[Generation], title: str) -> str | None:
     if not steps or steps[0].step is None:
         return None
     before = ", ".join(e for e in steps[0].effects if e not in steps[0].step.gain.added) or "plain model"
-    rows = [(before, steps[0].step.gain.over_floor[0])]
-    rows += [(f"+ {', '.join(g.step.gain.added)}", g.step.gain.over_floor[1]) for g in steps if g.step is not None]
-    return bars([(n, v, f"{v:.2f} x") for n, v in rows], title, mark=(1.0, "the sensors' noise"))
+    gains = [g.step.gain for g in steps if g.step is not None]
+    rows = [(before, gains[0].over_floor[0], gains[0].judged[0])]
+    rows += [(f"+ {', '.join(g.added)}", g.over_floor[1], g.judged[1]) for g in gains]
+    if rows[0][1] < MANY:
+        return bars([(n, v, f"{v:.2f} x") for n, v, _ in rows], title, mark=(1.0, "the sensors' noise"))
+    return bars([(n, v, errors.sized("deg", DEG).replace(" and ", ", ")) for n, v, errors in rows], title)
 
 
 def over_speed(source: ParameterSource, name: str, unit: str) -> str | None:

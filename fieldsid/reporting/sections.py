@@ -132,8 +132,9 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
             for run, channel, c in failing[:6]
         ],
         "candidates": _candidates(axis.diagnosis),
+        "errors_over": "" if _is_noiseless(axis.diagnosis) else ", x noise",
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
-        "fall": figures.fall(axis.line, f"the error of the {axis.axis} model over the noise"),
+        "fall": figures.fall(axis.line, f"the falling error of the {axis.axis} model"),
         "parameters": [row for s in axis.shown[:1] for row in _parameters(s)] if len(axis.shown) == 1 or axis.line else
         [row for s in axis.shown for row in _parameters(s)],
         "laws": _laws(axis),
@@ -186,14 +187,14 @@ def _candidates(item: Item | None) -> list[dict[str, str]]:
     if item is None or item.body is None:
         return []
     body = item.body
-    floor = body["noise_floor"]
+    floor = None if _is_noiseless(item) else body["noise_floor"]
     base = {"effect": "as it is", "train": body["base"]["train"], "validation": body["base"]["validation"]}
     return [
         {
             "effect": c["effect"],
             "probability": probability(c["probability"]) if "probability" in c else "",
-            "fitted": _over(c["train"], floor),
-            "unseen": _over(c["validation"], floor),
+            "fitted": _sized(c["train"], floor),
+            "unseen": _sized(c["validation"], floor),
             "explained": "worse" if c.get("worse") else f"{100 * c['explained']:.0f} %" if "explained" in c else "",
             "evidence": f"{c['log_evidence']:+z.0f}" if "log_evidence" in c else "",
         }
@@ -201,8 +202,16 @@ def _candidates(item: Item | None) -> list[dict[str, str]]:
     ]
 
 
-def _over(errors: Mapping[str, Any], floor: Mapping[str, Any]) -> str:
-    """Return an error over the noise floor, the channels' root mean square."""
+def _is_noiseless(item: Item | None) -> bool:
+    """Whether a diagnosis tells errors in their units; one kept by a release before has no word of it."""
+    return item is not None and item.body is not None and bool(item.body.get("noiseless", False))
+
+
+def _sized(errors: Mapping[str, Any], floor: Mapping[str, Any] | None) -> str:
+    """Return an error over the noise floor, the channels' root mean square; in its units where there is no floor."""
+    if floor is None:
+        parts = ((errors.get("angle_rms_rad"), "deg"), (errors.get("rate_rms_rad_s"), "deg/s"))
+        return ", ".join(f"{number(float(np.degrees(rms)), 2)} {unit}" for rms, unit in parts if rms is not None)
     pairs = [(errors.get("angle_rms_rad"), floor["angle_rad"]), (errors.get("rate_rms_rad_s"), floor["rate_rad_s"])]
     ratios = [float(e) / float(f) for e, f in pairs if e and f]
     return f"{(sum(r * r for r in ratios) / len(ratios)) ** 0.5:.2f}" if ratios else ""

@@ -24,7 +24,7 @@ from fieldsid.views._words import (
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from fieldsid.diagnosis import Candidate, Diagnosis
+    from fieldsid.diagnosis import Candidate, Diagnosis, Pair
 
 
 def line(found: Diagnosis) -> str:
@@ -35,8 +35,8 @@ def line(found: Diagnosis) -> str:
 def page(found: Diagnosis) -> Page:
     """Return the verdict, the candidates after the model as it is, where that fails, and what to fly next."""
     floor = found.noise_floor
-    errors = found.base.train.over(floor), found.base.validation.over(floor)
-    rows = [("model as it is", "", times(errors[0]), times(errors[1]), "", ""), *(_row(c, found) for c in found.candidates)]
+    rows = [("model as it is", "", *_errors(found, found.base), "", ""), *(_row(c, found) for c in found.candidates)]
+    of = "in rad and rad/s, in logs with next to no noise" if found.noiseless else "over the noise floor"
     heads = ("", "probability", "fitted", "unseen", "explained", "log evidence")
     next_ = found.next_maneuver
     known = facts(
@@ -51,7 +51,7 @@ def page(found: Diagnosis) -> Page:
     )
     blocks = (
         known,
-        Block("Candidates (fitted, unseen: free-run error of those runs over the noise floor)", tuple(rows), heads),
+        Block(f"Candidates (fitted, unseen: free-run error of those runs {of})", tuple(rows), heads),
         where_block("Where the model as it is fails", found.where),
     )
     return Page(f"Diagnosis of the {found.axis.value} axis: {found.says}", warned(found.notes), blocks)
@@ -87,9 +87,13 @@ def candidate_row(c: Candidate) -> dict[str, Any]:
 
 
 def _row(c: Candidate, found: Diagnosis) -> tuple[str, ...]:
-    floor = found.noise_floor
-    errors = times(c.errors.train.over(floor)), times(c.errors.validation.over(floor))
-    return (c.effect, probability(c.probability), *errors, percent(c.explained), f"{c.score:+z.0f}")
+    return (c.effect, probability(c.probability), *_errors(found, c.errors), percent(c.explained), f"{c.score:+z.0f}")
+
+
+def _errors(found: Diagnosis, pair: Pair) -> tuple[str, ...]:
+    """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
+    sides = (pair.train, pair.validation)
+    return tuple(e.sized() if found.noiseless else times(e.over(found.noise_floor)) for e in sides)
 
 
 VIEW = View("diagnosis", line, page, frames, lambda found: found.axis.value, figures)

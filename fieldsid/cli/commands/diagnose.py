@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,7 +21,7 @@ from fieldsid.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.diagnosis import Diagnosis
+    from fieldsid.diagnosis import Diagnosis, Errors, Pair
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
 
@@ -138,9 +139,8 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
     floor = found.noise_floor
     factor, angle = shown_in("rad")
     noise = f"{number(factor * floor.angle, 2)} {angle} and {number(factor * floor.rate, 2)} {angle}/s"
-    to.print(
-        Text(f"fitted, unseen: free-run error of those runs over the noise floor, {noise}; evidence: log, over the first row")
-    )
+    of = f"in {angle} and {angle}/s, in logs with next to no noise" if found.noiseless else f"over the noise floor, {noise}"
+    to.print(Text(f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row"))
     _render_words(to, found)
     _render_where(to, found)
     _render_skipped(to, found.skipped)
@@ -151,24 +151,34 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
 
 
 def _candidates(found: Diagnosis) -> Any:
-    from fieldsid.cli.headlines.words import times
     from fieldsid.rounding import probability
 
-    floor = found.noise_floor
-    judged = found.base.validation.over(floor)
-    rows = [("as it is", "", times(found.base.train.over(floor)), times(judged), "", "")]
+    rows = [("as it is", "", *_errors(found, found.base), "", "")]
     rows += [
         (
             fill(c.effect.replace("+", " +"), NAME_WIDTH),
             probability(c.probability),
-            times(c.errors.train.over(floor)),
-            times(c.errors.validation.over(floor)),
+            *_errors(found, c.errors),
             "worse" if c.worse else f"{100 * c.explained:.0f} %",
             f"{c.score:+z.0f}",
         )
         for c in found.candidates
     ]
     return table("", ("effect", "prob.", "fitted", "unseen", "explained", "evidence"), rows)
+
+
+def _errors(found: Diagnosis, errors: Pair) -> tuple[str, str]:
+    """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
+    from fieldsid.cli.headlines.words import times
+    from fieldsid.rounding import number
+
+    def said(e: Errors) -> str:
+        if not found.noiseless:
+            return times(e.over(found.noise_floor))
+        factor = shown_in("rad")[0]
+        return ", ".join(number(factor * rms, 2) for rms in (e.angle_rms_rad, e.rate_rms_rad_s) if isfinite(rms))
+
+    return said(errors.train), said(errors.validation)
 
 
 def _render_words(to: Console, found: Diagnosis) -> None:
@@ -181,13 +191,13 @@ def _render_words(to: Console, found: Diagnosis) -> None:
         return
     if found.effects:
         to.print()
-        to.print(Text(found.says))
+        to.print(Text(shown_words(found.says)))
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < RIVAL_PROBABILITY_RATIO:
             continue
         alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
         to.print()
-        to.print(Text(f"{c.effect}: {c.evidence}{alike}"))
+        to.print(Text(shown_words(f"{c.effect}: {c.evidence}{alike}")))
 
 
 def _render_where(to: Console, found: Diagnosis) -> None:
@@ -219,4 +229,4 @@ def _render_maneuver(to: Console, found: Diagnosis) -> None:
     if fly:
         to.print()
         note = f"; {fly['note']}" if "note" in fly else ""
-        to.print(Text(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}"))
+        to.print(Text(shown_words(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}")))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.report.report_text import sized
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
 from fieldsid.diagnosis.verdict import Verdict
@@ -36,7 +37,7 @@ def next_maneuver(
     left = found.selection_errors.over(floor)
     if skipped and verdict.word == "effect" and left > SUFFICIENT_ERROR_RATIO:
         name = min(skipped)
-        why = f"{left:.2f} x the noise floor is left, and {name} could not be tried: {skipped[name]}"
+        why = f"an error of {sized(search, found, floor)} is left, and {name} could not be tried: {skipped[name]}"
         return {"maneuver": "log the missing signal", "why": why}
     return None
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import isfinite
-
 from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Pair
@@ -18,16 +16,17 @@ DISTURBED = 1e-5
 """Disturbance moment, in rad/s^2, above which the report mentions it."""
 
 
-def over(search: Search, h: ScoredModel, floor: Noise) -> float:
-    """Return a model's selection error over a noise floor."""
-    return h.selection_errors.over(floor)
-
-
 def evidence(search: Search, h: ScoredModel, errors: Pair, floor: Noise, gain: float) -> str:
     """Return what speaks for or against a model with these errors and this log evidence over the base, in one sentence."""
     base = search.base()
     kind = "unseen runs" if search.validation else "the runs it was fitted to"
-    fall = f"error on {kind} {over(search, base, floor):.2f} -> {over(search, h, floor):.2f} x noise floor"
+    before, after = (m.selection_errors for m in (base, h))
+    size = (
+        f"{before.sized()} -> {after.sized()}"
+        if search.is_noiseless
+        else f"{before.over(floor):.2f} -> {after.over(floor):.2f} x noise floor"
+    )
+    fall = f"error on {kind} {size}"
     share = f"{fall} ({100 * excess_explained(search, h, floor):.0f} % of the excess)"
     said = f"makes it worse: {fall}" if worsens(search, h, floor) else share
     lower, total = lower_on(errors, base.errors, floor)
@@ -42,18 +41,17 @@ def lower_on(errors: Pair, base: Pair, floor: Noise) -> tuple[int, int]:
 
 def headline(search: Search, verdict: Verdict, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
     """Return the verdict in a sentence."""
-    error, base = over(search, found, floor), over(search, search.base(), floor)
+    error, base = found.selection_errors.over(floor), sized(search, search.base(), floor)
     runs = "unseen runs" if search.validation else "the runs it was fitted to"
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "disturbed":
-        size = _sized(search, search.base(), base)
-        return f"no effect of the catalogue is missing: what is left, {size}, is {_disturbance(noise)}"
+        return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
     if verdict.word == "unexplained":
         worse = validation_error_ratio(search.base(), search.floor)
         return (
-            f"something is there that is not in the catalogue: error {_sized(search, search.base(), base)}, most of it in "
+            f"something is there that is not in the catalogue: error {base}, most of it in "
             f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
             f"it moves with {left.moves_with}"
             + (f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else "")
@@ -70,10 +68,10 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
 def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
     """Return how the error falls with a model's effects; where the fitted runs' numbers raise it, with all runs'."""
     base = search.base()
-    before, after = over(search, base, floor), over(search, found, floor)
     if found.selection_errors.mean < base.selection_errors.mean or not search.validation:
-        return f"the error on {runs} falls from {_sized(search, base, before)} to {_sized(search, found, after)}"
+        return f"the error on {runs} falls from {sized(search, base, floor)} to {sized(search, found, floor)}"
     fitted = " to ".join(f"{h.train.over(floor):.2f}" for h in (base, found))
+    before, after = (h.selection_errors.over(floor) for h in (base, found))
     settled = min(errors.over(floor) for errors in found.unseen_errors)
     return (
         f"the error on the fitted runs goes from {fitted} x the noise floor, that on {runs} from {before:.2f} to {after:.2f} x "
@@ -98,10 +96,7 @@ def _says(h: ScoredModel, name: str) -> str:
     return effect.says if form is None else f"{effect.says}: {form.says}"
 
 
-def _sized(search: Search, h: ScoredModel, error: float) -> str:
-    """Return an error in words: over the noise floor, or in its own units where the logs show almost no noise."""
-    if not search.is_noiseless:
-        return f"{error:.2f} x the noise floor"
+def sized(search: Search, h: ScoredModel, floor: Noise) -> str:
+    """Return a model's selection error in words: over the noise floor, or in its units where logs show almost no noise."""
     errors = h.selection_errors
-    parts = [(errors.angle_rms_rad, "rad"), (errors.rate_rms_rad_s, "rad/s")]
-    return " and ".join(f"{value:.2g} {unit}" for value, unit in parts if isfinite(value))
+    return errors.sized() if search.is_noiseless else f"{errors.over(floor):.2f} x the noise floor"

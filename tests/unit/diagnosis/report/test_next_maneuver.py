@@ -14,7 +14,7 @@ from fieldsid.models.model import Noise
 
 FLOOR = Noise(0.004, 0.002)
 RIVALS = [SimpleNamespace(names=(n,), likelihood_model=None) for n in ("servo_lag", "delay")]
-WORK = SimpleNamespace(known=(), records=[SimpleNamespace(fin=np.array([-0.2, 0.0, 0.2]), speed=1.5)])
+WORK = SimpleNamespace(is_noiseless=False, known=(), records=[SimpleNamespace(fin=np.array([-0.2, 0.0, 0.2]), speed=1.5)])
 
 
 @pytest.mark.parametrize("odds", [12.0, 0.4])
@@ -46,6 +46,5 @@ def test_a_signal_is_missed_only_where_something_is_left_for_it(word, over, aske
     fly = next_maneuver.next_maneuver(WORK, Verdict(word, ()), found, LACKS, FLOOR)
     assert (fly is not None) == asked
     if fly:
-        assert (
-            fly["why"] == "1.40 x the noise floor is left, and roll_coupling could not be tried: needs roll, which the log lacks"
-        )
+        left = "an error of 1.40 x the noise floor is left"
+        assert fly["why"] == f"{left}, and roll_coupling could not be tried: needs roll, which the log lacks"

@@ -41,8 +41,8 @@ def _made(*names: str, train: tuple[float, ...], unseen: tuple[float, ...], scor
 BASE = _made(train=(1.1,), unseen=(1.1,), score=0.0)
 
 
-def _search(base=BASE):
-    return SimpleNamespace(base=lambda: base, validation=(None,), known=(), floor=FLOOR)
+def _search(base=BASE, *, noiseless=False):
+    return SimpleNamespace(base=lambda: base, validation=(None,), known=(), floor=FLOOR, is_noiseless=noiseless)
 
 
 def test_what_raises_the_error_is_said_to_make_it_worse():
@@ -58,6 +58,13 @@ def test_what_lowers_it_says_the_share_of_the_table():
     said = evidence(_search(), h, h.errors, FLOOR, h.log_evidence)
     assert f"1.10 -> 1.02 x noise floor ({100 * excess_explained(_search(), h, FLOOR):.0f} % of the excess)" in said
     assert not worsens(_search(), h, FLOOR)
+
+
+def test_errors_of_logs_without_noise_are_said_in_their_units():
+    h = _made("servo_lag", train=(1.0,), unseen=(1.02,), score=40.0)
+    said = evidence(_search(noiseless=True), h, h.errors, FLOOR, h.log_evidence)
+    assert "error on unseen runs 0.0044 rad and 0.0022 rad/s -> 0.0041 rad and 0.0020 rad/s (" in said
+    assert "noise floor" not in said
 
 
 def test_runs_are_counted_by_the_error_that_the_sentence_is_about():
