@@ -98,23 +98,41 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
 
 
 def equivalent_solution(values: Values, axis: Axis) -> dict[str, float] | None:
-    """Return the start with the servo's slow pole and the hull's exchanged: in yaw the same response at one speed.
+    """Return the start with the servo's slow pole and the hull's fast one exchanged: in yaw the same response at one speed.
 
     With inertia the servo's two time constants T1 >= T2 have the sum `lag` and the product inertia_share lag^2; they are real
-    where inertia_share is 1/4 at most.
+    where inertia_share is 1/4 at most. A hull that drifts has two poles, of s^2 + (a22 + c) s + a22 c + c_r with the cross
+    state's damping c and rate c_r, and keeps its zero -c: the slow pole stays, the fast one is exchanged; complex ones are not.
     """
-    damping, lag = values[NAMES[axis].damping], values["lag"]
+    names, lag = NAMES[axis], values["lag"]
     apart = 1.0 - 4.0 * values.get("inertia_share", 0.0)
-    if axis is not Axis.YAW or damping <= 0.0 or lag <= FASTEST_S or apart < 0.0:
+    poles = _hull_poles(values[names.damping], values)
+    if axis is not Axis.YAW or poles is None or lag <= FASTEST_S or apart < 0.0:
         return None
     slow, fast = (0.5 * lag * (1.0 + sign * np.sqrt(apart)) for sign in (1.0, -1.0))
-    moved = 1.0 / damping + fast
+    pole, kept = poles
+    moved = 1.0 / pole + fast
     exchanged = {
-        NAMES[axis].damping: 1.0 / slow,
+        names.damping: 1.0 / slow,
         "lag": moved,
-        NAMES[axis].authority: values[NAMES[axis].authority] / (slow * damping),
+        names.authority: values[names.authority] / (slow * pole),
     }
-    return exchanged | {"inertia_share": fast / damping / moved**2} if "inertia_share" in values else exchanged
+    if kept is not None:
+        zero = values["cross_damping"]
+        exchanged[names.damping] += kept - zero
+        exchanged["cross_rate"] = kept / slow - exchanged[names.damping] * zero
+    return exchanged | {"inertia_share": fast / pole / moved**2} if "inertia_share" in values else exchanged
+
+
+def _hull_poles(damping: float, values: Values) -> tuple[float, float | None] | None:
+    """Return a hull's fast pole and, where it drifts, its slow one, in 1/s; None where they are complex or the fast one grows."""
+    if "cross_damping" not in values:
+        return (damping, None) if damping > 0.0 else None
+    middle = 0.5 * (damping + values["cross_damping"])
+    squared = middle**2 - damping * values["cross_damping"] - values["cross_rate"]
+    if squared < 0.0 or middle + np.sqrt(squared) <= 0.0:
+        return None
+    return middle + float(np.sqrt(squared)), middle - float(np.sqrt(squared))
 
 
 SLACKENING = Coefficient(

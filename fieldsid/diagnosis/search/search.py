@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import leaves_error
-from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, likelihood_at
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
@@ -17,7 +18,7 @@ from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
 from fieldsid.diagnosis.search.multistart import multistart
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MISSING_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
 from fieldsid.models.effect import Effect
 
@@ -34,6 +35,7 @@ class Search(MoveEvaluation):
         self._expand()
         self._join_leaders()
         self._exchange_for_variants()
+        self._exchange_for_lookalikes()
         self._drop_each()
         self.share_own_moments()
         found = self.best_admissible()
@@ -55,6 +57,7 @@ class Search(MoveEvaluation):
                 found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
             )
             self.tried[frozenset(found.names)] = found
+        self._lift_under_other_trim_law()
         self.share_own_moments()
         return self.best_admissible()
 
@@ -101,6 +104,35 @@ class Search(MoveEvaluation):
             if gone.name not in self.known and without is not None and alike:
                 asked.append(VariantRequest(without, alike))
         self._try_variants(asked)
+
+    def _exchange_for_lookalikes(self) -> None:
+        """Try the model of the highest evidence with each effect exchanged for what it may be mistaken for, from its numbers.
+
+        The screens are of first order: where one stands for a lag of a sample, the lag itself may have passed none, or ended at a
+        worse optimum beside the others. And an effect in another variant may stand for its textbook's and one of those. What
+        comes so near that a variant could lead is tried in its variants.
+        """
+        best = self._most_evident()
+        for stands in (e for e in best.effects if e.name not in self.known):
+            others = [e for e in best.effects if e is not stands]
+            alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
+            sets = [others] if len(best.names) > len(self.known) + 1 else []
+            sets += [[*others, e] for e in self.catalogue if e.name == stands.name and stands.is_formed]
+            for effects in sets if self.budget.remaining() else ():
+                parent = self._moved(best, effects)
+                self._evaluate_moves(parent, by_effect(add_effect(parent, alike, None, self.parallel, anew=False, flown=True)))
+                keys = [frozenset((*parent.names, e.name)) for e in alike]
+                near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
+                self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
+
+    @staticmethod
+    def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
+        """Return a model with other effects at the parameters of one that was fitted, itself not fitted, to add to."""
+        fitted = h.likelihood_fit.fitted
+        problem = fitted.problem.with_effects(effects)
+        x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
+        at = replace(h.likelihood_fit, fitted=FittedProblem(problem, x, fitted.weights))
+        return replace(h, likelihood_fit=replace(at, log_likelihood=likelihood_at(problem, x, at)))
 
     def _front(self, best: ScoredModel) -> list[ScoredModel]:
         """Return the models of accepted effects whose error is clearly below that of the one with the highest evidence."""
@@ -168,6 +200,14 @@ class Search(MoveEvaluation):
             known, again = self.tried.get(frozenset(again.names)), prefer_output_error(again, self.floor)
             self.tried[frozenset(again.names)] = again if known is None or again.log_evidence > known.log_evidence else known
         return True
+
+    def _lift_under_other_trim_law(self) -> None:
+        """Let what lacks one of the found effects count under the other trim law, where that explains it better.
+
+        What a law explains without an effect is no evidence for that effect.
+        """
+        lawful = self.trim_laws.without_an_effect(self.best_admissible(), self.tried)
+        self.tried.update({frozenset(h.names): prefer_output_error(h, self.floor) for h in lawful})
 
     def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
         """Return a model without one of its effects, fitted from the parameters it has with it."""

@@ -149,11 +149,26 @@ class TrimLawSearch:
         answer, *again = parallel.map(lambda part: part(), parts)
         self.known |= dict(zip(new, again, strict=True))
         better = [
-            h
-            for h in (self.known[k] for k in keys)
-            if h is not None and h.log_evidence > found.log_evidence and _predicts(h, found)
+            other
+            for k, h in keys.items()
+            if (other := self.known[k]) is not None
+            and other.log_evidence > max(found.log_evidence, h.log_evidence + _prior_log_odds(other))
+            and _predicts(other, found)
         ]
         return answer, max(better, key=lambda h: h.log_evidence, default=None)
+
+    def without_an_effect(self, found: ScoredModel, tried: Mapping[frozenset[str], ScoredModel]) -> list[ScoredModel]:
+        """Return the models that lack one of a model's effects and have more evidence under the other trim law, under that."""
+        key = frozenset(found.names)
+        less = [h for k, h in tried.items() if k < key and len(k) == len(key) - 1]
+        others = [(h, self.known.get((h.names, h.log_evidence))) for h in less]
+        return [other for h, other in others if other is not None and _predicts(other, h)]
+
+
+def _prior_log_odds(h: ScoredModel) -> float:
+    """Return the prior log odds against a model's trim law, which a search turns to: those of any other law of the speed."""
+    layout = h.likelihood_fit.fitted.problem.layout
+    return 0.0 if layout.groups.trim_of_fin == TRIM_OF_FIN[layout.axis] else ALTERNATIVE_LOG_ODDS
 
 
 def _most_evident(tried: Collection[ScoredModel]) -> list[ScoredModel]:
@@ -183,7 +198,7 @@ def other_trim_law(h: ScoredModel, resolution_floor: Noise) -> ScoredModel | Non
             fit = score_model(
                 fit_maximum_likelihood(other, fitted.x, h.likelihood_fit.noise, resolution_floor, noise_kind), h.validation
             )
-            if fit.log_evidence > h.log_evidence + (0.0 if trim == TRIM_OF_FIN[layout.axis] else ALTERNATIVE_LOG_ODDS):
+            if fit.log_evidence > h.log_evidence:
                 return fit
     return None
 

@@ -75,7 +75,7 @@ def _best_of(judge: Objective, setting: Setting, crowd: Ensemble, scored: Sequen
             f"no maneuver stays inside the envelope at {judge.scene.speed:g} m/s with a probability of "
             f"{1 - setting.envelope.share:.0%}",
             found=", ".join(f"{k} {v:.3g}" for k, v in setting.envelope.rooms().items()),
-            hint="widen the envelope, or narrow the prior with a first model: `--model MODEL`",
+            hint=f"{setting.envelope.widening()}, or narrow the prior with a first model: `--model MODEL`",
         )
     best = enforce_chance_constraint(judge, setting, crowd, min(inside, key=lambda s: s.cost).candidate)
     return leg_of(judge, setting, best, crowd)

@@ -86,7 +86,7 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
     check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
     checked_prior(model, request.axis, request.speeds)
     legs = _legs(model, request, step)
-    legs = [_repeated(leg, request.want) for leg in legs]
+    legs = [_repeated(leg, request.want, request.envelope) for leg in legs]
     if request.radius:
         legs += circle_legs(setting_at(model, request, max(request.speeds)), request.speeds)
     check_minutes(legs, request)
@@ -129,7 +129,7 @@ def setting_at(model: Model, request: Request, speed: float) -> Setting:
     return Setting(model, request.envelope, window, request.want, request.run_up_s, request.seed, request.open_loop)
 
 
-def _repeated(leg: Leg, want: Mapping[str, float]) -> Leg:
+def _repeated(leg: Leg, want: Mapping[str, float], envelope: Envelope) -> Leg:
     """Return the leg with as many passes as the accuracy goals need; raises UsageError beyond a day's work."""
     lacking = [n for n in want if not np.isfinite(leg.expected[n].relative)]
     need = max((leg.expected[n].relative / want[n] for n in want if n not in lacking), default=1.0) ** 2
@@ -141,7 +141,7 @@ def _repeated(leg: Leg, want: Mapping[str, float]) -> Leg:
             found=f"{', '.join(lacking)} does not show" if lacking else f"it would take {passes} passes of {leg.pass_s:.0f} s",
             hint=f"possible in {MOST_PASSES} passes: `--want {accuracy_goals_text(possible)}`"
             if possible
-            else "widen the envelope",
+            else envelope.widening(),
         )
     return with_passes(leg, max(passes, 1))
 

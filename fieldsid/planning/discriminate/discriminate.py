@@ -74,7 +74,7 @@ class Separation:
             right, _, wrong = key.partition(">")
             lines.append(f"  if it is {right}: odds {_odds(value)} against {wrong}")
         if not self.decides:
-            lines.append("one pass is not enough for odds of 20 to 1: repeat it, or widen the envelope")
+            lines.append("one pass is not enough for odds of 20 to 1: repeat it, or leave it more room")
         return lines
 
 
@@ -154,7 +154,7 @@ def separate(
             "no maneuver of the catalogue stays inside the envelope for every rival",
             found=f"at {', '.join(f'{u:g}' for u in speeds)} m/s; "
             + (", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()) or "no room"),
-            hint="widen the envelope" + (": `--max-heading none` lets circles in" if envelope.heading is not None else ""),
+            hint=envelope.widening() + ("; `--max-heading none` lets circles in" if envelope.heading is not None else ""),
         )
     return best
 

@@ -76,7 +76,7 @@ def _leg_at(rivals: Sequence[Model], request: Request, speed: float) -> tuple[Le
         raise UsageError(
             f"`{best.candidate.spec}` would leave the envelope {leg.break_probability:.0%} of the time at {speed:g} m/s",
             found=", ".join(f"{k} {v:.3g}" for k, v in envelope.rooms().items()),
-            hint=f"accept it with `--risk {leg.break_probability:.2g}`, or widen the envelope",
+            hint=f"accept it with `--risk {leg.break_probability:.2g}`, or {envelope.widening()}",
         )
     if not leg.flown_from_list_in(envelope):
         return _leg_at(rivals, replace(request, open_loop=True), speed)

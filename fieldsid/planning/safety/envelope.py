@@ -38,6 +38,13 @@ OPTIONS: Mapping[str, tuple[str, str, str]] = {
 """Of each limit: the option, its unit, and what to write instead of zero."""
 
 
+SET_BY = {
+    "heading": "--max-heading", "track": "--max-track", "depth": "--depth-band", "pitch": "--max-pitch", "roll": "--max-roll",
+    "along": "--area", "across": "--area",
+}  # fmt: skip
+"""The option of `sysid plan` that sets the room for an excursion."""
+
+
 @dataclass(frozen=True, slots=True)
 class Envelope:
     """Limits about straight and level; None where there is none.
@@ -96,6 +103,11 @@ class Envelope:
             "across": None if self.area_width is None else 0.5 * self.area_width,
         }  # fmt: skip
         return {k: v for k, v in known.items() if v is not None}
+
+    def widening(self) -> str:
+        """Return what to widen in words, the options of `sysid plan` that set a limit."""
+        options = dict.fromkeys(f"`{SET_BY[name]}`" for name in self.rooms())
+        return f"widen {' or '.join(options)}" if options else "allow more fin: `--fin-max`"
 
     def plain(self) -> dict[str, float | None]:
         """Return the limits as a mapping; an unlimited fin rate is None."""

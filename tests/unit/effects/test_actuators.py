@@ -265,6 +265,26 @@ def test_the_equivalent_solution_exchanges_the_poles_of_servo_and_hull(shape):
         np.testing.assert_allclose(after, before, rtol=1e-12)
 
 
-@pytest.mark.parametrize("values", [{"a22": -0.1}, {"lag": 0.0}, {"inertia_share": 0.5}])
+@pytest.mark.parametrize("shape", [{}, {"inertia_share": 0.12}], ids=("of first order", "with inertia"))
+@pytest.mark.parametrize("rate", [-0.4, 0.3])
+def test_the_equivalent_solution_of_a_hull_that_drifts_keeps_its_zero_and_its_slow_pole(shape, rate):
+    """Poles, zero and static gain of b2 (s + c) / (servo ((s + a22) (s + c) + c_r)), by the roots of the polynomials."""
+    values = {"a22": 2.0, "b2": -3.0, "lag": 1.4, "cross_damping": 0.5, "cross_rate": rate} | shape
+    other = values | pick_effect("servo_lag").equivalent_solution(values, Axis.YAW)
+
+    def poles_and_gain(v):
+        hull = [1.0, v["a22"] + v["cross_damping"], v["a22"] * v["cross_damping"] + v["cross_rate"]]
+        servo = [v.get("inertia_share", 0.0) * v["lag"] ** 2, v["lag"], 1.0]
+        return np.sort(np.roots(np.polymul(np.trim_zeros(servo, "f"), hull))), v["b2"] * v["cross_damping"] / hull[-1]
+
+    assert other["lag"] < values["lag"]
+    assert other["cross_damping"] == values["cross_damping"]
+    for before, after in zip(poles_and_gain(values), poles_and_gain(other), strict=True):
+        np.testing.assert_allclose(after, before, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "values", [{"a22": -0.1}, {"lag": 0.0}, {"inertia_share": 0.5}, {"cross_damping": 1.0, "cross_rate": 3.0}]
+)
 def test_what_has_no_pole_to_exchange_has_no_equivalent_solution(values):
     assert pick_effect("servo_lag").equivalent_solution({"a22": 2.0, "b2": -3.0, "lag": 0.4} | values, Axis.YAW) is None

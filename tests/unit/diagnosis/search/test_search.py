@@ -65,6 +65,36 @@ def test_a_servo_slower_than_the_hull_is_tried_as_a_faster_one(base):
     assert other.model.values["lag"] == pytest.approx(fast.model.values["lag"], rel=0.2)
 
 
+def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch):
+    training, unseen = hidden_lag.runs()
+    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
+    effects = all_effects(Axis.YAW)
+    made = Search(*records, Axis.YAW, [effects[n] for n in ("servo_lag", "delay", "gyro_bias")])
+    parent = made.base()
+    for name in ("delay", "gyro_bias"):
+        moves = add_effect(parent, [effects[name]], None, made.parallel, anew=False, flown=True)
+        made._evaluate_moves(parent, by_effect(moves))
+        parent = made.tried[frozenset((*parent.names, name))]
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
+    assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
+    made._exchange_for_lookalikes()
+    lagged = made.tried[frozenset(["gyro_bias", "servo_lag"])]
+    assert lagged.log_evidence > parent.log_evidence
+    assert lagged.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
+
+
+def test_a_model_moved_to_fewer_effects_has_the_numbers_it_had_and_the_likelihood_there(base):
+    lag = base.catalogue[0]
+    base._evaluate_moves(base.base(), by_effect(add_effect(base.base(), [lag], None, base.parallel, anew=True, flown=False)))
+    fast = base.tried[frozenset(["servo_lag"])]
+    moved = base._moved(fast, [])
+    assert moved.names == ()
+    shared = moved.likelihood_fit.fitted
+    for name, value in zip(shared.problem.layout.names, shared.x, strict=False):
+        assert value == pytest.approx(fast.likelihood_model.values[name], rel=1e-12)
+    assert moved.likelihood_fit.log_likelihood < base.base().likelihood_fit.log_likelihood + 1.0
+
+
 def test_a_model_that_diverges_is_not_expanded(base):
     h = base.base()
     base.tried.progress.expanded.discard(base.root)

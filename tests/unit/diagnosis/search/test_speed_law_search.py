@@ -38,6 +38,7 @@ def asked(monkeypatch):
         return hypothesis(*h.names, score=h.log_evidence + 5.0)
 
     monkeypatch.setattr(speed_law_search, "other_trim_law", better)
+    monkeypatch.setattr(speed_law_search, "_prior_log_odds", lambda _h: 0.0)
     monkeypatch.setattr(speed_law_search, "leaves_error", lambda _h, _floor: True)
     monkeypatch.setenv("FIELDSID_IS_WORKER", "1")  # all in this process, where the calls are counted
     return names
@@ -82,6 +83,7 @@ def test_the_law_is_not_turned_to_where_it_predicts_far_worse(monkeypatch, asked
     monkeypatch.setattr(
         speed_law_search, "other_trim_law", lambda h, _told: hypothesis(*h.names, score=h.log_evidence + 30.0, error=error)
     )
+    monkeypatch.setattr(speed_law_search, "_prior_log_odds", lambda _h: 0.0)
     found = hypothesis("delay", score=100.0)
     tried = {frozenset(): hypothesis(score=0.0), frozenset(("delay",)): found}
     assert (TrimLawSearch().best_alternative(found, tried, FLOOR, FLOOR, ParallelMap((), ()), str)[1] is not None) == turns
@@ -94,3 +96,13 @@ def test_a_search_that_has_turned_twice_asks_no_more(asked):
         found, tried, FLOOR, FLOOR, ParallelMap((), ()), lambda: 7
     ) == (7, None)
     assert asked == []
+
+
+def test_a_search_does_not_turn_to_an_unusual_law_for_less_than_its_prior_odds(monkeypatch, asked):
+    monkeypatch.setattr(speed_law_search, "_prior_log_odds", lambda _h: 6.0)
+    found = hypothesis("delay", score=100.0)
+    tried = {frozenset(): hypothesis(score=97.0), frozenset(("delay",)): found}
+    trims = TrimLawSearch()
+    assert trims.best_alternative(found, tried, FLOOR, FLOOR, ParallelMap((), ()), str)[1] is None
+    (without,) = trims.without_an_effect(found, tried)
+    assert (without.names, without.log_evidence) == ((), 102.0)

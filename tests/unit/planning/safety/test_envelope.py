@@ -63,3 +63,9 @@ def test_limits_are_said_in_both_units_and_their_lack_is():
     assert said["heading"] == "60 deg (1.05 rad)"
     assert said["area"] == "200 m along, 25 m to either side"
     assert {n for n, words in said.items() if words == NOT_LIMITED} == {"fin rate", "track", "pitch", "roll", "depth"}
+
+
+def test_what_to_widen_is_named_by_its_option():
+    room = Envelope(0.2, heading=1.0, area_length=100.0, area_width=60.0)
+    assert room.widening() == "widen `--max-heading` or `--area`"
+    assert Envelope(0.2, heading=None, pitch=None).widening() == "allow more fin: `--fin-max`"
