@@ -2,7 +2,8 @@
 
     P = N^-1 (sum over runs of J' W S W J) N^-1,  N = J' W J,
 
-with Jacobian J, weights W and the covariance S of coloured noise. Source: Ljung 1999, section 9.4.
+with Jacobian J, weights W and the covariance S of coloured noise, to which moments of the runs' own of standard deviation s add
+s^2 r r', r the response to a unit moment. Source: Ljung 1999, section 9.4.
 """
 
 from __future__ import annotations
@@ -14,26 +15,36 @@ import numpy as np
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, normal_equations, sandwich
 from fieldsid.fitting.problem.problem import Problem, RunResult
 from fieldsid.models.model import Noise
+from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.sandwich_covariance import score_covariance
-from fieldsid.noise.whiten import noise_vector
+from fieldsid.noise.whiten import base_dynamics, noise_vector
 from fieldsid.numerics.arrays import FloatArray
 
 
 def coloured_covariance(problem: Problem, found: Minimum, weights: Noise, noise: Noise) -> FloatArray:
     """Return the covariance (F, F) of an output-error estimate under a noise model of any colour."""
     _, normal, _, results = normal_equations(problem, found.x, weights, found.free)
-    return white_weight_covariance(problem, found, weights, noise_vector(noise), normal, results)
+    return white_weight_covariance(problem, found, weights, noise_vector(noise), normal, results, noise.own_moment)
 
 
 def white_weight_covariance(
-    problem: Problem, found: Minimum, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult]
-) -> FloatArray:
-    """Return the covariance (F, F) of an estimate under a noise vector (7,); normal and results are those at the minimum."""
+    problem: Problem, found: Minimum, weights: Noise, noise: FloatArray, normal: FloatArray, results: Sequence[RunResult],
+    own_moment: float = 0.0,
+) -> FloatArray:  # fmt: skip
+    """Return the covariance (F, F) of an estimate under a noise vector (7,); normal and results are those at the minimum.
+
+    own_moment is the standard deviation of the moments of the runs' own, rad/s^2.
+    """
     sigma = np.array([weights.angle, weights.rate])
     place = {slot: i for i, slot in enumerate(found.free)}
     centre = np.zeros_like(normal)
     for record, result in zip(problem.records, results, strict=True):
         weighted = np.where(record.ok, result.sensitivity / sigma[:, None] ** 2, 0.0)
         index = np.array([place[s] for s in result.columns])
-        centre[np.ix_(index, index)] += score_covariance(record, noise, result.base.damping, result.base.stiffness, weighted)
+        damping, stiffness = result.base.damping, result.base.stiffness
+        centre[np.ix_(index, index)] += score_covariance(record, noise, damping, stiffness, weighted)
+        if own_moment > 0.0:
+            response = base_responses(record.nominal_steps, *base_dynamics(damping, stiffness))[0]
+            moved = own_moment * np.tensordot(weighted, response, axes=2)
+            centre[np.ix_(index, index)] += np.outer(moved, moved)
     return sandwich(normal, centre)
