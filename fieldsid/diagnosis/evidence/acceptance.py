@@ -14,7 +14,9 @@ from fieldsid.diagnosis.thresholds import (
     EXPLAINED_ERROR_RATIO,
     MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,
+    MAX_VALIDATION_ERROR_RATIO,
     MIN_TRAINING_GAIN,
+    SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.models.model import Noise
 
@@ -29,7 +31,8 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
 
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
     a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, the addition
-    may explain instead more of what is left above it than it leaves: near the floor no effect lowers the whole error much. See
+    may explain instead more of what is left above it than it leaves: near the floor no effect lowers the whole error much. And a
+    validation error that stays within what a sufficient model has speaks against nothing: the run is too mild. See
     `compared_errors` for which validation error.
     """
     before, now = compared_errors(without, with_)
@@ -37,7 +40,8 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
     unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
     explains = floor is not None and _explains_most((before, was), (now, left), floor)
-    return _keeps(before, now) and (lowers or explains)
+    mild = floor is not None and now.over(floor) <= SUFFICIENT_ERROR_RATIO
+    return (mild or _keeps(before, now)) and (lowers or explains)
 
 
 def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
@@ -102,6 +106,12 @@ def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
 def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence on the training runs alone or over all runs."""
     return gains_training_evidence(without, with_) or gains_evidence(without, with_)
+
+
+def only_validation_shows(h: ScoredModel, floor: Noise) -> bool:
+    """Whether a model follows the training runs to the noise and not the validation runs, or the latter far worse."""
+    followed = h.train.over(floor) <= SUFFICIENT_ERROR_RATIO < h.validation_errors.over(floor)
+    return validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO or (bool(h.validation) and followed)
 
 
 def validation_error_ratio(h: ScoredModel, floor: Noise) -> float:

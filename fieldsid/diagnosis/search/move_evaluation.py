@@ -12,7 +12,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
     gains_training_evidence,
     is_accepted,
     leaves_error,
-    validation_error_ratio,
+    only_validation_shows,
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
@@ -34,7 +34,7 @@ from fieldsid.diagnosis.search.add_effect import (
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
+from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import equivalent_solution, overlay_parameters, transfer_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
@@ -63,7 +63,7 @@ class MoveEvaluation(SearchState):
             self._fit_from_output_error(parent)
             self.tried.free_runs.screened.add(key)
             later = self._evaluate_moves(parent, by_effect(found))
-            if validation_error_ratio(parent, self.floor) > MAX_VALIDATION_ERROR_RATIO:
+            if only_validation_shows(parent, self.floor):
                 untried = [e for e in left if frozenset((*key, e.name)) not in self.tried]
                 self._evaluate_moves(parent, by_effect(moves_of_all_runs(parent, untried, self.parallel)), every=True)
             for other in self._other_solutions(parent):

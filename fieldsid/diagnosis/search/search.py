@@ -13,7 +13,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximu
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
-from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
+from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, add_effect, by_effect
 from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
 from fieldsid.diagnosis.search.multistart import multistart
@@ -23,7 +23,7 @@ from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_
 from fieldsid.models.effect import Effect
 
 MAX_JOINED = 3
-"""Sets that are fitted again with what the leading model has besides: a fit each."""
+"""Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
 
 
 @dataclass(slots=True)
@@ -34,6 +34,7 @@ class Search(MoveEvaluation):
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
         self._join_leaders()
+        self._grow_rivals()
         self._exchange_for_variants()
         self._exchange_for_lookalikes()
         self._drop_each()
@@ -91,6 +92,25 @@ class Search(MoveEvaluation):
             start = overlay_parameters(fitted.problem.layout, fitted.x, problem.layout, own)
             ml_fit = fit_maximum_likelihood(problem, start, best.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
             self.tried[names] = prefer_output_error(self._keep(ml_fit), self.floor)
+
+    def _grow_rivals(self) -> None:
+        """Add to the accepted sets that predict as well as the model of the highest evidence what may bring them above it.
+
+        Where that leaves the noise alone the search has ended, and an effect whose numbers pass for a lag of a sample has gained
+        on one that lacks the lag.
+        """
+        best = self._most_evident()
+        for h in [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]:
+            if self.budget.remaining():
+                left = [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
+                moves = add_effect(h, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True)
+                self._evaluate_moves(h, by_effect(moves))
+
+    def _predicts_as_well(self, h: ScoredModel, best: ScoredModel) -> bool:
+        """Whether an accepted set of no more effects, some at least, leaves nothing missing on fitted nor on unseen runs."""
+        pairs = ((h.selection_errors, best.selection_errors), (h.train, best.train))
+        alike = all(mine.mean < MISSING_ERROR_RATIO * other.mean for mine, other in pairs)
+        return alike and len(self.known) < len(h.names) <= len(best.names) and self.admissible(h)
 
     def _exchange_for_variants(self) -> None:
         """Try the model of the highest evidence without each effect, the others of the same stage in their other variants.

@@ -14,6 +14,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
     keeps_error,
     leaves_error,
     lowers_error,
+    only_validation_shows,
 )
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
@@ -56,6 +57,23 @@ BASE = hypothesis(over=1.2)
 @pytest.mark.parametrize(("over", "named"), [(1.19, False), (1.12, False), (1.09, True)])
 def test_a_name_asks_for_a_twelfth_of_the_error(over, named):
     assert is_accepted(BASE, hypothesis("servo_lag", gain=50.0, over=over)) == named
+
+
+@pytest.mark.parametrize(("over", "named"), [(1.06, True), (1.14, True), (1.16, False)])
+def test_an_unseen_run_that_stays_at_the_noise_speaks_against_nothing_that_a_visible_error_asks_for(over, named):
+    base = hypothesis(over=1.01, train=2.5)
+    found = hypothesis("backlash", gain=50.0, over=over, train=1.02)
+    assert lowers_error(base, found, FLOOR) == named
+    assert not lowers_error(base, found)
+
+
+@pytest.mark.parametrize(
+    ("train", "unseen", "shown"), [(1.02, 1.4, True), (1.02, 1.1, False), (1.4, 1.6, False), (1.4, 3.0, True)]
+)
+def test_what_the_unseen_runs_alone_show(train, unseen, shown):
+    errors = [Errors(FLOOR.angle * e, FLOOR.rate * e) for e in (train, unseen)]
+    h = SimpleNamespace(train=errors[0], validation_errors=errors[1], validation=(None,))
+    assert only_validation_shows(h, FLOOR) == shown
 
 
 @pytest.mark.parametrize(("over", "kept"), [(1.1, True), (1.22, True), (1.3, False)])

@@ -83,6 +83,23 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
     assert lagged.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
 
 
+def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(monkeypatch):
+    training, unseen = hidden_lag.runs()
+    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
+    effects = all_effects(Axis.YAW)
+    made = Search(*records, Axis.YAW, [effects[n] for n in ("servo_lag", "delay", "gyro_bias")])
+    base = made.base()
+    moves = add_effect(base, [effects["servo_lag"], effects["delay"]], None, made.parallel, anew=False, flown=True)
+    made._evaluate_moves(base, by_effect(moves))
+    best = made.tried[frozenset(["servo_lag"])]
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: best)
+    monkeypatch.setattr(search, "MISSING_ERROR_RATIO", 20.0)  # a dead time leaves more than that of so slow a servo
+    assert made._predicts_as_well(made.tried[frozenset(["delay"])], best)
+    assert not made._predicts_as_well(base, best)
+    made._grow_rivals()
+    assert frozenset(["delay", "servo_lag"]) in made.tried
+
+
 def test_a_model_moved_to_fewer_effects_has_the_numbers_it_had_and_the_likelihood_there(base):
     lag = base.catalogue[0]
     base._evaluate_moves(base.base(), by_effect(add_effect(base.base(), [lag], None, base.parallel, anew=True, flown=False)))
