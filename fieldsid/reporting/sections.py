@@ -35,7 +35,7 @@ def context_of(material: Material) -> dict[str, Any]:
         "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "tool": f"fieldsid {__version__}",
         "verdicts": [v for a in material.axes for v in _verdicts(a, state)] + _state_verdict(state),
-        "next": {"why": why, "command": "" if command == REPORT else command},  # this page is that report
+        "next": {"why": why, "command": "" if command.startswith(REPORT) else command},  # this page is that report
         "runs": [_run(r) for r in material.runs],
         "axes": [_axis(a) for a in material.axes],
         "vehicle": _vehicle(material),
@@ -272,7 +272,7 @@ def _gains(item: Item) -> dict[str, Any]:
     rows = [
         {
             "speed": number(r["speed_m_s"], 3), "kp": f"{r['kp']:.4f}", "ki": f"{r['ki']:.4f}", "kd": f"{r['kd']:.4f}",
-            "forward": f"{r['feed_forward_rad']:.4f}", "limit": f"{r['fin_limit_rad']:.3f}",
+            "forward": number(r["feed_forward_rad"], 3), "limit": f"{r['fin_limit_rad']:.3f}",
             "phase": number(r["phase_margin_deg"], 3),
             "gain": number(r["gain_margin_db"], 3), "delay": number(r["delay_margin_s"], 3),
             "supported": "yes" if r["supported"] else "no",
