@@ -15,7 +15,9 @@ import numpy as np
 
 from fieldsid.numerics.arrays import FloatArray
 
-WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 480, 48, 10, 18, 36, 22
+WIDTH, LEFT, RIGHT, TOP, BOTTOM, GAP = 480, 56, 10, 18, 36, 22
+SMALLEST_PLAIN = 1e-3
+"""The smallest tick that is written without a power of ten: more digits would be cut off at the page's edge."""
 MOST_POINTS = 700
 """Points of one line: as many as a wide screen tells apart."""
 TICKS_X, TICKS_Y = 6, 4
@@ -221,4 +223,8 @@ def _x_axis(top: float, x: tuple[float, float], label: str) -> str:
 
 
 def _shown(value: float) -> str:
+    """Return a tick's number, short enough for the margin: `0.0015`, `5e\u22124`."""
+    if 0.0 < abs(value) < SMALLEST_PLAIN:
+        digits, _, power = f"{value:.3e}".partition("e")
+        return f"{float(digits):g}e{int(power)}".replace("-", "\u2212")
     return f"{value:.6g}".replace("-", "\u2212")

@@ -16,7 +16,7 @@ from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
 from fieldsid.rounding import MANY, in_unit, interval, number, probability, with_error
 from fieldsid.trial_folder.journal import Entry
-from fieldsid.trial_folder.next_step import REPORT
+from fieldsid.trial_folder.next_step import REPORT, verification_of
 from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import FolderState, Item
 from fieldsid.turning.known_radius import BRACKETED, is_band_only, radius_cell, turn_words
@@ -34,8 +34,8 @@ def context_of(material: Material) -> dict[str, Any]:
         "folder": state.folder.resolve().name,
         "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "tool": f"fieldsid {__version__}",
-        "verdicts": [v for a in material.axes for v in _verdicts(a)] + _state_verdict(state),
-        "next": {"why": why, "command": "" if command == REPORT else command},  # this page is that report
+        "verdicts": [v for a in material.axes for v in _verdicts(a, state)] + _state_verdict(state),
+        "next": {"why": why, "command": "" if command.startswith(REPORT) else command},  # this page is that report
         "runs": [_run(r) for r in material.runs],
         "axes": [_axis(a) for a in material.axes],
         "vehicle": _vehicle(material),
@@ -46,7 +46,7 @@ def context_of(material: Material) -> dict[str, Any]:
     }
 
 
-def _verdicts(axis: AxisMaterial) -> list[dict[str, str]]:
+def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
     best = axis.shown[0]
     out = []
     if best.found:
@@ -54,9 +54,11 @@ def _verdicts(axis: AxisMaterial) -> list[dict[str, str]]:
         judged = unseen or seen
         over = exp(sum(log(c.leading.over_floor) for c in judged) / len(judged))
         on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
-        good = max(c.leading.over_floor for c in judged) <= DOWN_TO_NOISE
+        worst = max(judged, key=lambda c: c.leading.over_floor)
+        good = worst.leading.over_floor <= DOWN_TO_NOISE
         tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
-        says = f"error {over:.2f} x the noise on {on}{tail}" if over < MANY else _without_noise(judged, on)
+        most = f", {worst.leading.over_floor:.2f} x on {worst.run}" if len(judged) > 1 and not good else ""
+        says = f"error {over:.2f} x the noise on {on}{most}{tail}" if over < MANY else _without_noise(judged, on)
         effects = f" with {', '.join(best.model.effects)}" if best.model.effects else ""
         out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
     if axis.diagnosis is not None and axis.diagnosis.body is not None:
@@ -65,7 +67,7 @@ def _verdicts(axis: AxisMaterial) -> list[dict[str, str]]:
     if axis.turning is not None and axis.turning.body is not None:
         out.append(_turn_verdict(axis.turning.body))
     if axis.schedule is not None and axis.schedule.body is not None:
-        out.append(_gain_verdict(axis.axis, axis.schedule.body))
+        out.append(_gain_verdict(axis.axis, axis.schedule.body, verification_of(state, axis.schedule)))
     return out
 
 
@@ -81,7 +83,11 @@ def _turn_verdict(body: Mapping[str, Any]) -> dict[str, str]:
     return {"what": "tightest turn", "says": says, "state": "warn" if row["extrapolated"] else "good"}
 
 
-def _gain_verdict(axis: str, body: Mapping[str, Any]) -> dict[str, str]:
+FAILED = ("does not hold", "FAILED")
+"""First words of a verification that the gains did not pass."""
+
+
+def _gain_verdict(axis: str, body: Mapping[str, Any], verified: Entry | None) -> dict[str, str]:
     rows = body["rows"]
     worst = min(rows, key=lambda r: np.inf if r["phase_margin_deg"] is None else float(r["phase_margin_deg"]))
     phase, wanted = float(worst["phase_margin_deg"] or np.inf), float(body["phase_margin_wanted_deg"])
@@ -90,8 +96,8 @@ def _gain_verdict(axis: str, body: Mapping[str, Any]) -> dict[str, str]:
     )
     return {
         "what": f"{axis} gains at {len(rows)} speed{'s' * (len(rows) > 1)}",
-        "says": says,
-        "state": "good" if phase >= wanted - 0.5 else "warn",
+        "says": says if verified is None else f"{says}; verified: {verified.verdict}",
+        "state": "good" if phase >= wanted - 0.5 and not (verified and verified.verdict.startswith(FAILED)) else "warn",
     }
 
 
@@ -119,6 +125,7 @@ def _run(run: Any) -> dict[str, Any]:
 def _axis(axis: AxisMaterial) -> dict[str, Any]:
     best = axis.shown[0]
     failing = [(c.run, ch, c) for c in best.found for ch in c.failing]
+    told = axis.shown[:1] if axis.line else axis.shown
     return {
         "name": axis.axis,
         "pairs": [_pair(shown, c, axis) for shown in axis.shown for c in shown.found],
@@ -135,8 +142,8 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "errors_over": "" if _is_noiseless(axis.diagnosis) else ", x noise",
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
         "fall": figures.fall(axis.line, f"the falling error of the {axis.axis} model"),
-        "parameters": [row for s in axis.shown[:1] for row in _parameters(s)] if len(axis.shown) == 1 or axis.line else
-        [row for s in axis.shown for row in _parameters(s)],
+        "parameters": [row for s in told for row in _parameters(s)],
+        "parameters_of": told[0].path if len(told) == 1 else None,
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
         "gains": None if axis.schedule is None else _gains(axis.schedule),
@@ -265,7 +272,7 @@ def _gains(item: Item) -> dict[str, Any]:
     rows = [
         {
             "speed": number(r["speed_m_s"], 3), "kp": f"{r['kp']:.4f}", "ki": f"{r['ki']:.4f}", "kd": f"{r['kd']:.4f}",
-            "forward": f"{r['feed_forward_rad']:.4f}", "limit": f"{r['fin_limit_rad']:.3f}",
+            "forward": number(r["feed_forward_rad"], 3), "limit": f"{r['fin_limit_rad']:.3f}",
             "phase": number(r["phase_margin_deg"], 3),
             "gain": number(r["gain_margin_db"], 3), "delay": number(r["delay_margin_s"], 3),
             "supported": "yes" if r["supported"] else "no",

@@ -101,7 +101,8 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
         found.append(f"unstable at {number(weakest.speed, 3)} m/s{of}, phase margin {number(weakest.phase_least_deg, 3)} deg")
     elif (hunting := next((c for c in checked.scheduled if c.hunts), None)) and (after := hunting.hunts):
         words = "diverges" if not isfinite(after.swing) else f"still swings by {degrees(after.swing * after.size):.1f} deg"
-        found.append(f"at {number(hunting.speed, 3)} m/s the loop {words} after a {degrees(after.size):.0f} deg step")
+        drawn = " by some draws of the models' errors, not by the estimate" if checked.spread and isfinite(after.settling) else ""
+        found.append(f"at {number(hunting.speed, 3)} m/s the loop {words} after a {degrees(after.size):.0f} deg step{drawn}")
     unheld = min(schedule.rows, key=lambda r: r.draws_held)
     if unheld.draws_held < HELD_SHARE and not found and checked.spread:
         found.append(f"at {number(unheld.speed, 3)} m/s it holds {100 * unheld.draws_held:.0f} % of the draws it was designed on")

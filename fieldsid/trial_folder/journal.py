@@ -18,6 +18,8 @@ from fieldsid.display import Brief
 
 JOURNAL = "journal.jsonl"
 SCHEMA = "fieldsid/journal/1"
+GROUPS = (("schedule",), ("effects",))
+"""First words of commands whose second word says which of several they are."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -45,6 +47,11 @@ class Entry(Brief):
     inputs: tuple[Stamp, ...] = ()
     outputs: tuple[Stamp, ...] = ()
     named: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The command without what it was given: `schedule verify`, `report`."""
+        return " ".join(self.command[1 : 3 if self.command[1:2] in GROUPS else 2])
 
 
 def is_trial(folder: Path) -> bool:

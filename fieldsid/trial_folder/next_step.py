@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
+from math import isfinite
 from pathlib import Path
 
+from fieldsid.artifacts import sha256_of
+from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.rounding import MANY
 from fieldsid.trial_folder.journal import Entry, is_trial, made_by
-from fieldsid.trial_folder.make import RUNS
+from fieldsid.trial_folder.make import LOGS, RUNS
+from fieldsid.trial_folder.patterns import shortened
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
 from fieldsid.vehicle import find_vehicle
 
@@ -17,6 +22,10 @@ DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 
 REPORT = "sysid report"
+MORE_THAN_NOISE = 1.15
+"""The error over the noise floor above which something is missing, as in `diagnosis/thresholds.py`: here without its imports."""
+PORT = 14550
+"""The UDP port that a ground station usually listens on."""
 TAKES_ALL_RUNS = ("identify", "diagnose")
 """Commands that take every run of their trial folder where none is typed."""
 
@@ -77,9 +86,12 @@ def _data(state: FolderState) -> tuple[str, str] | None:
     if runs or state.of_kind(MODEL):
         return None
     if logs:
-        return "there is no run of the logs yet", shlex.join(
-            ["sysid", "import", *(i.path for i in logs), *_left_out(state, "-o", RUNS)]
-        )
+        words = ["sysid", "import", *_left_out(state, *logs_to_import(state), "-o", RUNS)]
+        return "there is no run of the logs yet", shortened(words, state.folder)
+    if plans := state.of_kind("plan"):
+        axis = str((plans[-1].body or {}).get("axis", Axis.YAW.value))
+        live = ["sysid", "live", "--axis", axis, "--udp", str(PORT), *_left_out(state, "--plan", plans[-1].path)]
+        return f"there is no log yet: fly {plans[-1].path} and put the logs in {LOGS}/", shlex.join(live)
     return "there is no log yet", f"sysid plan --axis yaw --speeds {_speeds(state.folder)}"
 
 
@@ -115,9 +127,43 @@ def _model(state: FolderState) -> tuple[str, str] | None:
     if lacking and not tried:
         add = [w for e in lacking for w in ("--add", e)]
         return f"the diagnosis names {', '.join(lacking)}", shlex.join(
-            ["sysid", "extend", *_left_out(state, best.path, *trained_runs(state, best)), *add]
+            ["sysid", "extend", *_left_out(state, best.path, *_typed_runs(state, best)), *add]
         )
-    return None
+    return _searched_on(state, best)
+
+
+def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
+    """Return how to ask what an extended model still lacks, by its own record, where no diagnosis asked since it was made."""
+    left = _left_by(best)
+    if not left > MORE_THAN_NOISE:
+        return None
+    place = state.place(best)
+    asked = (
+        e.command[1:2] == ("diagnose",) and e.exit in DONE and any(s.sha256 == sha256_of(place) for s in e.inputs)
+        for e in state.entries
+    )
+    asking = (any(s.path == place.resolve() for s in i.sources) for i in state.of_kind("diagnosis"))
+    if any(asked) or any(asking):
+        return None
+    words = ["sysid", "diagnose", *_left_out(state, *run_words(state)), "--axis", _axis(state), "--model", best.path]
+    return f"{best.path} leaves {left:.2f} x the noise" if left < MANY else f"{best.path} leaves more than the noise", shlex.join(
+        words
+    )
+
+
+def _left_by(model: Item) -> float:
+    """Return the error over the noise floor that an extended model leaves, the larger of fitted and unseen runs; else NaN."""
+    record = ((model.body or {}).get("info") or {}).get("extension") or {}
+    over = [_over(errors, record.get("noise_floor") or {}) for errors in (record.get("after") or {}).values()]
+    return max((o for o in over if isfinite(o)), default=float("nan"))
+
+
+def _over(errors: Mapping[str, float | None], floor: Mapping[str, float | None]) -> float:
+    """Return errors over the noise floor, the measured channels pooled, as `sysid extend` says it."""
+    names = (("angle_rms_rad", "angle_rad"), ("rate_rms_rad_s", "rate_rad_s"))
+    pairs = [(errors.get(name), floor.get(of)) for name, of in names]
+    parts = [(e / f) ** 2 for e, f in pairs if e is not None and isfinite(e) and f]
+    return (sum(parts) / len(parts)) ** 0.5 if parts else float("nan")
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
@@ -149,18 +195,46 @@ def _named(diagnosis: Item) -> list[str]:
 def _use(state: FolderState) -> tuple[str, str] | None:
     schedules = state.of_kind("schedule")
     models = chosen_models(state)
+    design = ["sysid", "schedule", "design", *_left_out(state, *models), "-o"]
     if not schedules:
-        return (
-            ("no gains yet", shlex.join(["sysid", "schedule", "design", *_left_out(state, *models), "-o", "gains.yaml"]))
-            if models
-            else None
-        )
-    if not any(e.command[1:3] == ("schedule", "verify") and e.exit in DONE for e in state.entries):
+        return ("no gains yet", shlex.join([*design, "gains.yaml"])) if models else None
+    gains = schedules[-1]
+    if models and (old := _extended_since(state, gains)):
+        return f"{gains.path} rests on {old}, which was extended since", shlex.join([*design, gains.path, "--force"])
+    if verification_of(state, gains) is None:
         known = "the gains are not verified" if is_trial(state.folder) else "no journal says that the gains are verified"
-        return known, shlex.join(["sysid", "schedule", "verify", *_left_out(state, schedules[-1].path)])
-    if is_trial(state.folder) and not any(e.command[1:2] == ("report",) and e.exit in DONE for e in state.entries):
+        return known, shlex.join(["sysid", "schedule", "verify", *_left_out(state, gains.path)])
+    return _reported(state) if is_trial(state.folder) else None
+
+
+def _extended_since(state: FolderState, gains: Item) -> str:
+    """Return the first model that gains rest on and another one here was extended from; empty without one."""
+    used = {s.path for s in gains.sources}
+    last = {i.path for i in state.models}
+    return next((i.path for i in state.of_kind(MODEL) if state.place(i).resolve() in used and i.path not in last), "")
+
+
+def verification_of(state: FolderState, gains: Item) -> Entry | None:
+    """Return the journal's last entry of a command that verified gains as they are now."""
+    done = [e for e in state.entries if e.name == "schedule verify" and e.exit in DONE]
+    now = sha256_of(state.place(gains)) if done else ""
+    return next((e for e in reversed(done) if not e.inputs or now in {s.sha256 for s in e.inputs}), None)
+
+
+def _reported(state: FolderState) -> tuple[str, str] | None:
+    """Return how the report is written, or written again where a command made something after it."""
+    reports = [i for i, e in enumerate(state.entries) if e.command[1:2] == ("report",) and e.exit in DONE]
+    if not reports:
         return "there is no report yet", REPORT
-    return None
+    since = [
+        e for e in state.entries[reports[-1] + 1 :] if any(s.path.endswith((".yaml", ".yml", ".parquet")) for s in e.outputs)
+    ]
+    if not since:
+        return None
+    entry = state.entries[reports[-1]]
+    words = [w for w in entry.command if w != "--json"]
+    again = shlex.join([*words, *([] if "--force" in words else ["--force"])])
+    return f"the report is older than what `sysid {since[-1].name}` made", again
 
 
 def chosen_models(state: FolderState, axis: str = "") -> list[str]:
@@ -196,6 +270,39 @@ def trained_runs(state: FolderState, model: Item) -> list[str]:
     fitted = {str(r) for r in (model.body or {}).get("runs", ())}
     named = {s.path for s in model.sources if s.path is not None}
     return [i.path for i in state.of_kind(RUN) if state.place(i).resolve() in named and Path(i.path).stem in fitted]
+
+
+def diagnosed_runs(state: FolderState, model: Item) -> tuple[list[str], list[str]]:
+    """Return the runs that an addition to a model is fitted to, and those that judge it, as in the diagnosis that named it.
+
+    Without a diagnosis of the model's plane, or where a run of it is no longer there, the runs that the model was fitted to: a
+    run that an earlier addition held back would be lost to the next one otherwise.
+    """
+    axis = (model.body or {}).get("axis")
+    made = [i for i in state.of_kind("diagnosis") if (i.body or {}).get("axis") == axis]
+    if made:
+        body = max(made, key=lambda i: state.place(i).stat().st_mtime_ns).body or {}
+        named = {stem_of(Path(r)): r for r in run_words(state)}
+        fitted, judged = ([str(r) for r in body.get(key) or ()] for key in ("runs", "validation_runs"))
+        if fitted and all(r in named for r in (*fitted, *judged)):
+            return [named[r] for r in fitted], [named[r] for r in judged]
+    return trained_runs(state, model), []
+
+
+def _typed_runs(state: FolderState, model: Item) -> list[str]:
+    fitted, judged = diagnosed_runs(state, model)
+    return [*fitted, *(w for r in judged for w in ("--validate", r))]
+
+
+def logs_to_import(state: FolderState, *, again: bool = False) -> list[str]:
+    """Return the logs of a folder that no run was made of; all of them with `again`, and where there are no others.
+
+    Where the folder of logs holds any, a table that lies elsewhere is none of them.
+    """
+    logs = [i for i in state.of_kind(LOG) if i.path.startswith(f"{LOGS}/")] or list(state.of_kind(LOG))
+    used = set() if again else {s.path for i in state.of_kind(RUN) for s in i.sources}
+    new = [i.path for i in logs if state.place(i).resolve() not in used]
+    return new or [i.path for i in logs]
 
 
 def _left_out(state: FolderState, *words: str) -> tuple[str, ...]:

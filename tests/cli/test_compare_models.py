@@ -97,3 +97,17 @@ def test_three_models_without_a_run_are_refused(run_cli, tmp_path):
     answer = run_cli("compare", *(saved(tmp_path / f"{n}.yaml") for n in "abc"))
     assert answer.code == 2
     assert "several models are compared over runs" in answer.err
+
+
+def test_a_run_of_the_same_name_from_another_day_judges_a_model_that_has_not_seen_it(run_cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for seed, day in ((3, "before"), (4, "after")):
+        trial.flown(tmp_path / day / "runs", seed=seed, name="run7")
+        assert run_cli("identify", f"{day}/runs/run7.parquet", "--axis", "yaw", "-o", day, "--no-figures").code == 0
+    models = [f"{day}/run7_yaw.yaml" for day in ("before", "after")]
+    body = run_cli("compare", *models, "after/runs/run7.parquet", "--json").json
+    assert [m["fitted_to"] for m in body["models"]] == [[], ["run7"]]
+    alone = run_cli("compare", models[0], "after/runs/run7.parquet", "--json").json
+    assert [r["fitted_to"] for r in alone["runs"]] == [False]
+    body = run_cli("compare", models[1], f"{tmp_path}/after/run7_yaw.yaml", "after/runs/run7.parquet", "--json").json
+    assert body["headline"]["rests_on"].endswith("; every one was fitted to run7: no fair judge")

@@ -9,11 +9,15 @@ from hashlib import sha256
 
 import numpy as np
 import pytest
+import yaml
 from cli import trial
 
+from fieldsid.cli.trial.filled import FILLS
+from fieldsid.cli.trial.parsed import parse
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.journal import Entry, Stamp, append
+from fieldsid.trial_folder.state import state_of
 
 BOTH_RUNS = ("runs/pulses_1.0.parquet", "runs/pulses_1.4.parquet")
 
@@ -295,3 +299,139 @@ def test_batch_takes_the_logs_and_the_vehicle(run_cli, folder):
     body = run_cli("batch", "--axis", "yaw", "--no-diagnose", "--workers", "1", "--json")
     assert body.json["runs"] == 2
     assert "--vehicle vehicle.yaml" in body.err
+
+
+def test_import_takes_the_logs_that_are_no_runs_yet_and_status_and_inspect_say_so(run_cli, folder):
+    for run in sorted((folder / "runs").iterdir()):
+        save_run(load_run(run), folder / "logs" / f"{run.stem}.csv")
+        run.unlink()
+    assert run_cli("status", "--json").json["next"]["command"] == "sysid import"
+    assert run_cli("inspect", "logs/pulses_1.0.csv", "--json").json["headline"]["next"] == "sysid import"
+    assert [r["run"] for r in run_cli("import", "logs/pulses_1.0.csv", "--json").json["runs"]] == ["pulses_1.0"]
+    answer = run_cli("import", "--json")
+    assert [r["run"] for r in answer.json["runs"]] == ["pulses_1.4"]
+    assert "taken from the trial folder: -o runs logs/pulses_1.4.csv" in answer.err
+    assert [r["run"] for r in run_cli("import", "--force", "--json").json["runs"]] == ["pulses_1.0", "pulses_1.4"]
+
+
+def test_a_log_from_elsewhere_is_imported_by_its_name(run_cli, folder):
+    (folder / "runs/pulses_1.0.parquet").rename(folder.parent / "elsewhere.parquet")
+    answer = run_cli("inspect", "../elsewhere.parquet", "--json")
+    assert answer.json["headline"]["next"].startswith("sysid import ../elsewhere.parquet ")
+
+
+def diagnosis(folder, runs, judges=(), effects=("servo_lag",)):
+    """Write what a diagnosis of some runs says, and what judged."""
+    lines = ["schema: fieldsid/diagnosis/1", "axis: yaw", f"effects: {json.dumps(list(effects))}"]
+    lines += [f"{key}: {json.dumps(list(names))}" for key, names in (("runs", runs), ("validation_runs", judges))]
+    (folder / "models/diagnosis_yaw.yaml").write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("judges", "taken"),
+    [((), BOTH_RUNS), (("pulses_1.4",), (BOTH_RUNS[0], "--validate", BOTH_RUNS[1]))],
+)
+def test_extend_takes_the_runs_of_the_diagnosis_that_names_the_effect(run_cli, folder, judges, taken):
+    assert run_cli("identify", "runs/pulses_1.0.parquet", "--axis", "yaw", "--no-figures").code == 0
+    diagnosis(folder, [r for r in ("pulses_1.0", "pulses_1.4") if r not in judges], judges)
+    answer = run_cli("extend", "--add", "servo_lag")
+    assert answer.code == 0
+    command = journal(folder)[-1]["command"]
+    assert command[4] == "models/pulses_1.0_yaw.yaml"
+    assert tuple(command[5:]) == taken
+
+
+def extended(folder, left):
+    """Write a model extended from the joint one, whose record says what it leaves on the runs fitted to."""
+    body = yaml.safe_load((folder / "models/joint_yaw.yaml").read_text())
+    errors = {"angle_rms_rad": left * 0.005, "rate_rms_rad_s": left * 0.004}
+    record = {
+        "after": {"train": errors, "validation": dict.fromkeys(errors)},
+        "noise_floor": {"angle_rad": 0.005, "rate_rad_s": 0.004},
+    }
+    parent = {"path": "models/joint_yaw.yaml", "sha256": sha256((folder / "models/joint_yaw.yaml").read_bytes()).hexdigest()}
+    body |= {"parent": parent, "effects": ["servo_lag"], "info": body["info"] | {"extension": record}}
+    (folder / "models/joint_yaw+servo_lag.yaml").write_text(yaml.safe_dump(body))
+
+
+@pytest.mark.parametrize(
+    ("left", "next_"),
+    [
+        (1.05, "sysid schedule design -o gains.yaml"),
+        (2.31, "sysid diagnose --axis yaw --model models/joint_yaw+servo_lag.yaml"),
+    ],
+)
+def test_status_goes_on_from_an_extended_model_as_extend_itself_does(run_cli, folder, left, next_):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    diagnosis(folder, ("pulses_1.0", "pulses_1.4"))
+    extended(folder, left)
+    assert run_cli("status", "--json").json["next"]["command"] == next_
+
+
+def test_gains_of_a_model_that_was_extended_since_are_designed_again_verified_again_and_reported_again(run_cli, folder):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    diagnosis(folder, ("pulses_1.0", "pulses_1.4"), effects=())
+    made_of = f"inputs:\n- path: models/joint_yaw.yaml\n  sha256: {stamped(folder, 'models/joint_yaw.yaml')}\n"
+    (folder / "gains.yaml").write_text(f"schema: fieldsid/schedule/1\n{made_of}")
+    entries = iter(range(1, 9))
+
+    def done(*command, inputs=(), outputs=()):
+        ins, outs = (tuple(Stamp(f, stamped(folder, f), 0, 0) for f in files) for files in (inputs, outputs))
+        append(folder, Entry(f"2027-01-01T00:00:0{next(entries)}+00:00", ("sysid", *command), 0, 1.0, "", ins, outs))
+
+    def next_():
+        return run_cli("status", "--json").json["next"]
+
+    assert next_()["command"] == "sysid schedule verify"
+    done("schedule", "verify", "gains.yaml", inputs=["gains.yaml"])
+    assert next_()["command"] == "sysid report"
+    done("report")
+    assert next_()["command"] == ""
+    extended(folder, 1.0)
+    said = next_()
+    assert said["why"] == "gains.yaml rests on models/joint_yaw.yaml, which was extended since"
+    assert said["command"] == "sysid schedule design -o gains.yaml --force"
+    text = (folder / "gains.yaml").read_text().replace("joint_yaw.yaml", "joint_yaw+servo_lag.yaml")
+    old = stamped(folder, "models/joint_yaw.yaml")
+    (folder / "gains.yaml").write_text(text.replace(old, stamped(folder, "models/joint_yaw+servo_lag.yaml")))
+    assert next_()["command"] == "sysid schedule verify"
+    done("schedule", "design", "-o", "gains.yaml", "--force", outputs=["gains.yaml"])
+    done("schedule", "verify", "gains.yaml", inputs=["gains.yaml"])
+    assert next_() == {
+        "why": "the report is older than what `sysid schedule design` made",
+        "command": "sysid report --force",
+    }
+
+
+def stamped(folder, name):
+    return sha256((folder / name).read_bytes()).hexdigest()
+
+
+def test_a_plan_is_written_where_live_finds_it_and_is_flown_next(run_cli, folder, monkeypatch):
+    for run in (folder / "runs").iterdir():
+        run.unlink()
+    (folder / "plan").mkdir()
+    (folder / "plan/plan.yaml").write_text("schema: fieldsid/plan/1\naxis: pitch\n")
+    body = run_cli("status", "--json").json["next"]
+    assert body["command"] == "sysid live --axis pitch --udp 14550"
+    assert body["why"] == "there is no log yet: fly plan/plan.yaml and put the logs in logs/"
+    filled = FILLS["plan"](parse(["plan", "--axis", "yaw", "--speeds", "1"]), state_of(folder))
+    assert filled == ["-o", "plan-2"]
+
+
+@pytest.mark.parametrize("line", [("schedule", "design"), ("fit",)])
+def test_what_would_overwrite_a_file_is_refused_before_the_work(run_cli, folder, monkeypatch, line):
+    assert run_cli("identify", "--axis", "yaw", "--no-figures").code == 0
+    (folder / "out.yaml").write_text("mine")
+    monkeypatch.setattr("fieldsid.plant.parameter_source.load_parameter_source", None)
+    answer = run_cli(*line, "-o", "out.yaml")
+    assert (answer.code, answer.err.splitlines()[-4:-2]) == (2, ["error: `out.yaml` exists", "  found: 4 bytes"])
+
+
+def test_status_keeps_the_names_of_files_in_one_piece_and_says_which_command_of_several(run_cli, folder):
+    name = "turning_circle_to_starboard"
+    (folder / "runs/pulses_1.0.parquet").rename(folder / f"runs/{name}.parquet")
+    append(folder, Entry("2026-01-01T00:00:00+00:00", ("sysid", "schedule", "verify", "gains.yaml"), 0, 1.0, "holds"))
+    out = run_cli("status").out
+    assert f"runs/{name}.parquet" in out
+    assert "sysid schedule verify: holds" in out

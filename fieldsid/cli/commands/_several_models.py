@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.console import emit, table
+from fieldsid.cli.other_data import unlike_fitted
 from fieldsid.cli.progress import get_ready
 from fieldsid.errors import UsageError
 
@@ -62,8 +63,8 @@ def several_models(
             {
                 "model": str(p),
                 "over_floor": _score(found),
-                "fitted_to": _fitted(m, found),
-                "runs": [entry(c, None) for c in found],
+                "fitted_to": _fitted(m, found, unlike_fitted(p, logs)),
+                "runs": [entry(c, None) | {"fitted_to": c.run in _fitted(m, found, unlike_fitted(p, logs))} for c in found],
             }
             for p, m, found in zip(paths, models, found_of, strict=True)
         ],
@@ -87,8 +88,8 @@ def _score(found: Sequence[Comparison]) -> float:
     return exp(sum(log(c.leading.over_floor) for c in found) / len(found))
 
 
-def _fitted(model: Model, found: Sequence[Comparison]) -> list[str]:
-    return [c.run for c in found if c.run in model.runs]
+def _fitted(model: Model, found: Sequence[Comparison], others: frozenset[str]) -> list[str]:
+    return [c.run for c in found if c.run in model.runs and c.run not in others]
 
 
 def _names(paths: Sequence[Path]) -> list[str]:

@@ -11,6 +11,7 @@ import typer
 
 from fieldsid.cli.console import complain, emit, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
+from fieldsid.cli.other_data import unlike_fitted
 from fieldsid.cli.progress import get_ready, refuse_closed
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_in, shown_words
@@ -102,7 +103,11 @@ def command(
 
     found = compare(known, logs, unfit=skips.skip)
     drawn = _drawn(known, model, found, output if figures else None, context, force=force)
-    entries = [_entry(c, figure) for c, figure in zip(found, drawn, strict=True)]
+    others = unlike_fitted(model, logs)
+    entries = [
+        _entry(c, figure) | {"fitted_to": c.run in known.runs and c.run not in others}
+        for c, figure in zip(found, drawn, strict=True)
+    ]
     notes = left_out(logs, known.axis)
     body = {
         "schema": "fieldsid/compare/1",

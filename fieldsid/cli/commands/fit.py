@@ -11,6 +11,7 @@ import typer
 
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.options import Figures, Force, JsonFlag, ModelFiles, OutputFile
+from fieldsid.cli.progress import refuse_existing
 from fieldsid.cli.session import tasks_of
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def command(
     from fieldsid.plant.laws.axis_laws import law_notes, report, save_laws
     from fieldsid.plant.parameter_source import load_parameter_source
 
+    refuse_existing(output, output.with_suffix(".png") if output is not None and figures else None, force=force)
     source = load_parameter_source(models)
     if source.is_fit_file:
         raise UsageError("this is a fit file already", found=str(models[0]), hint="give models or a table")

@@ -13,7 +13,7 @@ from fieldsid.cli.commands._schedule_tables import render_design, render_export,
 from fieldsid.cli.console import emit, say
 from fieldsid.cli.headlines.gains import of_design, of_export, of_patch, of_verification
 from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
-from fieldsid.cli.progress import refuse_figure
+from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import tasks_of
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ def design(
     from fieldsid.schedule.record import body_of, save_schedule
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
+    refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
     fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")

@@ -13,8 +13,10 @@ import typer
 
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.headlines.trial import of_status
+from fieldsid.cli.headlines.words import counted
 from fieldsid.cli.options import JsonFlag
 from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import stem_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,6 +31,9 @@ ORDER = ("vehicle", "mapping", "plan", "log", "run", "model", "diagnosis", "fit"
 MANY_IN_ONE, SEVERAL = ("laws", "gains"), {"diagnosis": "diagnoses", "turning radius": "turning radii"}
 """Files that hold several of what they are named after, and words whose plural is their own."""
 MOST_SOURCES = 2
+"""Files that one was made from, up to which each is named; of more the first is."""
+WIDEST_NAME = 40
+"""Characters up to which a file's name stays in one piece, whatever stands beside it."""
 LAST = 3
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="The trial folder; the one it is run in if not given.")]
@@ -98,20 +103,22 @@ def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:
     listed = [i for i in state.items if i.kind in NAMES and not (i.kind == "log" and state.place(i).resolve() in used)]
     shown = sorted(listed, key=lambda i: (ORDER.index(i.kind), i.path))
     if shown:
-        to.print(table("", ("file", "what", "made from", ""), [_row(i) for i in shown], left=4))
+        rows = table("", ("file", "what", "made from", ""), [_row(i) for i in shown], left=4)
+        rows.columns[0].width = min(max(len(i.path) for i in shown), WIDEST_NAME)
+        to.print(rows)
     kept = [e for e in state.entries if e.verdict][-LAST:]
     if kept:
         to.print()
     for e in kept:
         done = "" if e.exit in (0, 1) else "failed: "
         when = datetime.fromisoformat(e.time).astimezone().strftime("%Y-%m-%d %H:%M")
-        to.print(f"{when}  {' '.join(e.command[:2])}: {done}{e.verdict}", markup=False, soft_wrap=True)
+        to.print(f"{when}  sysid {e.name}: {done}{e.verdict}", markup=False, soft_wrap=True)
 
 
 def _row(item: Item) -> Sequence[str]:
-    names = [Path(s.named).name for s in item.sources]
-    said = ", ".join(names[:MOST_SOURCES]) + (f" and {len(names) - MOST_SOURCES} more" if len(names) > MOST_SOURCES else "")
+    names = [stem_of(Path(s.named)) for s in item.sources]
+    said = ", ".join(names) if len(names) <= MOST_SOURCES else f"{names[0]} and {len(names) - 1} more"
     what = NAMES[item.kind]
-    effects = ", ".join((item.body or {}).get("effects", ())) if item.kind == "model" else ""
+    effects = len((item.body or {}).get("effects", ())) if item.kind == "model" else 0
     state = f"stale: {item.stale}" if item.stale else f"not there: {', '.join(item.missing)}" if item.missing else ""
-    return item.path, f"{what} + {effects}" if effects else what, said, state
+    return item.path, f"{what}, {counted(effects, 'effect')}" if effects else what, said, state

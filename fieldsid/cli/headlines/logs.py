@@ -9,6 +9,10 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.trial_folder.journal import is_trial
+from fieldsid.trial_folder.make import LOGS
+
+MAPPING = "mapping.yaml"
 
 PROOF = "evidence"
 """Code of a finding that says why a column was taken for a signal: nothing is wrong there."""
@@ -37,10 +41,18 @@ def of_inspection(body: Body, mapping: Path | None) -> Headline:
 def _after(body: Body, mapping: Path | None) -> str:
     known = body["mapping_file"] or mapping
     if body["mapping_needed"] and known is None:
-        return typed_with("--write-mapping", "mapping.yaml", *(("--force",) if Path("mapping.yaml").exists() else ()))
+        return typed_with("--write-mapping", MAPPING, *(("--force",) if Path(MAPPING).exists() else ()))
     if not body["signals"]:  # an import is refused until somebody has said what the columns are
         return pasted("guide", "trial")
+    if _is_taken(Path(body["path"]), known) and not body["import_options"]:
+        return pasted("import")
     return pasted("import", body["path"], *(("--mapping", known) if known else ()), *body["import_options"], "-o", "runs/")
+
+
+def _is_taken(log: Path, mapping: Path | None) -> bool:
+    """Whether an import here takes a log, and its mapping, from the trial folder."""
+    is_here = is_trial(Path()) and log.resolve().parent == Path(LOGS).resolve()
+    return is_here and (mapping is None or mapping.resolve() == Path(MAPPING).resolve())
 
 
 def of_import(body: Body) -> Headline:

@@ -135,11 +135,10 @@ def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: S
     others = ", ".join(f"{n} at {s:.2f} x" for s, n in scores[1:])
     word = "follows no better than the next" if second <= close * least else "follows best"
     over = body["models"][0]["runs"]
-    seen = [
-        f"{n} was fitted to {named(m['fitted_to'])}: no fair judge of it"
-        for n, m in zip(names, body["models"], strict=True)
-        if m["fitted_to"]
-    ]
+    fitted = [(n, named(m["fitted_to"])) for n, m in zip(names, body["models"], strict=True) if m["fitted_to"]]
+    seen = [f"{n} was fitted to {to}: no fair judge of it" for n, to in fitted]
+    if len(fitted) == len(names) and len({to for _, to in fitted}) == 1:
+        seen = [f"every one was fitted to {fitted[0][1]}: no fair judge"]
     rests = f"{counted(len(over), 'run')}, geometric mean of the worse channel of each" + (f"; {'; '.join(seen)}" if seen else "")
     entry = next(m for m in body["models"] if m["model"] == body["best"])
     fails = any(e["failing"] for e in entry["runs"])

@@ -8,9 +8,7 @@ from pathlib import Path
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted
-
-PORT = 14550
-"""The UDP port that a ground station usually listens on."""
+from fieldsid.trial_folder.next_step import PORT
 
 
 def of_trial(body: Body) -> Headline:

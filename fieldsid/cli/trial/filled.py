@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from fieldsid.cli.trial.parsed import Parsed
 from fieldsid.errors import FieldsidError
-from fieldsid.trial_folder.make import MODELS, RUNS
-from fieldsid.trial_folder.next_step import chosen_models, run_words, trained_runs, unseen_runs
+from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
+from fieldsid.trial_folder.next_step import chosen_models, diagnosed_runs, logs_to_import, run_words, unseen_runs
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
 
 FEW = 3
@@ -41,13 +41,25 @@ def _output(parsed: Parsed, folder: str) -> list[str]:
 
 def _diagnose(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the runs, and a file that is free for the diagnosis: the report shows it, and `plan --from` takes it."""
-    names = (f"{MODELS}/diagnosis_{parsed.values.get('axis')}{f'-{i}' if i > 1 else ''}.yaml" for i in range(1, 10_000))
-    free = next(n for n in names if not (state.folder / n).exists())
-    return [*_runs(parsed, state), *_output(parsed, free)]
+    name = f"{MODELS}/diagnosis_{parsed.values.get('axis')}"
+    return [*_runs(parsed, state), *_output(parsed, _free(state, name, ".yaml"))]
 
 
-def _import(parsed: Parsed, _state: FolderState) -> list[str]:
-    return _output(parsed, RUNS)
+def _plan(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return a folder that is free for the plan: `live` takes it from there."""
+    return _output(parsed, _free(state, "plan"))
+
+
+def _free(state: FolderState, name: str, suffix: str = "") -> str:
+    """Return a name that nothing in the folder has yet, with a number where one has."""
+    names = (f"{name}{f'-{i}' if i > 1 else ''}{suffix}" for i in range(1, 10_000))
+    return next(n for n in names if not (state.folder / n).exists())
+
+
+def _import(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the logs that are no runs yet, every one with `--force`, and the folder of the runs."""
+    logs = [] if parsed.values.get("logs") else logs_to_import(state, again=bool(parsed.values.get("force")))
+    return [*logs, *_output(parsed, RUNS)]
 
 
 def _identify(parsed: Parsed, state: FolderState) -> list[str]:
@@ -67,7 +79,16 @@ def _of_model(fitted: Callable[[FolderState, Item], list[str]]) -> Fill:
 
 
 def _extend(parsed: Parsed, state: FolderState) -> list[str]:
-    return [] if parsed.values.get("undo") else _of_model(trained_runs)(parsed, state)
+    """Return the model and the runs of the diagnosis that names what is added, with those that judged it."""
+    if parsed.values.get("undo"):
+        return []
+    judges = [str(p) for p in parsed.paths("validate")]
+
+    def runs(state: FolderState, model: Item) -> list[str]:
+        fitted, judged = diagnosed_runs(state, model)
+        return [r for r in fitted if r not in judges] + [w for r in judged if not judges for w in ("--validate", r)]
+
+    return _of_model(runs)(parsed, state)
 
 
 def _model(parsed: Parsed, state: FolderState) -> list[str]:
@@ -79,10 +100,10 @@ def _models(parsed: Parsed, state: FolderState) -> list[str]:
 
 
 def _turn_radius(parsed: Parsed, state: FolderState) -> list[str]:
-    """Return the models of the yaw, and the runs of the folder that are turning circles."""
+    """Return the models of the yaw, the runs of the folder that are turning circles, and a free folder: the report shows it."""
     models = [] if parsed.values.get("models") else chosen_models(state, "yaw")
     circles = [] if parsed.values.get("measured") else _circles(state)
-    return [*models, *[word for circle in circles for word in ("--measured", circle)]]
+    return [*models, *[w for circle in circles for w in ("--measured", circle)], *_output(parsed, _free(state, "turning"))]
 
 
 def _circles(state: FolderState) -> list[str]:
@@ -128,6 +149,7 @@ def _batch(parsed: Parsed, state: FolderState) -> list[str]:
 
 FILLS: Mapping[str, Fill] = MappingProxyType(
     {
+        "plan": _plan,
         "import": _import,
         "identify": _identify,
         "compare": _of_model(unseen_runs),
@@ -149,6 +171,7 @@ FILLS: Mapping[str, Fill] = MappingProxyType(
 
 def in_words(added: Sequence[str]) -> str:
     """Return what was taken from the folder, short."""
-    runs = [w for w in added if w.startswith(f"{RUNS}/")]
-    words = dict.fromkeys(w for w in added if w not in runs)
-    return " ".join([*words, *(runs if len(runs) <= FEW else [runs[0], f"... {len(runs)} runs"])])
+    many = {kind: [w for w in added if w.startswith(f"{kind}/")] for kind in (LOGS, RUNS)}
+    words = dict.fromkeys(w for w in added if not any(w in files for files in many.values()))
+    shown = [w for kind, files in many.items() for w in (files if len(files) <= FEW else [files[0], f"... {len(files)} {kind}"])]
+    return " ".join([*words, *shown])

@@ -73,3 +73,16 @@ def test_a_long_line_is_thinned_and_keeps_its_ends_near():
     x, y = thinned(np.arange(100_000.0), np.zeros(100_000))
     assert x.size == y.size <= MOST_POINTS
     assert x[-1] > 99_000
+
+
+@pytest.mark.parametrize("size", [0.0004, 0.0015, 0.015, 900.0, 90000.0])
+def test_a_ticks_number_fits_its_margin_with_its_sign(size):
+    y = np.linspace(-size, size, 11)
+    root = parsed(chart([Panel("y", (Series(X, y, "simulated"),))], "x", "t"))
+    said = [t.text for t in root.iter("text") if t.get("text-anchor") == "end"]
+    assert any(t.startswith("\u2212") for t in said)
+    assert max(len(t) for t in said) <= 7
+    assert all(
+        float(t.replace("\u2212", "-")) == pytest.approx(-float(u.replace("\u2212", "-")))
+        for t, u in zip(said, said[::-1], strict=True)
+    )
