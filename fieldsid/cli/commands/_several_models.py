@@ -8,8 +8,8 @@ from math import exp, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fieldsid.cli.commands._other_data import unlike_fitted
 from fieldsid.cli.console import emit, table
-from fieldsid.cli.other_data import unlike_fitted
 from fieldsid.cli.progress import get_ready
 from fieldsid.errors import UsageError
 

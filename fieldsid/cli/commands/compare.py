@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fieldsid.cli.commands._other_data import unlike_fitted
 from fieldsid.cli.console import complain, emit, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
-from fieldsid.cli.other_data import unlike_fitted
 from fieldsid.cli.progress import get_ready, refuse_closed
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_in, shown_words

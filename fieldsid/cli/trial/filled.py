@@ -103,7 +103,7 @@ def _turn_radius(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the models of the yaw, the runs of the folder that are turning circles, and a free folder: the report shows it."""
     models = [] if parsed.values.get("models") else chosen_models(state, "yaw")
     circles = [] if parsed.values.get("measured") else _circles(state)
-    return [*models, *[w for circle in circles for w in ("--measured", circle)], *_output(parsed, _free(state, "turning"))]
+    return [*models, *_output(parsed, _free(state, "turning")), *[w for c in circles for w in ("--measured", c)]]
 
 
 def _circles(state: FolderState) -> list[str]:

@@ -87,6 +87,8 @@ class Diagnose(Result):
     """Errors with the named effects added; those of the base where none is."""
     noise_floor: NoiseFloor
     """Noise of the sensors."""
+    noiseless: bool
+    """Whether the logs show almost no noise, so that errors are told in their units."""
     candidates: list[Candidate]
     """What was tried, the one found first, then by evidence."""
     where: list[Where]
