@@ -138,10 +138,8 @@ def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     if not left > MORE_THAN_NOISE:
         return None
     place = state.place(best)
-    asked = (
-        e.command[1:2] == ("diagnose",) and e.exit in DONE and any(s.sha256 == sha256_of(place) for s in e.inputs)
-        for e in state.entries
-    )
+    now = sha256_of(place)
+    asked = (e.command[1:2] == ("diagnose",) and e.exit in DONE and any(s.sha256 == now for s in e.inputs) for e in state.entries)
     asking = (any(s.path == place.resolve() for s in i.sources) for i in state.of_kind("diagnosis"))
     if any(asked) or any(asking):
         return None

@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fieldsid.logs.run import Run
+    from fieldsid.models.model import Model
 
 
-def unlike_fitted(model: Path, runs: Iterable[Run]) -> frozenset[str]:
-    """Return the names of runs whose file is none that a model of a file was fitted to, though its log is called the same.
+def fitted_to(path: Path, model: Model, runs: Iterable[Run]) -> frozenset[str]:
+    """Return the names of the runs that the model of a file was fitted to, without those whose log is only called the same.
 
     By their hashes. Where the model's own log is gone, or of another format, its name is all there is to go by.
     """
     from fieldsid.artifacts import inputs_of, sha256_of
     from fieldsid.logs.several.run_names import stem_of
 
-    own = {(stem_of(p), p.suffix): p for p in inputs_of(model)}
+    own = {(stem_of(p), p.suffix): p for p in inputs_of(path)}
     pairs = [(r.name, r.source, own.get((stem_of(r.source), r.source.suffix))) for r in runs if r.source is not None]
-    return frozenset(
+    return frozenset(model.runs) - frozenset(
         name
         for name, here, there in pairs
         if there is not None and here.is_file() and there.is_file() and sha256_of(here) != sha256_of(there)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from math import exp, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.commands._other_data import unlike_fitted
+from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.progress import get_ready
 from fieldsid.errors import UsageError
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.comparison.compare import Comparison
-    from fieldsid.models.model import Model
 
 CLOSE = 1.05
 """A ratio of two models' errors up to which neither is called the better."""
@@ -29,7 +28,7 @@ def several_models(
     runs: Sequence[Path],
     skips: Skips,
     *,
-    entry: Callable[[Comparison, str | None], dict[str, Any]],
+    entry: Callable[[Comparison, str | None, Collection[str]], dict[str, Any]],
     reading: Mapping[str, Any],
     output: Path | None,
     force: bool,
@@ -55,6 +54,7 @@ def several_models(
 
     found_of = [compare(m, logs, unfit=skips.skip if i == 0 else None) for i, m in enumerate(models)]
     names = _names(paths)
+    fitted_of = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
     figures = _drawn(found_of, names, output, force=force)
     body = {
         "schema": "fieldsid/compare-several/1",
@@ -63,10 +63,10 @@ def several_models(
             {
                 "model": str(p),
                 "over_floor": _score(found),
-                "fitted_to": _fitted(m, found, unlike_fitted(p, logs)),
-                "runs": [entry(c, None) | {"fitted_to": c.run in _fitted(m, found, unlike_fitted(p, logs))} for c in found],
+                "fitted_to": [c.run for c in found if c.run in fitted],
+                "runs": [entry(c, None, fitted) for c in found],
             }
-            for p, m, found in zip(paths, models, found_of, strict=True)
+            for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
         ],
         "best": str(paths[min(range(len(paths)), key=lambda i: _score(found_of[i]))]),
         "figures": figures,
@@ -86,10 +86,6 @@ def several_models(
 def _score(found: Sequence[Comparison]) -> float:
     """Return the geometric mean over the runs of the error over the noise, each run's worse channel."""
     return exp(sum(log(c.leading.over_floor) for c in found) / len(found))
-
-
-def _fitted(model: Model, found: Sequence[Comparison], others: frozenset[str]) -> list[str]:
-    return [c.run for c in found if c.run in model.runs and c.run not in others]
 
 
 def _names(paths: Sequence[Path]) -> list[str]:

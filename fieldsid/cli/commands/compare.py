@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.commands._other_data import unlike_fitted
+from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import complain, emit, table
 from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
 from fieldsid.cli.progress import get_ready, refuse_closed
@@ -103,11 +103,8 @@ def command(
 
     found = compare(known, logs, unfit=skips.skip)
     drawn = _drawn(known, model, found, output if figures else None, context, force=force)
-    others = unlike_fitted(model, logs)
-    entries = [
-        _entry(c, figure) | {"fitted_to": c.run in known.runs and c.run not in others}
-        for c, figure in zip(found, drawn, strict=True)
-    ]
+    fitted = fitted_to(model, known, logs)
+    entries = [_entry(c, figure, fitted) for c, figure in zip(found, drawn, strict=True)]
     notes = left_out(logs, known.axis)
     body = {
         "schema": "fieldsid/compare/1",
@@ -184,10 +181,10 @@ def _drawn(
         ]
 
 
-def _entry(c: Comparison, figure: str | None) -> dict[str, Any]:
+def _entry(c: Comparison, figure: str | None, fitted: Collection[str]) -> dict[str, Any]:
     return {
         "run": c.run,
-        "fitted_to": c.run in c.model.runs,
+        "fitted_to": c.run in fitted,
         "speed_m_s": c.shown.record.speed,
         "angle_rms_rad": c.merit.angle_rms,
         "rate_rms_rad_s": c.merit.rate_rms,

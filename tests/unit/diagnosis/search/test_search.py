@@ -26,13 +26,18 @@ def patch(monkeypatch, name, value):
             monkeypatch.setattr(part, name, value)
 
 
+def search_for(*names):
+    """A search for some effects on the runs of the hidden lag."""
+    training, unseen = hidden_lag.runs()
+    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
+    effects = all_effects(Axis.YAW)
+    return Search(*records, Axis.YAW, [effects[n] for n in names])
+
+
 @pytest.fixture(scope="module")
 def base():
     """A search with its base judged."""
-    training, unseen = hidden_lag.runs()
-    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
-    lag = [all_effects(Axis.YAW)["servo_lag"]]
-    made = Search(*records, Axis.YAW, lag)
+    made = search_for("servo_lag")
     made.base()
     return made
 
@@ -66,10 +71,8 @@ def test_a_servo_slower_than_the_hull_is_tried_as_a_faster_one(base):
 
 
 def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch):
-    training, unseen = hidden_lag.runs()
-    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
+    made = search_for("servo_lag", "delay", "gyro_bias")
     effects = all_effects(Axis.YAW)
-    made = Search(*records, Axis.YAW, [effects[n] for n in ("servo_lag", "delay", "gyro_bias")])
     parent = made.base()
     for name in ("delay", "gyro_bias"):
         moves = add_effect(parent, [effects[name]], None, made.parallel, anew=False, flown=True)
@@ -84,10 +87,8 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
 
 
 def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(monkeypatch):
-    training, unseen = hidden_lag.runs()
-    records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
+    made = search_for("servo_lag", "delay", "gyro_bias")
     effects = all_effects(Axis.YAW)
-    made = Search(*records, Axis.YAW, [effects[n] for n in ("servo_lag", "delay", "gyro_bias")])
     base = made.base()
     moves = add_effect(base, [effects["servo_lag"], effects["delay"]], None, made.parallel, anew=False, flown=True)
     made._evaluate_moves(base, by_effect(moves))
