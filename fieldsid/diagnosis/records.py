@@ -22,6 +22,11 @@ class Errors(Brief):
     rate_rms_rad_s: float
     each: tuple[Errors, ...] = ()
 
+    @property
+    def runs(self) -> tuple[Errors, ...]:
+        """The errors of each run; where they are not known, those over all."""
+        return self.each or (self,)
+
     def over(self, floor: Noise) -> float:
         """Return the error over the noise floor, both measured channels pooled."""
         parts = [

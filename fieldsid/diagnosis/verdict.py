@@ -51,7 +51,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     it leaves: a lag of a sample may be there, and is not what is missing.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
-    was, now = compared_errors(search.base(), found)
+    was, now = compared_errors(search.base(), found, floor)
     error = now.over(floor)
     if frozenset(found.names) == search.root:
         if max(found.selection_errors.over(floor), found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:

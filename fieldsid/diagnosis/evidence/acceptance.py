@@ -30,12 +30,12 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
     """Whether an addition lowers the training or the validation error clearly, their product, and does not raise the latter.
 
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
-    a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, the addition
-    may explain instead more of what is left above it than it leaves: near the floor no effect lowers the whole error much. And a
-    validation error that stays within what a sufficient model has speaks against nothing: the run is too mild. See
-    `compared_errors` for which validation error.
+    a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, where the
+    model without it leaves a visible error in some run, the addition may explain instead more of what is left above the floor
+    than it leaves: near the floor no effect lowers the whole error much. And a validation error that stays within what a
+    sufficient model has speaks against nothing: the run is too mild. See `compared_errors` for which validation error.
     """
-    before, now = compared_errors(without, with_)
+    before, now = compared_errors(without, with_, floor)
     was, left = (h.train_under(common_own_moment(without, with_)) for h in (without, with_))
     unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
@@ -44,17 +44,18 @@ def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None =
     return (mild or _keeps(before, now)) and (lowers or explains)
 
 
-def compared_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
+def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
     """Return the validation errors that two models are compared by.
 
-    They are those at the training runs' parameters; where these do not fall, and those at the parameters of all runs do or are at
-    least kept, the latter. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are
-    the same, and what a model lacks is no trim that differs from run to run.
+    They are those at the training runs' parameters or those at the parameters of all runs, whichever the addition lowers more of
+    those that are visible over a noise floor without it: training runs may leave open what one validation run settles, in either
+    model. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are the same, and what
+    a model lacks is no trim that differs from run to run.
     """
     std = common_own_moment(without, with_)
-    pairs = tuple(zip(without.unseen_under(std), with_.unseen_under(std), strict=True))
-    lower = next((pair for pair in pairs if pair[1].mean < pair[0].mean), None)
-    return lower or next((pair for pair in pairs if _keeps(*pair)), pairs[0])
+    pairs = list(zip(without.unseen_under(std), with_.unseen_under(std), strict=True))
+    visible = [pair for pair in pairs if floor is None or pair[0].over(floor) > SUFFICIENT_ERROR_RATIO]
+    return min(visible or pairs[:1], key=lambda pair: pair[1].mean / pair[0].mean)
 
 
 def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
@@ -65,12 +66,12 @@ def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
-    On one of them it must predict better, not equally well.
+    In some run it must have left a visible error, and on training or validation runs it must predict better, not equally well.
     """
     was, left = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in (before, now))
     better = any(EQUAL_ERROR_RATIO * b.over(floor) < a.over(floor) for a, b in zip(before, now, strict=True))
-    leaves = max(errors.over(floor) for errors in before) > EXPLAINED_ERROR_RATIO
-    return better and leaves and was - left > MAIN_EXPLAINED_SHARE * was
+    visible = max(run.over(floor) for errors in before for run in errors.runs) > SUFFICIENT_ERROR_RATIO
+    return better and visible and was - left > MAIN_EXPLAINED_SHARE * was
 
 
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:

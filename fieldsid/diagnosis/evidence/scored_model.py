@@ -30,7 +30,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
 )
 from fieldsid.diagnosis.evidence.predictive_density import ValidationRun, log_predictive_density, parameter_jacobian
 from fieldsid.diagnosis.records import Errors, Pair
-from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.fitting.predict.own_moment import FreeRun, free_run
 from fieldsid.fitting.predict.predict import frozen_problem, refit_nuisances, with_command_timing
@@ -308,7 +308,8 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     layout, records = ml_fit.fitted.problem.layout, ml_fit.fitted.problem.records
     own = sum(len(e.nuisance) for e in layout.effects)
     hidden = sum(1 for e in layout.effects if e.extra_states)
-    total = sum(ALTERNATIVE_LOG_ODDS * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects)
+    prior = EVIDENCE_TEMPERATURE * ALTERNATIVE_LOG_ODDS
+    total = sum(prior * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects)
     beyond = {c.name for e in layout.effects for c in e.shared} | {
         group_name(NAMES[layout.axis].authority, layout.groups, i) for i in range(len(layout.groups.speeds))
     } - {NAMES[layout.axis].authority}

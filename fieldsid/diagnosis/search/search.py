@@ -20,7 +20,7 @@ from fieldsid.diagnosis.search.multistart import multistart
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO
 from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
-from fieldsid.models.effect import Effect
+from fieldsid.models.effect import Effect, Stage
 
 MAX_JOINED = 3
 """Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
@@ -39,6 +39,9 @@ class Search(MoveEvaluation):
         self._exchange_for_lookalikes()
         self._drop_each()
         self.share_own_moments()
+        if self.error_ratio(self.best_admissible()) > MISSING_ERROR_RATIO:
+            self._fit_in_series()
+            self.share_own_moments()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -74,24 +77,28 @@ class Search(MoveEvaluation):
                 self.base()
 
     def _join_leaders(self) -> None:
-        """Fit the sets of clearly lower error with the small effects too that the model of the highest evidence has besides.
+        """Fit the sets of clearly lower error with what the model of the highest evidence has besides, the small effects or all.
 
         A lag of a sample shows in the evidence more than a large effect that is slow; a set without it is compared unfairly, and
         the search may have ended before both were tried together.
         """
         best = self._most_evident()
-        idle = [e for e in best.effects if e.name not in self.core_of(best)]
+        small = [e for e in best.effects if e.name not in self.core_of(best)]
         for h in self._front(best)[:MAX_JOINED]:
-            more = [e for e in idle if e.name not in h.names]
-            names = frozenset((*h.names, *(e.name for e in more)))
-            if not more or names in self.tried:
-                continue
-            fitted, other = h.likelihood_fit.fitted, best.likelihood_fit.fitted
-            problem = fitted.problem.with_effects([*h.effects, *more])
-            own = transfer_parameters(other.problem.layout, other.x, problem.layout)
-            start = overlay_parameters(fitted.problem.layout, fitted.x, problem.layout, own)
-            ml_fit = fit_maximum_likelihood(problem, start, best.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
-            self.tried[names] = prefer_output_error(self._keep(ml_fit), self.floor)
+            for joined in (small, best.effects):
+                more = [e for e in joined if e.name not in h.names]
+                names = frozenset((*h.names, *(e.name for e in more)))
+                if more and names not in self.tried and len(names) <= len(self.known) + MAX_EFFECTS:
+                    self._join(h, best, more)
+
+    def _join(self, h: ScoredModel, other: ScoredModel, more: Sequence[Effect]) -> None:
+        """Fit a model with effects of another besides, at the parameters that they have there."""
+        fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
+        problem = fitted.problem.with_effects([*h.effects, *more])
+        own = transfer_parameters(there.problem.layout, there.x, problem.layout)
+        start = overlay_parameters(fitted.problem.layout, fitted.x, problem.layout, own)
+        ml_fit = fit_maximum_likelihood(problem, start, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+        self.tried[frozenset(ml_fit.fitted.names)] = prefer_output_error(self._keep(ml_fit), self.floor)
 
     def _grow_rivals(self) -> None:
         """Add to the accepted sets that predict as well as the model of the highest evidence what may bring them above it.
@@ -138,7 +145,7 @@ class Search(MoveEvaluation):
             alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
             sets = [others] if len(best.names) > len(self.known) + 1 else []
             sets += [[*others, e] for e in self.catalogue if e.name == stands.name and stands.is_formed]
-            for effects in sets if self.budget.remaining() else ():
+            for effects in sets:
                 parent = self._moved(best, effects)
                 self._evaluate_moves(parent, by_effect(add_effect(parent, alike, None, self.parallel, anew=False, flown=True)))
                 keys = [frozenset((*parent.names, e.name)) for e in alike]
@@ -179,6 +186,26 @@ class Search(MoveEvaluation):
         """Whether a model is new, does not diverge, is below the largest size, and leaves an error above the noise floor."""
         is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
+
+    def _fit_in_series(self) -> None:
+        """Fit every actuator with every hidden state of the hull that it is mistaken for, from the base model's parameters.
+
+        Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
+        the two: an effect starts at its start value, in the variant that stands for it.
+        """
+        alone = [self.tried.get(self.root | {e.name}) for e in self.catalogue]
+        effects = [next(e for e in h.effects if e.name not in self.known) for h in alone if h is not None]
+        pairs = [(a, b) for a in effects for b in self.catalogue if _in_series(a, b) and a is not b and b.name not in self.known]
+        base = self.base().likelihood_fit
+
+        def fit(pair: tuple[Effect, Effect]) -> ScoredModel:
+            problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
+            start = transfer_parameters(base.fitted.problem.layout, base.fitted.x, problem.layout)
+            return self._keep(
+                fit_maximum_likelihood(problem, start, base.noise, self.resolution_floor, self.noise_kind)
+            ).evaluate_errors()
+
+        self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit, pairs)})
 
     def _drop_each(self) -> None:
         """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.
@@ -247,3 +274,9 @@ class Search(MoveEvaluation):
         if kept is not before:
             self.tried[key] = prefer_output_error(kept, self.floor)
         return self.tried[key]
+
+
+def _in_series(effect: Effect, other: Effect) -> bool:
+    """Whether two effects are mistaken for each other, one acting on the fin and one a state of the hull's."""
+    alike = other.name in effect.mistaken_for
+    return alike and any(a.stage is Stage.ACTUATOR and bool(b.extra_states) for a, b in ((effect, other), (other, effect)))

@@ -24,7 +24,7 @@ from fieldsid.diagnosis.search.speed_law_search import (
     speed_laws,
 )
 from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
-from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.models.axis import Axis
@@ -178,7 +178,7 @@ class SearchState:
         An effect that gains evidence beside all else stays where it lowers the error, though it may gain none once a small one is
         left out: what that leaves in fast samples, a disturbance takes up with the rest.
         """
-        floor = self._floor_to_explain()
+        floor = sensor_noise(self.floor, self.tried.get(self.root))
         proven = {name for name, w in self._without_each(h) if is_accepted(w, h, floor)}
         while idle := [
             w
@@ -187,11 +187,6 @@ class SearchState:
         ]:
             h = max(idle, key=lambda w: w.log_evidence)
         return frozenset(h.names)
-
-    def _floor_to_explain(self) -> Noise | None:
-        """Return the noise floor above which what is left is to be explained; None where the base model is sufficient."""
-        base, floor = self.base(), sensor_noise(self.floor, self.tried.get(self.root))
-        return floor if max(base.selection_errors.over(floor), base.train.over(floor)) > SUFFICIENT_ERROR_RATIO else None
 
     def _without_each(self, h: ScoredModel) -> list[tuple[str, ScoredModel]]:
         """Return each effect of a model whose absence was tried, with the fitted model that lacks it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -49,6 +50,11 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None, own_moment=0
         train_under=lambda std: grown(errors[1], std),
         unseen_under=lambda std: (grown(errors[0], std), grown(errors[2], std)),
     )
+
+
+def at(over):
+    """Errors over the floor."""
+    return Errors(FLOOR.angle * over, FLOOR.rate * over)
 
 
 BASE = hypothesis(over=1.2)
@@ -138,13 +144,36 @@ def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
 
 @pytest.mark.parametrize(
     ("before", "after", "counts"),
-    [((1.1, 1.04), (1.02, 1.0), True), ((1.1, 1.04), (1.06, 1.03), False), ((1.01, 1.01), (1.0, 1.0), False)],
+    [
+        ((1.17, 1.04), (1.08, 1.0), True),
+        ((1.17, 1.04), (1.13, 1.03), False),
+        ((1.1, 1.04), (1.02, 1.0), False),
+        ((1.01, 1.01), (1.0, 1.0), False),
+    ],
 )
 def test_near_the_floor_an_addition_counts_that_explains_more_than_it_leaves(before, after, counts):
     base = hypothesis("servo_lag", over=before[0], train=before[1])
     more = hypothesis("servo_lag", "stall", gain=50.0, over=after[0], train=after[1])
     assert is_accepted(base, more, FLOOR) == counts
     assert not is_accepted(base, more)
+
+
+def test_a_visible_error_in_one_run_asks_for_what_explains_it():
+    base, more = hypothesis("servo_lag", over=1.1, train=1.04), hypothesis("servo_lag", "current", gain=50.0, over=1.02)
+    assert not is_accepted(base, more, FLOOR)
+    base.unseen_under = lambda _std: (replace(base.selection_errors, each=(at(1.0), at(1.19))),)
+    more.unseen_under = lambda _std: (more.selection_errors,)
+    assert is_accepted(base, more, FLOOR)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "counts"),
+    [((1.02, 1.1), (1.01, 0.99), False), ((1.32, 5.2), (1.23, 1.5), True), ((1.3, 1.2), (1.1, 1.2), True)],
+)
+def test_of_both_errors_on_unseen_runs_the_one_that_falls_more_counts_where_it_is_visible(before, after, counts):
+    base = hypothesis(over=before[0], settled=before[1])
+    found = hypothesis("current", gain=50.0, over=after[0], settled=after[1])
+    assert is_accepted(base, found, FLOOR) == counts
 
 
 @pytest.mark.parametrize(("settled", "counts"), [(1.0, True), (1.22, True), (1.3, False)])

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.evidence.scored_model import score_model
+from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
 from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
 from fieldsid.fitting.initial.effect_screen import equivalent_solution
 from fieldsid.models.axis import Axis
+from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
 
 
@@ -80,6 +83,7 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
         parent = made.tried[frozenset((*parent.names, name))]
     monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
+    made.budget.most = 0.0  # what is named last is asked for whatever was spent before
     made._exchange_for_lookalikes()
     lagged = made.tried[frozenset(["gyro_bias", "servo_lag"])]
     assert lagged.log_evidence > parent.log_evidence
@@ -99,6 +103,55 @@ def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(
     assert not made._predicts_as_well(base, best)
     made._grow_rivals()
     assert frozenset(["delay", "servo_lag"]) in made.tried
+
+
+def test_a_set_of_clearly_lower_error_is_fitted_with_all_that_the_most_evident_has_besides(monkeypatch):
+    made = search_for("servo_lag", "delay", "gyro_bias")
+    effects = all_effects(Axis.YAW)
+    base = made.base()
+    made._evaluate_moves(
+        base,
+        by_effect(
+            add_effect(base, [effects[n] for n in ("servo_lag", "gyro_bias")], None, made.parallel, anew=False, flown=True)
+        ),
+    )
+    lagged, biased = (made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias"))
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: biased)
+    monkeypatch.setattr(Search, "core_of", lambda _self, h: frozenset(h.names))
+    monkeypatch.setattr(Search, "_front", lambda _self, _best: [lagged])
+    made._join_leaders()
+    both = made.tried[frozenset(["servo_lag", "gyro_bias"])]
+    assert both.log_likelihood_by_run.sum() > biased.log_likelihood_by_run.sum()
+    assert both.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
+
+
+def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(monkeypatch):
+    made = search_for("servo_lag", "sway_coupling", "gyro_bias")
+    effects, starts = all_effects(Axis.YAW), []
+    base = made.base()
+    moves = add_effect(base, [effects["sway_coupling"]], None, made.parallel, anew=False, flown=True)
+    made._evaluate_moves(base, by_effect(moves))
+    real = search.fit_maximum_likelihood
+
+    def fit(problem, start, *more):
+        starts.append(dict(zip(problem.layout.names, start, strict=False)))
+        return real(problem, start, *more)
+
+    monkeypatch.setattr(search, "fit_maximum_likelihood", fit)
+    monkeypatch.setattr(made.parallel, "map", lambda function, items: [function(i) for i in items])
+    made._fit_in_series()
+    (start,) = starts
+    assert start["lag"] == pytest.approx(0.15)
+    assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
+    assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
+
+
+def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence(base):
+    lag, alone = base.catalogue[0], base.base()
+    base._evaluate_moves(alone, by_effect(add_effect(alone, [lag], None, base.parallel, anew=True, flown=False)))
+    paid = base.tried[frozenset(["servo_lag"])].complexity_penalty - alone.complexity_penalty
+    prior = EVIDENCE_TEMPERATURE * ALTERNATIVE_LOG_ODDS
+    assert prior < paid < prior + 0.5 * np.log(2 * sum(r.time.size for r in base.records))
 
 
 def test_a_model_moved_to_fewer_effects_has_the_numbers_it_had_and_the_likelihood_there(base):
@@ -154,7 +207,7 @@ def test_an_end_that_a_child_has_led_to_is_kept_where_unseen_runs_agree(base, ot
 
 def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, monkeypatch):
     def model(names, *, error, evidence):
-        errors = SimpleNamespace(mean=error, over=lambda _floor: error)
+        errors = Errors(0.004 * error, 0.002 * error)
         known = np.array([evidence])
         effects = tuple(all_effects(Axis.YAW)[n] for n in names)
         return SimpleNamespace(
@@ -180,7 +233,7 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
         model(whole[::2], error=1.4, evidence=100.0),
         model(whole[1:], error=2.0, evidence=90.0),
     ]
-    work = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in tried}, _floor_to_explain=lambda: None)
+    work = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in tried}, floor=Noise(0.004, 0.002), root=frozenset())
     work._without_each = lambda h: search_state.SearchState._without_each(work, h)
     assert search_state.SearchState.core_of(work, tried[3]) == set(both)
     assert search_state.SearchState.core_of(work, tried[1]) == {"stall"}
