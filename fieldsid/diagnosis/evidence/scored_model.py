@@ -321,24 +321,17 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
 
 
 def errors_of(runs: Sequence[FreeRun], own_moment: float) -> Errors:
-    """Return the errors of free runs whose own moments have a standard deviation (rad/s^2)."""
-    return pooled_errors([r.record for r in runs], [r.left(own_moment) for r in runs])
+    """Return the errors of free runs, of all and of each, whose own moments have a standard deviation (rad/s^2)."""
+    squares, counts = np.array([r.squares(own_moment) for r in runs]), np.array([r.counts for r in runs])
+    if not runs:
+        return Errors(float("nan"), float("nan"))
+    each = tuple(_rms(*of) for of in zip(squares, counts, strict=True))
+    return replace(_rms(squares.sum(axis=0), counts.sum(axis=0)), each=each)
 
 
-def pooled_errors(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
-    """Return the pooled rms of residuals (2, n) over the measured samples of all runs, and that of each run."""
-    each = tuple(_pooled([r], [e]) for r, e in zip(records, residuals, strict=True))
-    return replace(_pooled(records, residuals), each=each)
-
-
-def _pooled(records: Sequence[Record], residuals: Sequence[FloatArray]) -> Errors:
-    values = []
-    for channel in range(2):
-        ok = [r.ok[channel] for r in records]
-        squares = sum(float(np.sum(e[channel][m] ** 2)) for e, m in zip(residuals, ok, strict=True))
-        count = sum(int(m.sum()) for m in ok)
-        values.append(float(np.sqrt(squares / count)) if count else float("nan"))
-    return Errors(values[0], values[1])
+def _rms(squares: FloatArray, counts: FloatArray) -> Errors:
+    angle, rate = (float(np.sqrt(s / n)) if n else float("nan") for s, n in zip(squares, counts, strict=True))
+    return Errors(angle, rate)
 
 
 def bare_model(problem: Problem, x: FloatArray, noise: Noise) -> Model:

@@ -13,6 +13,7 @@ and L the correlation length of that, so that the residual of a wrong model has 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +31,7 @@ MIN_REPORTED_STD = 0.1
 """Standard deviations of the prior from which on a moment is worth telling of."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FreeRun:
     """A run's residual (2, n) without a moment of its own, what 1 rad/s^2 of it does (2, n), and the channels' weights (2, 1).
 
@@ -42,15 +43,32 @@ class FreeRun:
     response: FloatArray
     weight: FloatArray
 
+    @cached_property
+    def counts(self) -> FloatArray:
+        """The number of measured samples of each channel (2,)."""
+        return self.record.ok.sum(axis=1).astype(float)
+
+    @cached_property
+    def _products(self) -> FloatArray:
+        """Sums (3, 2) over each channel's measured samples: residual squared, residual by response, response squared."""
+        e, r = (np.where(self.record.ok, of, 0.0) for of in (self.residual, self.response))
+        return np.array([[float(a @ b) for a, b in zip(one, other, strict=True)] for one, other in ((e, e), (e, r), (r, r))])
+
+    @cached_property
+    def _information(self) -> tuple[float, float]:
+        """What the weighted residual says of the moment, and the information on it, without the prior."""
+        shown = self.response * self.weight
+        return float(np.vdot(shown, self.residual * self.weight)), float(np.vdot(shown, shown))
+
     def own_moment(self, std: float) -> float:
         """Return the most probable moment (rad/s^2) under a prior of that standard deviation."""
-        shown = self.response * self.weight
-        information = float(np.vdot(shown, shown))
-        return std**2 * float(np.vdot(shown, self.residual * self.weight)) / (1.0 + std**2 * information)
+        said, information = self._information
+        return std**2 * said / (1.0 + std**2 * information)
 
-    def left(self, std: float) -> FloatArray:
-        """Return the residual (2, n) with that moment."""
-        return self.residual - self.own_moment(std) * self.response if std > 0.0 else self.residual
+    def squares(self, std: float) -> FloatArray:
+        """Return each channel's sum (2,) of squares of the residual with that moment, over the measured samples."""
+        moment, (plain, mixed, square) = self.own_moment(std), self._products
+        return np.asarray(np.maximum(plain - 2.0 * moment * mixed + moment**2 * square, 0.0))
 
 
 def free_run(problem: Problem, x: FloatArray, run: int, residual: FloatArray, floor: Noise) -> FreeRun:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.diagnose import confusable
-from fieldsid.diagnosis.evidence.scored_model import pooled_errors
+from fieldsid.diagnosis.evidence.scored_model import errors_of
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.report.report_text import evidence, headline
 from fieldsid.diagnosis.verdict import Verdict, excess_explained, probabilities, worsens
+from fieldsid.fitting.predict.own_moment import FreeRun
 from fieldsid.models.model import Noise
 
 FLOOR = Noise(0.004, 0.002)
@@ -94,11 +95,14 @@ def test_a_rival_is_one_whose_probability_makes_it_one(behind, rival):
 
 def test_errors_hold_those_of_each_run():
     records = [SimpleNamespace(ok=np.ones((2, n), dtype=bool)) for n in (10, 30)]
+    records[0].ok[1] = False
     residuals = [np.full((2, 10), 0.1), np.full((2, 30), 0.3)]
-    found = pooled_errors(records, residuals)
+    found = errors_of([FreeRun(r, e, np.zeros_like(e), np.ones((2, 1))) for r, e in zip(records, residuals, strict=True)], 1.0)
     assert [e.angle_rms_rad for e in found.each] == pytest.approx([0.1, 0.3])
-    assert found.rate_rms_rad_s == pytest.approx(np.sqrt((10 * 0.01 + 30 * 0.09) / 40))
-    assert pooled_errors([], []).each == ()
+    assert np.isnan(found.each[0].rate_rms_rad_s)
+    assert found.angle_rms_rad == pytest.approx(np.sqrt((10 * 0.01 + 30 * 0.09) / 40))
+    assert found.rate_rms_rad_s == pytest.approx(0.3)
+    assert errors_of([], 0.0).each == ()
 
 
 def test_where_the_fitted_runs_leave_the_numbers_open_the_headline_says_both_errors():

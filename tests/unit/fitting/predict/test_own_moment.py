@@ -106,8 +106,10 @@ def test_the_moment_is_the_minimum_of_what_the_page_says():
     tried = np.linspace(-1e-3, 2e-3, 3001)
     cost = [float(np.sum(((run.residual - m * run.response) * run.weight) ** 2) + (m / STD) ** 2) for m in tried]
     assert run.own_moment(STD) == pytest.approx(tried[int(np.argmin(cost))], abs=1e-6)
-    np.testing.assert_allclose(run.left(STD), run.residual - run.own_moment(STD) * run.response)
-    assert run.left(0.0) is run.residual
+    for std in (0.0, STD):
+        left = (run.residual - run.own_moment(std) * run.response)[record.ok].reshape(2, -1)
+        np.testing.assert_allclose(run.squares(std), np.sum(left**2, axis=1), rtol=1e-9)
+    np.testing.assert_array_equal(run.counts, record.ok.sum(axis=1))
 
 
 def test_a_motion_without_bound_has_no_moment_of_its_own():
@@ -118,7 +120,7 @@ def test_a_motion_without_bound_has_no_moment_of_its_own():
     residual = np.ones((2, len(record)))
     run = free_run(problem, x, 0, residual, white_noise_floor([record]))
     assert run.own_moment(STD) == 0.0
-    assert run.left(STD) == pytest.approx(residual)
+    np.testing.assert_allclose(run.squares(STD), np.sum(residual**2, axis=1))
 
 
 def test_next_to_nothing_is_not_told():
