@@ -46,7 +46,7 @@ class FreeRun:
     @cached_property
     def counts(self) -> FloatArray:
         """The number of measured samples of each channel (2,)."""
-        return self.record.ok.sum(axis=1).astype(float)
+        return np.asarray(self.record.ok.sum(axis=1), dtype=float)
 
     @cached_property
     def _products(self) -> FloatArray:
