@@ -13,9 +13,9 @@ from math import exp
 
 ALTERNATIVE_LOG_ODDS = 6.0
 """Log odds. Prior against one effect of the catalogue, one variant other than the textbook's, another kind of noise, or another
-law of the speed than the usual: 400 to 1, as dozens of each are tried. Effects and their variants pay it EVIDENCE_TEMPERATURE
-times in the log evidence, which is divided by that before it becomes a probability: a prior is not overstated. On cases of the
-second bank that mended five of one effect too many, named by odds below 20 to 1, and cost the second effect of two."""
+law of the speed than the usual: 400 to 1, as dozens of each are tried. An effect pays it EVIDENCE_TEMPERATURE times in the log
+evidence, which is divided by that before it becomes a probability: a prior is not overstated. Of an effect's few variants one
+pays it once. On cases of the second bank that mended five of one effect too many, and cost the second effect of two."""
 RIVAL_LOG_ODDS = 3.0
 """Log odds. Two models are rivals within it, and a maneuver that tells them apart is worth a dive from it on: 20 to 1."""
 RIVAL_PROBABILITY_RATIO = exp(-RIVAL_LOG_ODDS)

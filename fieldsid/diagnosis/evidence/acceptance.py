@@ -84,11 +84,9 @@ def _keeps(before: Errors, now: Errors) -> bool:
 
 
 def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
-    """Whether an addition gains log evidence on the training runs alone."""
-    return bool(
-        with_.log_likelihood_by_run.sum() - with_.complexity_penalty
-        > without.log_likelihood_by_run.sum() - without.complexity_penalty
-    )
+    """Whether an addition gains log evidence on the training runs alone, enough to be tried further."""
+    gain = with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()
+    return bool(gain > with_.trial_penalty - without.trial_penalty)
 
 
 def leaves_error(h: ScoredModel, floor: Noise) -> bool:

@@ -183,6 +183,11 @@ class ScoredModel:
         return self.likelihood_fit.fitted.names
 
     @property
+    def trial_penalty(self) -> float:
+        """The complexity penalty with the prior log odds once: what is worth trying need not be worth naming."""
+        return self.complexity_penalty - (EVIDENCE_TEMPERATURE - 1.0) * ALTERNATIVE_LOG_ODDS * len(self.names)
+
+    @property
     def log_evidence(self) -> float:
         """Log evidence up to a constant that all models share."""
         return float(self.log_likelihood_by_run.sum() + self.validation_log_density.sum() - self.complexity_penalty)
@@ -308,8 +313,8 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     layout, records = ml_fit.fitted.problem.layout, ml_fit.fitted.problem.records
     own = sum(len(e.nuisance) for e in layout.effects)
     hidden = sum(1 for e in layout.effects if e.extra_states)
-    prior = EVIDENCE_TEMPERATURE * ALTERNATIVE_LOG_ODDS
-    total = sum(prior * (1 + e.is_formed) + e.log_prior_penalty for e in layout.effects)
+    odds = ALTERNATIVE_LOG_ODDS
+    total = sum(EVIDENCE_TEMPERATURE * odds + odds * e.is_formed + e.log_prior_penalty for e in layout.effects)
     beyond = {c.name for e in layout.effects for c in e.shared} | {
         group_name(NAMES[layout.axis].authority, layout.groups, i) for i in range(len(layout.groups.speeds))
     } - {NAMES[layout.axis].authority}

@@ -152,6 +152,7 @@ def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence(base):
     paid = base.tried[frozenset(["servo_lag"])].complexity_penalty - alone.complexity_penalty
     prior = EVIDENCE_TEMPERATURE * ALTERNATIVE_LOG_ODDS
     assert prior < paid < prior + 0.5 * np.log(2 * sum(r.time.size for r in base.records))
+    assert base.tried[frozenset(["servo_lag"])].trial_penalty - alone.trial_penalty == pytest.approx(paid - ALTERNATIVE_LOG_ODDS)
 
 
 def test_a_model_moved_to_fewer_effects_has_the_numbers_it_had_and_the_likelihood_there(base):
