@@ -56,26 +56,63 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     """Return the model that a beam search by the error ends at, None where no effect lowers it enough.
 
     The best two models of every size are extended, because the best single effect need not be part of the best set. Effects that
-    the log evidence speaks against are left out at the end, as long as what is left still `explains` enough. That set, and those
-    without one of its effects, are added to what the search has tried.
+    the log evidence speaks against are left out at the end, as long as what is left still `explains` enough; the rest is then
+    extended by what gains log evidence. That set, and those without one of its effects, are added to what the search has tried.
     """
-    base = search.base()
-    best = start = FreeRunFit(base.reported_fit, _as_modelled(base), 1.0, _charge(search, base.reported_fit))
-    front, seen = [start], dict[frozenset[str], FreeRunFit]()
+    base, seen = search.base(), dict[frozenset[str], FreeRunFit]()
+    start = FreeRunFit(base.reported_fit, _as_modelled(base), 1.0, _charge(search, base.reported_fit))
+    grown = _grow(search, start, seen)
+    if grown is start:
+        return None
+    found = _thin(search, grown, seen, explains)
+    if len(found.names) < len(grown.output_error_fit.names):
+        found = _grow_likelier(search, found, seen)
+        found = _thin(search, seen[frozenset(found.names)], seen, explains)
+    return found
+
+
+def _grow(search: Search, start: FreeRunFit, seen: dict[frozenset[str], FreeRunFit]) -> FreeRunFit:
+    """Return what a model is extended to, itself where nothing lowers the error enough."""
+    best, front = start, [start]
     for _ in range(MAX_EFFECTS):
         grown: dict[frozenset[str], FreeRunFit] = {}
         for current in front:
-            for new in _forward_candidates(search, current.output_error_fit):
-                _keep(seen, new)
-                charged = _error_ratio(search, new.errors, current.errors) * new.charge / current.charge
-                if charged <= MAX_FREE_RUN_ERROR_RATIO:
-                    _keep(grown, new)
+            for new in _lower(search, current, seen):
+                _keep(grown, new)
         front = sorted(grown.values(), key=lambda f: f.error_ratio)[:BEAM_WIDTH]
         if not front or front[0].error_ratio > MAX_FREE_RUN_ERROR_RATIO * best.error_ratio:
             break
         best = front[0]
-    if best is start:
-        return None
+    return best
+
+
+def _grow_likelier(search: Search, found: ScoredModel, seen: dict[frozenset[str], FreeRunFit]) -> ScoredModel:
+    """Return what a model is extended to by the effects that lower the error most of those that gain log evidence."""
+    while len(found.names) < len(search.known) + MAX_EFFECTS:
+        lower = sorted(_lower(search, seen[frozenset(found.names)], seen), key=lambda f: f.error_ratio)
+        scored = (_scored(search, new.output_error_fit) for new in lower)
+        likelier = next((h for h in scored if h.log_evidence > found.log_evidence), None)
+        if likelier is None:
+            break
+        found = likelier
+    return found
+
+
+def _lower(search: Search, current: FreeRunFit, seen: dict[frozenset[str], FreeRunFit]) -> list[FreeRunFit]:
+    """Return the fits with one effect more that lower the error enough."""
+    lower = []
+    for new in _forward_candidates(search, current.output_error_fit):
+        _keep(seen, new)
+        charged = _error_ratio(search, new.errors, current.errors) * new.charge / current.charge
+        if charged <= MAX_FREE_RUN_ERROR_RATIO:
+            lower.append(new)
+    return lower
+
+
+def _thin(
+    search: Search, best: FreeRunFit, seen: dict[frozenset[str], FreeRunFit], explains: Callable[[ScoredModel], bool]
+) -> ScoredModel:  # fmt: skip
+    """Return a model without the effects that are no longer needed; it, and it without each, count as tried."""
     best, without = _backward_eliminate(search, best, seen)
     (found,) = search.parallel.map(partial(_scored, search), [best.output_error_fit])
     while True:
