@@ -21,25 +21,29 @@ from fieldsid.diagnosis.thresholds import (
 from fieldsid.models.model import Noise
 
 
-def is_accepted(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> bool:
+def is_accepted(
+    without: ScoredModel, with_: ScoredModel, floor: Noise | None = None, least: float = SUFFICIENT_ERROR_RATIO
+) -> bool:  # fmt: skip
     """Whether an addition gains log evidence and lowers the error, see `lowers_error`."""
-    return gains_evidence(without, with_) and lowers_error(without, with_, floor)
+    return gains_evidence(without, with_) and lowers_error(without, with_, floor, least)
 
 
-def lowers_error(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> bool:
+def lowers_error(
+    without: ScoredModel, with_: ScoredModel, floor: Noise | None = None, least: float = SUFFICIENT_ERROR_RATIO
+) -> bool:  # fmt: skip
     """Whether an addition lowers the training or the validation error clearly, their product, and does not raise the latter.
 
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
     a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, where the
-    model without it leaves a visible error in some run, the addition may explain instead more of what is left above the floor
-    than it leaves: near the floor no effect lowers the whole error much. And a validation error that stays within what a
+    model without it leaves more than `least` times that in some run, the addition may explain instead more of what is left above
+    the floor than it leaves: near the floor no effect lowers the whole error much. And a validation error that stays within what a
     sufficient model has speaks against nothing: the run is too mild. See `compared_errors` for which validation error.
     """
     before, now = compared_errors(without, with_, floor)
     was, left = (h.train_under(common_own_moment(without, with_)) for h in (without, with_))
     unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
-    explains = floor is not None and _explains_most((before, was), (now, left), floor)
+    explains = floor is not None and _explains_most((before, was), (now, left), floor, least)
     mild = floor is not None and now.over(floor) <= SUFFICIENT_ERROR_RATIO
     return (mild or _keeps(before, now)) and (lowers or explains)
 
@@ -63,15 +67,15 @@ def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
     return max((without, with_), key=lambda h: h.log_evidence).own_moment
 
 
-def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:
+def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise, least: float) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
-    In some run it must have left a visible error, and on training or validation runs it must predict better, not equally well.
+    In some run there must be `least` times the floor, and on training or validation runs it must predict better, not equally well.
     """
     was, left = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in (before, now))
     better = any(EQUAL_ERROR_RATIO * b.over(floor) < a.over(floor) for a, b in zip(before, now, strict=True))
-    visible = max(run.over(floor) for errors in before for run in errors.runs) > SUFFICIENT_ERROR_RATIO
-    return better and visible and was - left > MAIN_EXPLAINED_SHARE * was
+    leaves = max(run.over(floor) for errors in before for run in errors.runs) > least
+    return better and leaves and was - left > MAIN_EXPLAINED_SHARE * was
 
 
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:

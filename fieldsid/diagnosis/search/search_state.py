@@ -24,7 +24,7 @@ from fieldsid.diagnosis.search.speed_law_search import (
     speed_laws,
 )
 from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
-from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS
+from fieldsid.diagnosis.thresholds import EXPLAINED_ERROR_RATIO, RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.models.axis import Axis
@@ -179,14 +179,21 @@ class SearchState:
         left out: what that leaves in fast samples, a disturbance takes up with the rest.
         """
         floor = sensor_noise(self.floor, self.tried.get(self.root))
-        proven = {name for name, w in self._without_each(h) if is_accepted(w, h, floor)}
+        least = self._least_to_explain(floor)
+        proven = {name for name, w in self._without_each(h) if is_accepted(w, h, floor, least)}
         while idle := [
             w
             for name, w in self._without_each(h)
-            if not (is_accepted(w, h, floor) or (name in proven and lowers_error(w, h, floor)))
+            if not (is_accepted(w, h, floor, least) or (name in proven and lowers_error(w, h, floor, least)))
         ]:
             h = max(idle, key=lambda w: w.log_evidence)
         return frozenset(h.names)
+
+    def _least_to_explain(self, floor: Noise) -> float:
+        """Return the error over a floor that is one to explain: a visible one, and any where the base leaves a visible one."""
+        base = self.base()
+        visible = max(base.selection_errors.over(floor), base.train.over(floor)) > SUFFICIENT_ERROR_RATIO
+        return EXPLAINED_ERROR_RATIO if visible else SUFFICIENT_ERROR_RATIO
 
     def _without_each(self, h: ScoredModel) -> list[tuple[str, ScoredModel]]:
         """Return each effect of a model whose absence was tried, with the fitted model that lacks it."""

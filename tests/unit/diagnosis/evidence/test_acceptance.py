@@ -143,18 +143,20 @@ def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "counts"),
+    ("before", "after", "least", "counts"),
     [
-        ((1.17, 1.04), (1.08, 1.0), True),
-        ((1.17, 1.04), (1.13, 1.03), False),
-        ((1.1, 1.04), (1.02, 1.0), False),
-        ((1.01, 1.01), (1.0, 1.0), False),
+        ((1.17, 1.04), (1.08, 1.0), 1.15, True),
+        ((1.17, 1.04), (1.13, 1.03), 1.15, False),
+        ((1.1, 1.04), (1.02, 1.0), 1.15, False),
+        ((1.1, 1.04), (1.02, 1.0), 1.02, True),
+        ((1.1, 1.04), (1.06, 1.03), 1.02, False),
+        ((1.01, 1.01), (1.0, 1.0), 1.02, False),
     ],
 )
-def test_near_the_floor_an_addition_counts_that_explains_more_than_it_leaves(before, after, counts):
+def test_near_the_floor_an_addition_counts_that_explains_more_than_it_leaves(before, after, least, counts):
     base = hypothesis("servo_lag", over=before[0], train=before[1])
     more = hypothesis("servo_lag", "stall", gain=50.0, over=after[0], train=after[1])
-    assert is_accepted(base, more, FLOOR) == counts
+    assert is_accepted(base, more, FLOOR, least) == counts
     assert not is_accepted(base, more)
 
 

@@ -234,7 +234,13 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
         model(whole[::2], error=1.4, evidence=100.0),
         model(whole[1:], error=2.0, evidence=90.0),
     ]
-    work = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in tried}, floor=Noise(0.004, 0.002), root=frozenset())
+    work = SimpleNamespace(
+        known=(),
+        tried={frozenset(h.names): h for h in tried},
+        floor=Noise(0.004, 0.002),
+        root=frozenset(),
+        _least_to_explain=lambda _floor: 1.15,
+    )
     work._without_each = lambda h: search_state.SearchState._without_each(work, h)
     assert search_state.SearchState.core_of(work, tried[3]) == set(both)
     assert search_state.SearchState.core_of(work, tried[1]) == {"stall"}
