@@ -74,7 +74,7 @@ MIN_EXPLAINED_SHARE = SHARES_TO_EXPLAIN[0][0]
 """The largest of those shares that is asked whatever the error."""
 MAIN_EXPLAINED_SHARE = 0.5
 """Share of the excess error that an effect explains at least where it explains more than it leaves. Asked where an error near the
-noise floor cannot fall to MAX_ERROR_RATIO while the base, or in a run the model without it, leaves a visible one; in a log without
+noise floor cannot fall to MAX_ERROR_RATIO while the base, or in a run the model without it, leaves a visible one; in logs without
 noise: no p-value decides there, since without noise whatever is left is significant; and of one that leaves an error above
 MISSING_ERROR_RATIO, whatever the tests say: of 702 cases of the second bank three named less, two a lag of 20 ms beside a moment
 in no catalogue and one half of a pair that alone lowered nothing."""

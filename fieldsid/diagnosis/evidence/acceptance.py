@@ -36,7 +36,7 @@ def lowers_error(
     Either may show the effect: a mild validation run does not excite what a hard training run does, and the training error of
     a model without the effect is low where its other parameters are biased towards those runs. Over a noise floor, where the
     model without it leaves more than `least` times that in some run, the addition may explain instead more of what is left above
-    the floor than it leaves: near the floor no effect lowers the whole error much. And a validation error that stays within what a
+    the floor than it leaves: near the floor no effect lowers the whole error much. A validation error that stays within what a
     sufficient model has speaks against nothing: the run is too mild. See `compared_errors` for which validation error.
     """
     before, now = compared_errors(without, with_, floor)
@@ -70,7 +70,7 @@ def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise, least: float) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
-    In some run there must be `least` times the floor, and on training or validation runs it must predict better, not equally well.
+    Some run must have `least` times the floor, and on training or validation runs it must predict better, not equally well.
     """
     was, left = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in (before, now))
     better = any(EQUAL_ERROR_RATIO * b.over(floor) < a.over(floor) for a, b in zip(before, now, strict=True))
