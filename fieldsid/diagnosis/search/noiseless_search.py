@@ -8,7 +8,7 @@ and validation runs by a twentieth. Of the set found an effect is left out again
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -64,10 +64,11 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     grown = _grow(search, start, seen)
     if grown is start:
         return None
-    found = _thin(search, grown, seen, explains)
+    best, without = _backward_eliminate(search, grown, seen)
+    found = _thin(search, best, without, seen, explains)
     if len(found.names) < len(grown.output_error_fit.names):
-        found = _grow_likelier(search, found, seen)
-        found = _thin(search, seen[frozenset(found.names)], seen, explains)
+        best = seen[frozenset(_grow_likelier(search, found, seen).names)]
+        found = _thin(search, best, _without_each(search, best, seen), seen, explains)
     return found
 
 
@@ -110,10 +111,10 @@ def _lower(search: Search, current: FreeRunFit, seen: dict[frozenset[str], FreeR
 
 
 def _thin(
-    search: Search, best: FreeRunFit, seen: dict[frozenset[str], FreeRunFit], explains: Callable[[ScoredModel], bool]
+    search: Search, best: FreeRunFit, without: Sequence[FreeRunFit], seen: dict[frozenset[str], FreeRunFit],
+    explains: Callable[[ScoredModel], bool],
 ) -> ScoredModel:  # fmt: skip
-    """Return a model without the effects that are no longer needed; it, and it without each, count as tried."""
-    best, without = _backward_eliminate(search, best, seen)
+    """Return a model without the effects that the log evidence speaks against; it, and it without each, count as tried."""
     (found,) = search.parallel.map(partial(_scored, search), [best.output_error_fit])
     while True:
         less = search.parallel.map(partial(_scored, search), [w.output_error_fit for w in without])
