@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import leaves_error
-from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, likelihood_at
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
@@ -19,11 +20,14 @@ from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluatio
 from fieldsid.diagnosis.search.multistart import multistart
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO
-from fieldsid.fitting.initial.effect_screen import overlay_parameters, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import linearise_at, overlay_parameters, scan_points, transfer_parameters
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect, Stage
 
 MAX_JOINED = 3
 """Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
+MAX_STARTS_IN_SERIES = 4
+"""Scan points, those of the lowest cost, that an actuator and a hidden state are fitted from together."""
 
 
 @dataclass(slots=True)
@@ -40,7 +44,7 @@ class Search(MoveEvaluation):
         self._drop_each()
         self.share_own_moments()
         if self.error_ratio(self.best_admissible()) > MISSING_ERROR_RATIO:
-            self._fit_in_series()
+            self._fit_in_series(self._all_in_series())
             self.share_own_moments()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
@@ -151,6 +155,8 @@ class Search(MoveEvaluation):
                 keys = [frozenset((*parent.names, e.name)) for e in alike]
                 near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
                 self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
+            if stands.is_formed and len(others) == len(self.known):
+                self._fit_in_series([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
@@ -187,25 +193,30 @@ class Search(MoveEvaluation):
         is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
 
-    def _fit_in_series(self) -> None:
-        """Fit every actuator with every hidden state of the hull that it is mistaken for, from the base model's parameters.
+    def _all_in_series(self) -> list[tuple[Effect, Effect]]:
+        """Return every actuator with every hidden state that it is mistaken for, one in the variant that stands for it."""
+        alone = (self.tried.get(self.root | {e.name}) for e in self.catalogue)
+        effects = [next(e for e in h.effects if e.name not in self.known) for h in alone if h is not None]
+        return [(a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known]
+
+    def _fit_in_series(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
+        """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
 
         Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
-        the two: an effect starts at its start value, in the variant that stands for it.
+        the two.
         """
-        alone = [self.tried.get(self.root | {e.name}) for e in self.catalogue]
-        effects = [next(e for e in h.effects if e.name not in self.known) for h in alone if h is not None]
-        pairs = [(a, b) for a in effects for b in self.catalogue if _in_series(a, b) and a is not b and b.name not in self.known]
         base = self.base().likelihood_fit
+        at = linearise_at(base.fitted.problem, base.fitted.x, base.noise)
 
-        def fit(pair: tuple[Effect, Effect]) -> ScoredModel:
+        def fit(pair: tuple[Effect, Effect]) -> list[LikelihoodFit]:
             problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
-            start = transfer_parameters(base.fitted.problem.layout, base.fitted.x, problem.layout)
-            return self._keep(
-                fit_maximum_likelihood(problem, start, base.noise, self.resolution_floor, self.noise_kind)
-            ).evaluate_errors()
+            points = scan_points(at, next(e for e in pair if e.extra_states))
+            starts = [transfer_parameters(base.fitted.problem.layout, base.fitted.x, problem.layout, v) for v in points]
+            best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
+            return [fit_maximum_likelihood(problem, x, base.noise, self.resolution_floor, self.noise_kind) for x in best]
 
-        self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit, pairs)})
+        for ml_fit in chain.from_iterable(self.parallel.map(fit, pairs)):
+            self._keep(ml_fit)
 
     def _drop_each(self) -> None:
         """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.

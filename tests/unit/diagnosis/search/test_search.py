@@ -139,10 +139,13 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
 
     monkeypatch.setattr(search, "fit_maximum_likelihood", fit)
     monkeypatch.setattr(made.parallel, "map", lambda function, items: [function(i) for i in items])
-    made._fit_in_series()
-    (start,) = starts
-    assert start["lag"] == pytest.approx(0.15)
-    assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
+    pairs = made._all_in_series()
+    assert [(a.name, b.name) for a, b in pairs] == [("sway_coupling", "servo_lag")]
+    made._fit_in_series(pairs)
+    assert len({(start["cross_damping"], start["cross_rate"]) for start in starts}) == len(starts) == search.MAX_STARTS_IN_SERIES
+    for start in starts:
+        assert start["lag"] == pytest.approx(0.15)
+        assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
     assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
 
 
