@@ -51,15 +51,15 @@ def lowers_error(
 def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
     """Return the validation errors that two models are compared by.
 
-    They are those at the training runs' parameters or those at the parameters of all runs, whichever the addition lowers more of
-    those that are visible over a noise floor without it: training runs may leave open what one validation run settles, in either
-    model. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are the same, and what
-    a model lacks is no trim that differs from run to run.
+    They are those at the training runs' parameters or, where they are visible over a noise floor without the addition, those at
+    the parameters of all runs, whichever the addition lowers more: training runs may leave open what one validation run settles,
+    in either model. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are the same,
+    and what a model lacks is no trim that differs from run to run.
     """
     std = common_own_moment(without, with_)
-    pairs = list(zip(without.unseen_under(std), with_.unseen_under(std), strict=True))
-    visible = [pair for pair in pairs if floor is None or pair[0].over(floor) > SUFFICIENT_ERROR_RATIO]
-    return min(visible or pairs[:1], key=lambda pair: pair[1].mean / pair[0].mean)
+    first, *settled = zip(without.unseen_under(std), with_.unseen_under(std), strict=True)
+    visible = [pair for pair in settled if floor is None or pair[0].over(floor) > SUFFICIENT_ERROR_RATIO]
+    return min((first, *visible), key=lambda pair: pair[1].mean / pair[0].mean)
 
 
 def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:

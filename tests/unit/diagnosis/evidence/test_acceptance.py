@@ -168,6 +168,11 @@ def test_a_visible_error_in_one_run_asks_for_what_explains_it():
     assert is_accepted(base, more, FLOOR)
 
 
+def test_an_error_that_rises_with_the_numbers_of_all_runs_speaks_not_against_one_that_falls():
+    base = hypothesis(over=1.14, train=2.2, settled=1.2)
+    assert is_accepted(base, hypothesis("backlash", gain=50.0, over=1.12, train=1.1, settled=2.2), FLOOR)
+
+
 @pytest.mark.parametrize(
     ("before", "after", "counts"),
     [((1.02, 1.1), (1.01, 0.99), False), ((1.32, 5.2), (1.23, 1.5), True), ((1.3, 1.2), (1.1, 1.2), True)],
