@@ -65,10 +65,10 @@ def noiseless_search(search: Search, explains: Callable[[ScoredModel], bool]) ->
     if grown is start:
         return None
     best, without = _backward_eliminate(search, grown, seen)
-    found = _thin(search, best, without, seen, explains)
+    found = _thin(search, _scored(search, best.output_error_fit), without, seen, explains)
     if len(found.names) < len(grown.output_error_fit.names):
-        best = seen[frozenset(_grow_likelier(search, found, seen).names)]
-        found = _thin(search, best, _without_each(search, best, seen), seen, explains)
+        found = _grow_likelier(search, found, seen)
+        found = _thin(search, found, _without_each(search, seen[frozenset(found.names)], seen), seen, explains)
     return found
 
 
@@ -111,19 +111,17 @@ def _lower(search: Search, current: FreeRunFit, seen: dict[frozenset[str], FreeR
 
 
 def _thin(
-    search: Search, best: FreeRunFit, without: Sequence[FreeRunFit], seen: dict[frozenset[str], FreeRunFit],
+    search: Search, found: ScoredModel, without: Sequence[FreeRunFit], seen: dict[frozenset[str], FreeRunFit],
     explains: Callable[[ScoredModel], bool],
 ) -> ScoredModel:  # fmt: skip
     """Return a model without the effects that the log evidence speaks against; it, and it without each, count as tried."""
-    (found,) = search.parallel.map(partial(_scored, search), [best.output_error_fit])
     while True:
         less = search.parallel.map(partial(_scored, search), [w.output_error_fit for w in without])
         search.tried.update({frozenset(h.names): h for h in (found, *less)})
         likelier = max((found, *filter(explains, less)), key=lambda h: h.log_evidence)
         if likelier is found:
             return found
-        best, found = without[less.index(likelier)], likelier
-        without = _without_each(search, best, seen)
+        found, without = likelier, _without_each(search, without[less.index(likelier)], seen)
 
 
 def _keep(known: dict[frozenset[str], FreeRunFit], new: FreeRunFit) -> None:

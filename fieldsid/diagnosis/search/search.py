@@ -197,7 +197,8 @@ class Search(MoveEvaluation):
         """Return every actuator with every hidden state that it is mistaken for, one in the variant that stands for it."""
         alone = (self.tried.get(self.root | {e.name}) for e in self.catalogue)
         effects = [next(e for e in h.effects if e.name not in self.known) for h in alone if h is not None]
-        return [(a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known]
+        pairs = ((a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known)
+        return list({frozenset((e.name, e.is_formed) for e in pair): pair for pair in pairs}.values())
 
     def _fit_in_series(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
         """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
