@@ -66,9 +66,8 @@ def _gain(old: ParameterSource, new: ParameterSource, was: Row, now: Row, fin: F
 
 def _formula(plant: LinearPlant) -> FloatArray:
     """Return the gain that the formula gives at damping 0.7071, for each draw, (d,)."""
-    damping = plant.damping + plant.cross_rate / plant.cross_damping
-    authority = plant.authority + plant.cross_fin / plant.cross_damping
-    size = np.broadcast_to(np.abs(0.5 * damping**2 - plant.stiffness), authority.shape)
+    authority = plant.slow_authority
+    size = np.broadcast_to(np.abs(0.5 * plant.slow_damping**2 - plant.stiffness), authority.shape)
     count = min(DRAWS, authority.size)
     return np.asarray((size / np.abs(authority))[:count])
 

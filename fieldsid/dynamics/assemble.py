@@ -49,7 +49,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class KernelInputs:
-    """Arrays of the core: drive (n-1, 8), constants (14,), pieces per interval; what they came from: fin path, terms, core."""
+    """Arrays of the core: drive (n-1, 8), constants (18,), pieces per interval; what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
@@ -142,7 +142,7 @@ def cross_input_of(fin: FinPath, core: Core) -> FloatArray | float:
 
 
 def constants_of(core: Core) -> FloatArray:
-    """Return a core's coefficients as the vector (14,) that the kernel takes; the fin's input to the cross state is a drive."""
+    """Return a core's coefficients as the vector (18,) that the kernel takes; the fin's input to the cross state is a drive."""
     return np.array(_CONSTANTS(core))
 
 

@@ -13,6 +13,7 @@ DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", 
 CONSTANTS = (
     "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
     "cross_damping", "cross_rate", "cross_quadratic", "beyond_square", "heading_sin2", "heading_cos2", "heading_turn",
+    "cross_share", "strip_moment", "strip_force", "strip_flow",
 )  # fmt: skip
 
 
@@ -21,7 +22,7 @@ def integrate_motion(
 ) -> None:
     """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on.
 
-    steps (n-1,) s, drive (n-1, 8) in the order of DRIVES, c (14,) in that of CONSTANTS, start (3,).
+    steps (n-1,) s, drive (n-1, 8) in the order of DRIVES, c (18,) in that of CONSTANTS, start (3,).
     """
     if not linear_motion(steps, drive, c, start, pieces, out):
         nonlinear_motion(steps, drive, c, start, pieces, out)
@@ -44,7 +45,7 @@ def integrate_with_sensitivities(
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
     A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says; none goes
-    with the flow. d_c (P, 14) are those of the constants, d_start (P, 3) those of the initial state.
+    with the flow. d_c (P, 18) are those of the constants, d_start (P, 3) those of the initial state.
     """
     if not linear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens):
         nonlinear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens)

@@ -71,14 +71,20 @@ def set_all_diverged(sens: FloatArray, first: int) -> None:
 
 @inner
 def reverses(c: FloatArray) -> bool:
-    """Whether any of the constants (14,) goes with the sine or the cosine of the angle."""
+    """Whether any of the constants (18,) goes with the sine or the cosine of the angle."""
     return bool(abs(c[3]) + abs(c[4]) + abs(c[5]) + abs(c[6]) + abs(c[11]) + abs(c[12]) != 0.0)
 
 
 @inner
 def crosses_limit_by(c: FloatArray) -> bool:
-    """Whether any of the constants (14,) is of the cross state."""
-    return bool(abs(c[7]) + abs(c[8]) + abs(c[9]) != 0.0)
+    """Whether any of the constants (18,) drives the cross state or damps it."""
+    return bool(abs(c[7]) + abs(c[8]) + abs(c[9]) + abs(c[16]) != 0.0)
+
+
+@inner
+def of_strips(c: FloatArray) -> bool:
+    """Whether any of the constants (18,) is of the flow that the cross state makes along the hull."""
+    return bool(abs(c[15]) + abs(c[16]) != 0.0)
 
 
 @inner
@@ -93,7 +99,9 @@ def crosses_limit(drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
 @inner
 def is_linear(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
     """Whether a motion is linear in (y, p) alone, and goes by even intervals."""
-    return c[0] == 0.0 and c[1] == 0.0 and is_even(steps, drive) and not (reverses(c) or crosses_limit(drive, c, start))
+    if c[0] != 0.0 or c[1] != 0.0 or c[15] != 0.0:
+        return False
+    return is_even(steps, drive) and not (reverses(c) or crosses_limit(drive, c, start))
 
 
 @inner

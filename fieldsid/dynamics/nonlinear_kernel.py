@@ -1,11 +1,12 @@
 """The compiled core of any motion: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
 
     y' = p
-    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) + x
+    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) - N F(s x/g, p) + c x
          + hs sin z + hc cos z + hs2 sin 2z + hc2 cos 2z + rs (z - sin z) + rc (cos z - 1)
     z = y - ht (t - the middle of the run)
-    x' = -e g x - (D/g) x|x| - f g^2 p + q
+    x' = -e g x - (D/g) x|x| - f g^2 p - Y g G(s x/g, p) + q
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
+    G(alpha, p) = int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| dxi              (G(alpha, 0) = alpha |alpha|)
 a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
 start to its end. The tangents are the
 derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
@@ -19,6 +20,7 @@ from fieldsid.dynamics.linear_kernel import (
     DIVERGED_RATE_RAD_S,
     crosses_limit,
     crosses_limit_by,
+    of_strips,
     reverses,
     set_all_diverged,
     set_diverged,
@@ -31,9 +33,11 @@ SMALLEST_SPEED_RATIO = 0.01
 """Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
 SMALLEST_WEIGHT = 1e-150
 AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, FLOW, BY_LENGTH, SIN, COS, ARC, BY_TURN = range(16)
+OF_X, OF_FACTOR, X_BY_P, STRIP_MOMENT, STRIP_FORCE, MOMENT_BY_FLOW, FORCE_BY_FLOW = range(16, 23)
 """What is kept of each stage of a step: the state and the share of the interval; the derivatives of p' by y and by p, of -x'
-by x and by the cross factor; and what the derivatives of the constants multiply."""
-STAGE_COLUMNS = 16
+by x and by the cross factor; what the derivatives of the constants multiply; the derivatives of p' by x and by the cross
+factor, of -x' by p; and, of the flow that the cross state makes, F, G/g and their derivatives by s."""
+STAGE_COLUMNS = 23
 
 
 @inner
@@ -48,6 +52,17 @@ def crossflow(alpha: float, p: float) -> tuple[float, float, float]:
     by_alpha = s * (16.0 * alpha - 64.0 / 3.0 * alpha * ratio * ratio)
     by_p = s * (2.0 * p + 32.0 / 3.0 * alpha * ratio * ratio * ratio)
     return value, by_alpha, by_p
+
+
+@inner
+def crossforce(alpha: float, p: float) -> tuple[float, float, float]:
+    """Return G(alpha, p) and its derivatives by alpha and by p, from the closed form of the integral."""
+    if abs(alpha) >= 0.5 * abs(p):
+        s = 1.0 if alpha >= 0.0 else -1.0
+        return s * (alpha * alpha + p * p / 12.0), 2.0 * abs(alpha), s * p / 6.0
+    s, ratio = (1.0 if p >= 0.0 else -1.0), alpha / p
+    cube = 2.0 / 3.0 * alpha * ratio
+    return s * (0.5 * alpha * p + cube * alpha), s * (0.5 * p + 3.0 * cube), s * (0.5 * alpha - cube * ratio)
 
 
 @inner
@@ -88,16 +103,13 @@ def nonlinear_motion(
     n = steps.shape[0] + 1
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
-    turning, late = reverses(c), -0.5 * _total(steps)
+    turning, stripped, late = reverses(c), of_strips(c), -0.5 * _total(steps)
     for i in range(n - 1):
         h = steps[i] / pieces
         a, k = drive[i, 0], drive[i, 1]
-        e, f_cross, hold, q = (
-            c[7] * drive[i, 4],
-            c[8] * drive[i, 4] ** 2,
-            c[9] / max(drive[i, 4], SMALLEST_SPEED_RATIO),
-            drive[i, 5],
-        )
+        fast = drive[i, 4]
+        floored = max(fast, SMALLEST_SPEED_RATIO)
+        e, f_cross, hold, q = c[7] * fast, c[8] * fast**2, c[9] / floored, drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -107,16 +119,21 @@ def nonlinear_motion(
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
                 drag = ps * abs(ps) if c[10] == 0.0 else power_drag(ps, c[10])[0]
-                f = -a * ps - k * ys + m - c[0] * drag + xs
+                f = -a * ps - k * ys + m - c[0] * drag + c[14] * xs
+                slower = (e + hold * abs(xs)) * xs + f_cross * ps - q
                 if c[1] != 0.0:
                     w = drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part
                     f -= c[1] * crossflow(w / c[2], ps)[0]
+                if stripped:
+                    alpha = c[17] * xs / floored
+                    f -= c[15] * crossflow(alpha, ps)[0]
+                    slower += c[16] * fast * crossforce(alpha, ps)[0]
                 if turning:
                     seen = ys - c[13] * (late + part * steps[i])
                     sin, cos = np.sin(seen), np.cos(seen)
                     f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0)
                     f += 2.0 * c[11] * sin * cos + c[12] * (1.0 - 2.0 * sin * sin)
-                ky, kp, kx = ps, f, -(e + hold * abs(xs)) * xs - f_cross * ps + q
+                ky, kp, kx = ps, f, -slower
                 ty += _weight(stage) * ky
                 tp += _weight(stage) * kp
                 tx += _weight(stage) * kx
@@ -131,7 +148,7 @@ def nonlinear_motion(
 
 
 @inner
-def _map_row(row: int, h: float, turn: float, stages: FloatArray, rows: FloatArray, push: FloatArray, pull: FloatArray) -> None:
+def _map_row(row: int, h: float, stages: FloatArray, rows: FloatArray, push: FloatArray, pull: FloatArray) -> None:
     """Fill one row of a step's linear map: rows (3, 9) of the state and of what enters, push and pull (3, 4) of each stage.
 
     A tangent obeys s' = A_l s + b u_l at stage l of the step, so that s -> s + sum_l W_l (A_l s + b u_l) with
@@ -145,9 +162,11 @@ def _map_row(row: int, h: float, turn: float, stages: FloatArray, rows: FloatArr
         l = 3 - back
         whole = _weight(l) * h / 6.0
         w_y, w_p, w_x = part * v_y + whole * in_y, part * v_p + whole * in_p, part * v_x + whole * in_x
-        v_y, v_p, v_x = w_p * stages[BY_Y, l], w_y + w_p * stages[BY_P, l] - w_x * turn, w_p - w_x * stages[BY_X, l]
+        v_y, v_p = w_p * stages[BY_Y, l], w_y + w_p * stages[BY_P, l] - w_x * stages[X_BY_P, l]
+        v_x = w_p * stages[OF_X, l] - w_x * stages[BY_X, l]
         of_y, of_p, of_x = of_y + v_y, of_p + v_p, of_x + v_x
-        one, of_cross, by_factor = one + w_p, of_cross + w_x, by_factor - w_x * stages[BY_FACTOR, l]
+        one, of_cross = one + w_p, of_cross + w_x
+        by_factor += w_p * stages[OF_FACTOR, l] - w_x * stages[BY_FACTOR, l]
         push[row, l], pull[row, l] = w_p, w_x
         part = _reach(l) * h
     rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3] = of_y, of_p, of_x, one
@@ -177,6 +196,7 @@ def nonlinear_sensitivities(
     s, has_c = np.zeros((count, 3)), np.zeros(count)
     stages, rows, push, pull = np.zeros((STAGE_COLUMNS, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
     turning, flowing, raised, late = reverses(c), c[1] != 0.0, c[10] != 0.0, -0.5 * _total(steps)
+    stripped = of_strips(c)
     crossing = crosses_limit(drive, c, start)
     for j in range(count):
         for l in range(3):
@@ -184,12 +204,12 @@ def nonlinear_sensitivities(
         for l in range(d_c.shape[1]):
             has_c[j] += d_c[j, l] != 0.0
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
-        turning, flowing = turning or reverses(d_c[j]), flowing or d_c[j, 1] != 0.0
+        turning, flowing, stripped = turning or reverses(d_c[j]), flowing or d_c[j, 1] != 0.0, stripped or of_strips(d_c[j])
         raised, crossing = (
             raised or d_c[j, 10] != 0.0,
             crossing or crosses_limit_by(d_c[j]) or s[j, 2] != 0.0 or factor[j, 5] != 0.0,
         )
-    bent = crossing or turning or flowing or raised or c[0] != 0.0
+    bent = crossing or turning or flowing or raised or stripped or c[0] != 0.0
     last_h, last_a, last_k = -1.0, 0.0, 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
@@ -211,7 +231,7 @@ def nonlinear_sensitivities(
                 if raised:
                     drag, log = power_drag(ps, c[10])
                     by_p = -a - (2.0 + c[10]) * c[0] * drag / (ps if abs(ps) > ZERO_RATE_RAD_S else 1.0)
-                f = -a * ps - k * ys + m - c[0] * drag + xs
+                f = -a * ps - k * ys + m - c[0] * drag + c[14] * xs
                 if flowing:
                     alpha = (drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part) / c[2]
                     flow, by_alpha, by_rate = crossflow(alpha, ps)
@@ -229,11 +249,29 @@ def nonlinear_sensitivities(
                     stages[SIN, stage], stages[COS, stage], stages[ARC, stage] = sin, cos, seen - sin
                     stages[BY_TURN, stage] = slope * clock
                 square = xs * abs(xs)
+                slower = damp * xs + hold * square + turn * ps - q
+                by_x, by_factor = damp + 2.0 * hold * abs(xs), c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square
+                stages[OF_X, stage], stages[OF_FACTOR, stage], stages[X_BY_P, stage] = c[14], 0.0, turn
+                if stripped:
+                    alpha = c[17] * xs / floored
+                    moment, moment_by_flow, moment_by_p = crossflow(alpha, ps)
+                    force, force_by_flow, force_by_p = crossforce(alpha, ps)
+                    f -= c[15] * moment
+                    slower += c[16] * fast * force
+                    by_p -= c[15] * moment_by_p
+                    by_x += c[16] * fast * force_by_flow * c[17] / floored
+                    by_factor += c[16] * (force - fast * force_by_flow * alpha / floored)
+                    stages[OF_X, stage] -= c[15] * moment_by_flow * c[17] / floored
+                    stages[OF_FACTOR, stage] = c[15] * moment_by_flow * alpha / floored
+                    stages[X_BY_P, stage] += c[16] * fast * force_by_p
+                    stages[STRIP_MOMENT, stage], stages[STRIP_FORCE, stage] = moment, fast * force
+                    stages[MOMENT_BY_FLOW, stage] = c[15] * moment_by_flow * xs / floored
+                    stages[FORCE_BY_FLOW, stage] = c[16] * fast * force_by_flow * xs / floored
                 stages[AT_Y, stage], stages[AT_P, stage], stages[AT_X, stage], stages[PART, stage] = ys, ps, xs, part
-                stages[BY_Y, stage], stages[BY_P, stage], stages[BY_X, stage] = by_y, by_p, damp + 2.0 * hold * abs(xs)
-                stages[BY_FACTOR, stage] = c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square
+                stages[BY_Y, stage], stages[BY_P, stage] = by_y, by_p
+                stages[BY_X, stage], stages[BY_FACTOR, stage] = by_x, by_factor
                 stages[DRAG, stage], stages[BY_POWER, stage] = drag, c[0] * log * drag
-                ky, kp, kx = ps, f, -damp * xs - hold * square - turn * ps + q
+                ky, kp, kx = ps, f, -slower
                 ty += wt * ky
                 tp += wt * kp
                 tx += wt * kx
@@ -242,7 +280,7 @@ def nonlinear_sensitivities(
             x += h / 6.0 * tx
             for row in range(2 + crossing):
                 if bent or not (a == last_a and k == last_k and abs(h - last_h) < 1e-9 * h):
-                    _map_row(row, h, turn, stages, rows, push, pull)
+                    _map_row(row, h, stages, rows, push, pull)
                 _map_rates(row, stages, push, rows)
             last_h, last_a, last_k = h, a, k
             for j in range(count):
@@ -276,7 +314,7 @@ def nonlinear_sensitivities(
                 if has_c[j] > 0.0:
                     for l in range(4):
                         ps, xs = stages[AT_P, l], stages[AT_X, l]
-                        e = -d_c[j, 0] * stages[DRAG, l] - d_c[j, 10] * stages[BY_POWER, l]
+                        e = d_c[j, 14] * xs - d_c[j, 0] * stages[DRAG, l] - d_c[j, 10] * stages[BY_POWER, l]
                         if flowing:
                             e += d_c[j, 2] * stages[BY_LENGTH, l] - d_c[j, 1] * stages[FLOW, l]
                         if turning:
@@ -284,10 +322,14 @@ def nonlinear_sensitivities(
                             e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * stages[ARC, l] + d_c[j, 6] * (cos - 1.0)
                             e += 2.0 * d_c[j, 11] * sin * cos + d_c[j, 12] * (1.0 - 2.0 * sin * sin)
                             e -= d_c[j, 13] * stages[BY_TURN, l]
+                        if stripped:
+                            e -= d_c[j, 15] * stages[STRIP_MOMENT, l] + d_c[j, 17] * stages[MOMENT_BY_FLOW, l]
                         to_y += push[0, l] * e
                         to_p += push[1, l] * e
                         if crossing:
                             z = d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * xs * abs(xs)
+                            if stripped:
+                                z += d_c[j, 16] * stages[STRIP_FORCE, l] + d_c[j, 17] * stages[FORCE_BY_FLOW, l]
                             to_y -= pull[0, l] * z
                             to_p -= pull[1, l] * z
                             to_x += push[2, l] * e - pull[2, l] * z

@@ -103,6 +103,7 @@ def equivalent_solution(values: Values, axis: Axis) -> dict[str, float] | None:
     With inertia the servo's two time constants T1 >= T2 have the sum `lag` and the product inertia_share lag^2; they are real
     where inertia_share is 1/4 at most. A hull that drifts has two poles, of s^2 + (a22 + c) s + a22 c + c_r with the cross
     state's damping c and rate c_r, and keeps its zero -c: the slow pole stays, the fast one is exchanged; complex ones are not.
+    A hull that the cross flow along it holds has no poles of its own.
     """
     names, lag = NAMES[axis], values["lag"]
     apart = 1.0 - 4.0 * values.get("inertia_share", 0.0)
@@ -128,6 +129,8 @@ def _hull_poles(damping: float, values: Values) -> tuple[float, float | None] | 
     """Return a hull's fast pole and, where it drifts, its slow one, in 1/s; None where they are complex or the fast one grows."""
     if "cross_damping" not in values:
         return (damping, None) if damping > 0.0 else None
+    if "strip_drag" in values:
+        return None
     middle = 0.5 * (damping + values["cross_damping"])
     squared = middle**2 - damping * values["cross_damping"] - values["cross_rate"]
     if squared < 0.0 or middle + np.sqrt(squared) <= 0.0:

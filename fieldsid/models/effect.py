@@ -2,13 +2,13 @@
 
 Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The core integrates
     angle' = p
-    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - crossflow F(w, p)
+    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - crossflow F(w, p) - strip_moment F(s x/g, p)
          + heading_sin sin(seen) + heading_cos cos(seen) + heading_sin2 sin(2 seen) + heading_cos2 cos(2 seen)
-         + righting_sin (seen - sin seen) + righting_cos (cos seen - 1) + x
-    x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p + cross_fin delta
-with p the rate, seen = angle - heading_turn (t - the middle of the run), and x the cross state (sway or heave, scaled so
-that its moment is +x). A run starts with x where some steady rate before it had left it; no motion within that rate leaves
-it further from zero.
+         + righting_sin (seen - sin seen) + righting_cos (cos seen - 1) + cross_share x
+    x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p - strip_force g G(s x/g, p) + cross_fin delta
+with p the rate, seen = angle - heading_turn (t - the middle of the run), s = strip_flow, and x the cross state (sway or heave,
+scaled so that its moment is cross_share x, the share one by default). A run starts with x where some steady rate before it had
+left it; no motion within that rate leaves it further from zero.
 """
 
 from __future__ import annotations
@@ -139,17 +139,26 @@ class Core:
     heading_sin2: float = 0.0
     heading_cos2: float = 0.0
     heading_turn: float = 0.0
+    cross_share: float = 1.0
+    strip_moment: float = 0.0
+    strip_force: float = 0.0
+    strip_flow: float = 0.0
 
     def plus(self, other: Core) -> Core:
-        """Return the sum of two sets of coefficients; `length` is taken from whichever sets it."""
-        total = {f: getattr(self, f) + getattr(other, f) for f in CORE_FIELDS if f != "length"}
-        return replace(self, **total, length=other.length if other.length != 1.0 else self.length)
+        """Return the sum of two sets of coefficients; the factors of FACTORS are taken from whichever sets them."""
+        total = {f: getattr(self, f) + getattr(other, f) for f in CORE_FIELDS if f not in FACTORS}
+        factors = {f: getattr(other if getattr(other, f) != 1.0 else self, f) for f in FACTORS}
+        return replace(self, **total, **factors)
 
     def steady_cross_state(self, rate: float) -> float:
-        """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none."""
+        """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none.
+
+        The force along the hull is taken as that of a hull that drifts as fast and does not turn.
+        """
         if self.cross_damping <= 0.0:
             return 0.0
-        return float(steady_cross_state(np.asarray(-self.cross_rate * rate), self.cross_damping, self.cross_quadratic))
+        square = self.cross_quadratic + self.strip_force * self.strip_flow**2
+        return float(steady_cross_state(np.asarray(-self.cross_rate * rate), self.cross_damping, square))
 
 
 def steady_cross_state(push: FloatArray, damping: FloatArray | float, quadratic: FloatArray | float) -> FloatArray:
@@ -164,6 +173,8 @@ def power_drag(rate: FloatArray, beyond: FloatArray | float) -> FloatArray:
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)
+FACTORS = ("length", "cross_share")
+"""The coefficients of a core that are one where no effect sets them."""
 
 
 @dataclass(frozen=True, slots=True)

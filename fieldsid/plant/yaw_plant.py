@@ -1,7 +1,7 @@
 """The identified yaw model as arrays over draws of its parameters, ready for steady turns at any speed.
 
-    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - F(v, r) + b(u) delta + m + M(r) + x
-    c(u) x + c_q(u) x|x| = -c_r(u) r + c_d(u) delta
+    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - F(v, r) - N F(s x, r) + b(u) delta + m + M(r) + c_m x
+    c(u) x + c_q(u) x|x| + Y(u) G(s x, r) = -c_r(u) r + c_d(u) delta
 with every coefficient at the speed u kept in the turn, by the model's own speed law and its effects' own scaling.
 The actuator's effects are taken as they leave a fin that was told to stay at its limit.
 """
@@ -25,7 +25,10 @@ SETTLE_S = 60.0
 STEP_S = 0.05
 SCALES = np.geomspace(0.2, 5.0, 9)
 EXPONENT = "damping_exponent"
-CORE = ("cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "quadratic", "crossflow", "beyond_square")
+CORE = (
+    "cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow",
+    "quadratic", "crossflow", "beyond_square",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +220,8 @@ def _seen_share(model: Model, values: Mapping[str, float]) -> float:
     damping, held = values.get("cross_damping", 0.0), model.trained.get("held_s", np.inf)
     if damping <= 0.0 or not damping * held < 1.0:
         return 1.0
-    settled = values[NAMES[model.axis].damping] + values.get("cross_rate", 0.0) / damping
+    moved = values.get("strip_munk", 1.0) * values.get("cross_rate", 0.0) / damping
+    settled = values[NAMES[model.axis].damping] + moved
     return 1.0 if settled > 0.0 else float(-np.expm1(-damping * held))
 
 

@@ -1,7 +1,7 @@
 """The linear plant a controller meets at one speed: fin command to angle, over draws of the identified parameters.
 
-y'' = -a y' - k y + b delta + x,   x' = -c x - c_q x|x| - c_r y' + c_f delta
-angle/fin = (b (s + c) + c_f) / ((s^2 + a s + k)(s + c) + c_r s),   fin/command = exp(-T s) / (lag s + 1)
+y'' = -a y' - k y + b delta + m x,   x' = -c x - c_q x|x| - c_r y' + c_f delta
+angle/fin = (b (s + c) + m c_f) / ((s^2 + a s + k)(s + c) + m c_r s),   fin/command = exp(-T s) / (lag s + 1)
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, straight_moment
 
 PARTS = (
     "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "crossflow", "cross_damping",
-    "cross_rate", "cross_fin", "cross_quadratic", "lag", "delay", "fin_rate", "powers", "speed_loss",
+    "cross_rate", "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow", "lag", "delay",
+    "fin_rate", "powers", "speed_loss",
 )  # fmt: skip
 POWERS = ("damping", "authority", "cross_damping", "cross_rate", "cross_fin", "cross_quadratic")
 """What goes with a power of the speed, in the order of a plant's `powers`."""
@@ -41,7 +42,8 @@ LONGEST_LAG_S = 10.0
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `quadratic`, `beyond_square`, `crossflow`, `cross_quadratic`, `powers` and `speed_loss` act in time simulations only.
+    `quadratic`, `beyond_square`, `crossflow`, `cross_quadratic`, the strips, `powers` and `speed_loss` act in time simulations
+    only.
     `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited. `powers` (d, 6)
     are the exponents of the speed, by POWERS; `speed_loss` (d, 3) is drag a_u (1/m), the fin's and the turn's loss over it.
     Where the draws are those of a vehicle in surge, sway and yaw, `hull` (d, 22) are its coefficients
@@ -61,6 +63,10 @@ class LinearPlant:
     cross_rate: FloatArray
     cross_fin: FloatArray
     cross_quadratic: FloatArray
+    cross_share: FloatArray
+    strip_moment: FloatArray
+    strip_force: FloatArray
+    strip_flow: FloatArray
     lag: FloatArray
     delay: FloatArray
     fin_rate: FloatArray
@@ -96,14 +102,14 @@ class LinearPlant:
         """Return angle over fin command at frequencies (w,) rad/s, (d, w)."""
         s = 1j * omega[None, :]
         a, k, b = self.damping[:, None], self.stiffness[:, None], self.authority[:, None]
-        c, c_r, c_f = self.cross_damping[:, None], self.cross_rate[:, None], self.cross_fin[:, None]
+        c, c_r, c_f = self.cross_damping[:, None], self.moment_of_rate[:, None], self.moment_of_fin[:, None]
         hull = (b * (s + c) + c_f) / ((s * s + a * s + k) * (s + c) + c_r * s)
         return np.asarray(hull * np.exp(-s * self.delay[:, None]) / (self.lag[:, None] * s + 1.0))
 
     def polynomials(self) -> tuple[FloatArray, FloatArray]:
         """Return numerator (d, m) and denominator (d, n) of angle over command without delay, highest power first."""
         a, k, b = self.damping, self.stiffness, self.authority
-        c, c_r, c_f = self.cross_damping, self.cross_rate, self.cross_fin
+        c, c_r, c_f = self.cross_damping, self.moment_of_rate, self.moment_of_fin
         one = np.ones_like(a)
         numerator, denominator = b[:, None], np.column_stack([one, a, k])
         if c_r.any() or c_f.any():
@@ -116,22 +122,32 @@ class LinearPlant:
     @property
     def growth(self) -> FloatArray:
         """Return how fast the hull's least stable motion grows without a pilot, (d,) 1/s; a free heading is not one."""
-        a, k, c, c_r = self.damping, self.stiffness, self.cross_damping, self.cross_rate
-        coupled = bool(c_r.any() or self.cross_fin.any())
+        a, k, c, c_r = self.damping, self.stiffness, self.cross_damping, self.moment_of_rate
+        coupled = bool(c_r.any() or self.moment_of_fin.any())
         own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r] if coupled else [np.ones_like(a), a])
         if k.any():
             own = np.column_stack([np.ones_like(a), a + c, k + a * c + c_r, k * c] if coupled else [np.ones_like(a), a, k])
         return np.asarray(roots_of(own).real.max(axis=1))
 
     @property
+    def moment_of_rate(self) -> FloatArray:
+        """Return what the yaw or pitch rate takes from the moment of the cross state, (d,) 1/s^2 for each second."""
+        return np.asarray(self.cross_share * self.cross_rate)
+
+    @property
+    def moment_of_fin(self) -> FloatArray:
+        """Return what the fin adds to the moment of the cross state, (d,) 1/s^3."""
+        return np.asarray(self.cross_share * self.cross_fin)
+
+    @property
     def slow_damping(self) -> FloatArray:
         """Return the damping of the yaw or pitch rate (d,) 1/s once sway or heave has followed."""
-        return np.asarray(self.damping + self.cross_rate / self.cross_damping)
+        return np.asarray(self.damping + self.moment_of_rate / self.cross_damping)
 
     @property
     def slow_authority(self) -> FloatArray:
         """Return the authority (d,) 1/s^2 as the slow loop feels it: the fin's own and that through sway or heave."""
-        return np.asarray(self.authority + self.cross_fin / self.cross_damping)
+        return np.asarray(self.authority + self.moment_of_fin / self.cross_damping)
 
 
 def products(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -220,7 +236,8 @@ def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, d
     lag, delay, fin_rate = _actuator({}, limits, draws)
     return LinearPlant(
         source.axis, speed, base[names.damping], stiffness, authority, base[names.trim] / authority,
-        zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate, _powers(zero + 1.0, {}), np.zeros((draws, 3)),
+        zero, zero, zero, zero + 1.0, zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate,
+        _powers(zero + 1.0, {}), np.zeros((draws, 3)),
     )  # fmt: skip
 
 
@@ -277,6 +294,10 @@ def _plant_of_model(
         cross_rate=cored("cross_rate"),
         cross_fin=cored("cross_fin"),
         cross_quadratic=cored("cross_quadratic"),
+        cross_share=cored("cross_share"),
+        strip_moment=cored("strip_moment"),
+        strip_force=cored("strip_force"),
+        strip_flow=cored("strip_flow"),
         **dict(zip(("lag", "delay", "fin_rate"), _actuator(shared, limits, draws), strict=True)),
         powers=_powers(exponents, {name: power(name) for name in POWERS[2:]}),
         speed_loss=np.zeros((draws, 3)),

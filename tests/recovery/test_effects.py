@@ -14,6 +14,7 @@ from truth.logbook import flown
 from truth.noise import Clock
 from truth.physics import HIDDEN_EFFECTS, HiddenEffect, Physics
 
+import fieldsid as fs
 from fieldsid.dynamics.free_run import simulate
 from fieldsid.effects import all_effects
 from fieldsid.fitting.fit import fit
@@ -75,6 +76,42 @@ def test_a_run_that_starts_in_a_turn_shows_the_hidden_state_it_starts_with(case)
     hidden = simulate(first.model, whole, state=first.predictions[0].state).cross
     assert abs(hidden[turning]) > 0.3 * np.abs(hidden).max()
     assert found.predictions[0].state[2] == pytest.approx(hidden[turning], rel=0.05)
+
+
+HELD_BY_STRIPS = {
+    "damping": 1.0, "authority": -1.45, "fin_bend": -0.005, "cross_damping": 0.12, "cross_rate": 1.0, "cross_fin": 0.2,
+    "cross_strips": 3.1, "crossflow": 4.4, "length": 1.6,
+}  # fmt: skip
+"""A torpedo of 1.6 m at 1.9 m/s whose sway is in no moment but that of the cross flow along it."""
+
+
+def test_a_hull_that_only_the_cross_flow_holds_is_told_by_its_strips():
+    """No sway is measured. What turns the path into drift, the drag and the inertia's share are those that were put in.
+
+    To port or to starboard: the drift has no other moment than one that is the same for both.
+    """
+    rng, time = np.random.default_rng(3), CLOCK.time
+    plans = (
+        maneuvers.multisine(time, rng, 0.2),
+        maneuvers.stairs(time, 0.2, length=3.0),
+        maneuvers.pulses(time, 0.2, 0.12, recovery=4.0),
+        maneuvers.multisine(time, rng, 0.15),
+    )
+    runs = []
+    for i, plan in enumerate(plans):
+        log = flown(Physics(**HELD_BY_STRIPS), CLOCK, plan)
+        log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(time.size)
+        log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(time.size)
+        runs.append(Run(f"r{i}", log["time_s"], {name: log[name] for name in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad")}))
+    found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
+    assert (found.verdict, found.effects) == ("effect", ("sway_coupling",))
+    assert found.final.validation.angle_rms_rad < 1.15 * 0.005
+    assert found.final.validation.rate_rms_rad_s < 1.15 * 0.003
+    assert found.base.validation.angle_rms_rad > 3.0 * found.final.validation.angle_rms_rad
+    values = found.candidates[0].parameters
+    assert values["strip_drag"] == pytest.approx(4.4, rel=0.1)
+    assert values["strip_inertia"] == pytest.approx(3.1 * 1.6 / (32.0 * 4.4), rel=0.2)
+    assert abs(values["cross_rate"]) == pytest.approx(1.0 / 1.6, rel=0.15)
 
 
 def test_every_effect_that_needs_no_helper_signal_is_in_the_list():

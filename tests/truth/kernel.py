@@ -30,6 +30,18 @@ def crossflow(s, p):
 
 
 @nb.njit(cache=True)
+def strips(s, p):
+    """integral over xi in [-1/2, 1/2] of (s + xi p)|s + xi p|, by Simpson's rule on either side of where the flow turns."""
+    turn = min(max(-s / p, -0.5), 0.5) if p != 0.0 else 0.5
+    total = 0.0
+    for low, high in ((-0.5, turn), (turn, 0.5)):
+        for xi, w in ((low, 1.0), (0.5 * (low + high), 4.0), (high, 1.0)):
+            flow = s + xi * p
+            total += w / 6.0 * (high - low) * flow * abs(flow)
+    return total
+
+
+@nb.njit(cache=True)
 def moments(y, q, t, event, thrust):
     """Sum of the moments that are neither damping, stiffness nor fin, in rad/s^2."""
     deep = y[DEPTH] - q.depth_reference
@@ -76,6 +88,8 @@ def slope(y, out, q, t, fin, now, pitching):
     out[CROSS] = (
         -q.cross_damping * y[CROSS] - q.cross_rate * y[RATE] + q.cross_fin * fin - q.cross_quadratic * y[CROSS] * abs(y[CROSS])
     )
+    if q.cross_strips != 0.0:
+        out[CROSS] -= q.cross_strips * q.length**2 * strips(y[CROSS] / q.length, y[RATE])
     out[ROLL] = y[ROLL_RATE]
     turn = 0.0 if pitching else q.roll_by_turn * y[RATE] * y[SURGE]
     out[ROLL_RATE] = -2.0 * q.roll_zeta * q.roll_omega * y[ROLL_RATE] - q.roll_omega**2 * y[ROLL] + turn + now[ROLL_PUSH]

@@ -60,6 +60,7 @@ class Physics(NamedTuple):
     cross_rate: float = 0.0
     cross_fin: float = 0.0
     cross_quadratic: float = 0.0
+    cross_strips: float = 0.0
     cross_moment: float = 0.0
     roll_moment: float = 0.0
     roll_rate_moment: float = 0.0

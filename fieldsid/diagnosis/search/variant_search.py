@@ -135,7 +135,7 @@ def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence
         (point, edges) for point in _start_points(records, left, variant.initial_guesses, variant.coefficients) for edges in again
     ]
     starts = [
-        _with_values(problem.layout, transfer_parameters(old, fitted.x, problem.layout, point), edges) for point, edges in points
+        _with_values(problem.layout, transfer_parameters(old, fitted.x, problem.layout), point | edges) for point, edges in points
     ]
     likely = sorted(starts, key=lambda x: cost_of(problem, x, noise))[:MAX_STARTS]
     found = [levenberg_marquardt(problem, x, noise, max_iterations=SCREEN_ITERATIONS, tolerance=COST_TOLERANCE) for x in likely]

@@ -37,7 +37,9 @@ from fieldsid.models.speed_law import over_reference
 from fieldsid.numerics.arrays import FloatArray
 
 CROSS = START_NAMES.index("rate_before")
-DAMPING, RATE, SQUARE = (integrate.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate", "cross_quadratic"))
+DAMPING, RATE, SQUARE, FORCE, FLOW = (
+    integrate.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate", "cross_quadratic", "strip_force", "strip_flow")
+)
 EXPONENT_STEP = 1e-4
 """Half width of the central difference by the exponent of the speed law."""
 
@@ -105,7 +107,7 @@ class Sensitivities:
         return sens
 
     def _input_jacobians(self, slots: tuple[int, ...]) -> tuple[list[DriveDerivatives], FloatArray, FloatArray]:
-        """Return the derivatives by the parameters: of the drives, of the constants (P, 14), of the initial states (P, 3)."""
+        """Return the derivatives by the parameters: of the drives, of the constants (P, 18), of the initial states (P, 3)."""
         count = len(slots)
         drives: list[DriveDerivatives] = []
         d_c, d_start = np.zeros((count, CONSTANT_COUNT)), np.zeros((count, 3))
@@ -129,14 +131,16 @@ class Sensitivities:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _initial_state_derivative(self, d_c: FloatArray) -> float:
-        """Return the derivative of the initial cross state by the kernel's constants (14,), the rate before the run fixed."""
-        x, before = self.start[CROSS], self.values.get("rate_before", 0.0)
-        return self._steady_cross_derivative(d_c[RATE] * before + d_c[DAMPING] * x + d_c[SQUARE] * x * abs(x))
+        """Return the derivative of the initial cross state by the kernel's constants (18,), the rate before the run fixed."""
+        x, before, c = self.start[CROSS], self.values.get("rate_before", 0.0), self.arrays.constants
+        square = d_c[SQUARE] + d_c[FORCE] * c[FLOW] ** 2 + 2.0 * c[FORCE] * c[FLOW] * d_c[FLOW]
+        return self._steady_cross_derivative(d_c[RATE] * before + d_c[DAMPING] * x + square * x * abs(x))
 
     def _steady_cross_derivative(self, push: float) -> float:
         """Return the derivative of the initial cross state by a small input of its equation."""
-        damping = self.arrays.constants[DAMPING]
-        stiff = damping + 2.0 * self.arrays.constants[SQUARE] * abs(self.start[CROSS])
+        c = self.arrays.constants
+        damping, square = c[DAMPING], c[SQUARE] + c[FORCE] * c[FLOW] ** 2
+        stiff = damping + 2.0 * square * abs(self.start[CROSS])
         return -float(push) / float(stiff) if damping > 0.0 else 0.0
 
     def _integrate_with_sensitivities(
@@ -169,7 +173,7 @@ class Sensitivities:
         return out
 
     def _input_jacobian(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives by a parameter, and of the constants (14,) where there are any."""
+        """Return the derivatives of the drives by a parameter, and of the constants (18,) where there are any."""
         names = NAMES[self.layout.axis]
         share, ratio = self.scales
         exponent = self.values.get("damping_exponent", 1.0)
@@ -186,7 +190,7 @@ class Sensitivities:
         return self._of_effect(name)
 
     def _damping_exponent(self, factor: float, exponent: float) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives, and of the constants (14,), by the exponent of the speed law."""
+        """Return the derivatives of the drives, and of the constants (18,), by the exponent of the speed law."""
         of_damping = self._damping(factor)
         if all(e.core is None for e in self.layout.effects):
             return of_damping, None
@@ -251,7 +255,7 @@ class Sensitivities:
         return drives, None if owner.core is None else (up - down) / width
 
     def _drives_of_effect(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
-        """Return the drives that an effect changes, by their place, and the kernel's constants (14,), at these values."""
+        """Return the drives that an effect changes, by their place, and the kernel's constants (18,), at these values."""
         effects, record = self.layout.effects, self.record
         fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
         terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)

@@ -21,7 +21,7 @@ from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
 
 FOLDER = "plan/priors"
-HELD_BY = ("quadratic", "crossflow")
+HELD_BY = ("quadratic", "crossflow", "strip_moment")
 """Core terms whose damping grows with the rate: they hold a hull that is unstable at small angles."""
 WIDEST = 3.0
 """Draws stay within this many standard deviations."""
@@ -68,10 +68,10 @@ def checked_prior(model: Model, axis: Axis, speeds: tuple[float, ...]) -> Model:
 def growth_of(base: Base, core: Core) -> float:
     """Return the growth rate (1/s) of the least stable motion; a free heading counts as neither stable nor unstable.
 
-    y'' = -a y' - k y + x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another.
+    y'' = -a y' - k y + m x, x' = -c x - c_r y': sway may hold a hull that is unstable without it, and upset another.
     """
     a, k, c = base.damping, base.stiffness, core.cross_damping
-    roots = np.roots([1.0, a + c, k + a * c + core.cross_rate, k * c])
+    roots = np.roots([1.0, a + c, k + a * c + core.cross_share * core.cross_rate, k * c])
     worst = float(np.max(roots.real))
     return worst if worst > 1e-6 else 0.0
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.dynamics.nonlinear_kernel import power_drag
+from fieldsid.dynamics.nonlinear_kernel import crossflow, crossforce, power_drag
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 
-PLANT_COLUMNS = 23
+PLANT_COLUMNS = 27
 """Columns of a plant's row: damping, stiffness, authority, offset, quadratic, beyond_square, crossflow, cross_damping,
 cross_rate, cross_fin, cross_quadratic, exp(-step/lag), delay in steps, largest fin move in a step; the powers of the speed of
-damping, authority, cross_damping, cross_rate, cross_fin, cross_quadratic; drag, fin's and turn's loss of speed."""
+damping, authority, cross_damping, cross_rate, cross_fin, cross_quadratic; drag, fin's and turn's loss of speed; cross_share,
+strip_moment, strip_force, strip_flow."""
 GAIN_COLUMNS = 8
 """Columns of the gains' rows: speed, kp, ki, kd, bias, reference gain, fin limit, depth gain."""
 OUT_COLUMNS = 4
@@ -79,6 +80,16 @@ def commanded(now: FloatArray, target: float, y: float, p: float, integral: floa
 
 
 @inner
+def along_hull(row: FloatArray, c: FloatArray, x: float, p: float) -> tuple[float, float]:
+    """Return the moment of the cross state with that of the flow it makes along the hull, and what that flow takes from it."""
+    if row[24] == 0.0 and row[25] == 0.0:
+        return row[23] * x, 0.0
+    faster = c[2] / row[7]
+    alpha = row[26] * x / faster
+    return row[23] * x - row[24] * crossflow(alpha, p)[0], row[25] * faster * crossforce(alpha, p)[0]
+
+
+@inner
 def moved(
     row: FloatArray, c: FloatArray, held: float, push: float, step: float, state: tuple[float, float, float]
 ) -> tuple[float, float, float, float]:
@@ -89,11 +100,13 @@ def moved(
         of_power, square = 0.0, row[4] + row[6]
     a, b, k, h = c[0], c[1], row[1], 0.5 * step
     moment = b * held + push
-    pp = -a * p - k * y + moment - drag(p, of_power, beyond, square) + x
-    px = -(c[2] + c[5] * abs(x)) * x - c[3] * p + c[4] * held
+    turned, slowed = along_hull(row, c, x, p)
+    pp = -a * p - k * y + moment - drag(p, of_power, beyond, square) + turned
+    px = -(c[2] + c[5] * abs(x)) * x - c[3] * p + c[4] * held - slowed
     ym, pm, xm = y + h * p, p + h * pp, x + h * px
-    p += step * (-a * pm - k * ym + moment - drag(pm, of_power, beyond, square) + xm)
-    x += step * (-(c[2] + c[5] * abs(xm)) * xm - c[3] * pm + c[4] * held)
+    turned, slowed = along_hull(row, c, xm, pm)
+    p += step * (-a * pm - k * ym + moment - drag(pm, of_power, beyond, square) + turned)
+    x += step * (-(c[2] + c[5] * abs(xm)) * xm - c[3] * pm + c[4] * held - slowed)
     return y + step * pm, p, x, pm
 
 
@@ -109,7 +122,7 @@ def close_loop(
     push: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill out (n, t, 4) with angle, fin, depth and speed of n plants (n, 23) under the gains of table (k, 8).
+    """Fill out (n, t, 4) with angle, fin, depth and speed of n plants (n, 27) under the gains of table (k, 8).
 
     push (t,) is a disturbance moment in rad/s^2. With depth_step other than zero the reference is depth gain (z - depth_step),
     limited; else `reference` rad. What diverges is inf from there on.

@@ -9,7 +9,8 @@ import numpy as np
 
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import power_drag, steady_cross_state
+from fieldsid.models.effect import power_drag
+from fieldsid.models.helpers.strip_theory import settled_cross_state, strip_moment
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.yaw_plant import YawPlant, own_moment
 from fieldsid.turning.steady.speed_loss import SpeedLoss
@@ -61,25 +62,15 @@ def balance(
     scale = plant.scale(surge)
     core = {n: c.at(scale) for n, c in plant.core.items()}
     coupled = core["cross_damping"] > 0
-    inverse = np.where(coupled, plant.sway_seen / np.where(coupled, core["cross_damping"], 1.0), 0.0)
+    seen = plant.sway_seen * core["cross_share"]
+    inverse = np.where(coupled, seen / np.where(coupled, core["cross_damping"], 1.0), 0.0)
     linear = plant.damping_at(surge) + core["cross_rate"] * inverse
     push = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment + core["cross_fin"] * inverse * fin
     drive = side * push
-    curved = ("crossflow", "cross_quadratic", "beyond_square")
+    curved = ("crossflow", "cross_quadratic", "beyond_square", "strip_moment", "strip_force")
     if not moments and not any(np.any(core[name]) for name in curved):
         return side * _quadratic_root(linear, core["quadratic"], drive)
     return side * _bisected(plant, speed_loss, core, linear, drive, side * fin, side, moments)
-
-
-def crossflow(drift: FloatArray, rate: FloatArray) -> FloatArray:
-    """Return F(a, p) = 32 int_{-1/2}^{1/2} (a + x p)|a + x p| x dx, arrays alike; F(0, p) = p |p|."""
-    x, w = np.polynomial.legendre.leggauss(24)
-    x, w = 0.5 * x, 0.5 * w
-    total = np.zeros(np.broadcast(drift, rate).shape)
-    for xi, wi in zip(x, w, strict=True):
-        flow = drift + xi * rate
-        total += wi * xi * flow * np.abs(flow)
-    return 32.0 * total
 
 
 def _quadratic_root(linear: FloatArray, quadratic: FloatArray, drive: FloatArray) -> FloatArray:
@@ -109,9 +100,12 @@ def _bisected(
     def surplus(rate: FloatArray) -> FloatArray:
         drift = -speed_loss.drift_per_rate * rate / plant.length
         left = drive - linear * rate
-        left = left - core["quadratic"] * power_drag(rate, core["beyond_square"]) - core["crossflow"] * crossflow(drift, rate)
-        if np.any(core["cross_quadratic"]):
-            left = left + plant.sway_seen * _held_back(core, core["cross_fin"] * fin - core["cross_rate"] * rate)
+        left = left - core["quadratic"] * power_drag(rate, core["beyond_square"]) - core["crossflow"] * strip_moment(drift, rate)
+        if np.any(core["cross_quadratic"]) or np.any(core["strip_moment"]) or np.any(core["strip_force"]):
+            push = core["cross_fin"] * fin - core["cross_rate"] * rate
+            settled = _settled(core, push, rate)
+            left = left + plant.sway_seen * core["cross_share"] * (settled - push / core["cross_damping"])
+            left = left - core["strip_moment"] * strip_moment(core["strip_flow"] * settled, rate)
         if moments:
             left = left + side * np.interp(side * rate, moments["rate"], moments["moment"])
         return left
@@ -124,10 +118,11 @@ def _bisected(
     return np.where(good, 0.5 * (low + high), np.nan)
 
 
-def _held_back(core: Mapping[str, FloatArray], push: FloatArray) -> FloatArray:
-    """Return the steady cross state under an input less what it would be without its quadratic drag, arrays alike."""
-    damping, quadratic = core["cross_damping"], core["cross_quadratic"]
-    return steady_cross_state(push, damping, quadratic) - push / damping
+def _settled(core: Mapping[str, FloatArray], push: FloatArray, rate: FloatArray) -> FloatArray:
+    """Return the cross state that an input leads to in a steady turn, arrays alike."""
+    return settled_cross_state(
+        push, rate, core["cross_damping"], core["cross_quadratic"], core["strip_force"], core["strip_flow"]
+    )
 
 
 def _moment_tables(plant: YawPlant) -> dict[str, FloatArray]:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.models.effect import power_drag
+from fieldsid.models.helpers.strip_theory import strip_force, strip_moment
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.yaw_plant import YawPlant, fin_after_step
 from fieldsid.turning.steady.speed_loss import SpeedLoss
-from fieldsid.turning.steady.steady_turn import crossflow
 
 STEP_S = 0.04
 MAX_TRANSIENT_S = 240.0
@@ -69,11 +69,13 @@ def _slope(state: FloatArray, plant: YawPlant, speed_loss: SpeedLoss, entry: Flo
     core = {n: c.at(plant.scale(speed))[0] for n, c in plant.core.items()}
     moment = plant.authority_at(speed)[0] * fin + plant.trim_at(speed)[0] + plant.moment[0]
     moment = moment - plant.damping_at(speed)[0] * rate - core["quadratic"] * power_drag(rate, core["beyond_square"])
-    moment = moment + scale * state[6]
-    drift = (core["cross_fin"] * fin - core["cross_rate"] * rate) / scale
+    moment = moment + core["cross_share"] * scale * state[6]
+    along_hull = core["strip_flow"] * scale * state[6]
+    moment = moment - core["strip_moment"] * strip_moment(along_hull, rate)
+    drift = (core["cross_fin"] * fin - core["cross_rate"] * rate - core["strip_force"] * strip_force(along_hull, rate)[0]) / scale
     drift = drift - (core["cross_damping"] + core["cross_quadratic"] * scale * np.abs(state[6])) * state[6]
     if np.any(core["crossflow"]):
-        moment = moment - core["crossflow"] * crossflow(-speed_loss.drift_per_rate[0] * rate / plant.length[0], rate)
+        moment = moment - core["crossflow"] * strip_moment(-speed_loss.drift_per_rate[0] * rate / plant.length[0], rate)
     drag, turn, loss = speed_loss.drag[0], speed_loss.turn[0], speed_loss.fin[0]
     slower = drag * (entry**2 - surge**2 * (1.0 + loss * fin**2) - turn * rate**2)
     sway = -speed_loss.drift_per_rate[0] * rate

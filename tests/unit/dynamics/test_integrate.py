@@ -13,8 +13,15 @@ from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion, nonlinear_sensi
 from fieldsid.numerics.jit import plain_of
 
 N, H = 80, 0.05
-C = dict(zip(integrate.CONSTANTS, (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4), strict=True))
-LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0])
+C = dict(
+    zip(
+        integrate.CONSTANTS,
+        (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1),
+        strict=True,
+    )
+)
+LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0])
+COUNT = len(integrate.CONSTANTS)
 
 
 def NOTHING(count):  # noqa: N802
@@ -44,13 +51,16 @@ def oracle(rows, c, start):
             seen = s[0] - c["heading_turn"] * ((i + part) * H - 0.5 * (N - 1) * H)
             flow = (w0 + (w1 - w0) * part) / c["length"] + xi * s[1]
             drag = 32.0 * np.mean(flow * np.abs(flow) * xi)
-            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["crossflow"] * drag + s[2]
+            own = c["strip_flow"] * s[2] / g + xi * s[1]
+            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["crossflow"] * drag + c["cross_share"] * s[2]
+            p -= c["strip_moment"] * 32.0 * np.mean(own * np.abs(own) * xi)
             p -= c["quadratic"] * np.sign(s[1]) * 0.2**2 * (abs(s[1]) / 0.2) ** (2.0 + c["beyond_square"])
             p += c["heading_sin"] * np.sin(seen) + c["heading_cos"] * np.cos(seen)
             p += c["heading_sin2"] * np.sin(2.0 * seen) + c["heading_cos2"] * np.cos(2.0 * seen)
             p += c["righting_sin"] * (seen - np.sin(seen)) + c["righting_cos"] * (np.cos(seen) - 1.0)
             held = c["cross_damping"] * g + c["cross_quadratic"] / g * abs(s[2])
-            return [s[1], p, -held * s[2] - c["cross_rate"] * g * g * s[1] + q]
+            held_back = c["strip_force"] * g * np.mean(own * np.abs(own))
+            return [s[1], p, -held * s[2] - c["cross_rate"] * g * g * s[1] - held_back + q]
 
         y = solve_ivp(slope, (0.0, H), y, method="DOP853", rtol=1e-9, atol=1e-12).y[:, -1]
         path.append(y)
@@ -140,7 +150,7 @@ def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear
     rows[:, 4], rows[:, 5:] = 1.0, 0.0
     columns, places, factors, pushes = pushed()
     out, sens = np.empty((N, 3)), np.empty((4, 2, N))
-    none = np.zeros((4, 14)), np.zeros((4, 3))
+    none = np.zeros((4, COUNT)), np.zeros((4, 3))
     integrate.integrate_with_sensitivities(steps, rows, LINEAR, start, 2, columns, places, factors, *none, out, sens)
     for place in range(4):
         ends = []
@@ -158,7 +168,7 @@ def test_the_linear_core_moves_as_the_general_one(pieces, what):
     steps, rows[:, 0] = np.full(N - 1, H), -9.0 if what == "one without bound" else 1.1
     rows[:, 4], rows[:, 5:] = 1.0, 0.0
     d_start = np.eye(4, 3) if what == "a single run's own start" else np.zeros((4, 3))
-    d_start[:, 2], none = 0.0, np.zeros((4, 14))
+    d_start[:, 2], none = 0.0, np.zeros((4, COUNT))
     found = []
     for move, with_tangents in (
         (integrate.integrate_motion, integrate.integrate_with_sensitivities),
@@ -176,14 +186,17 @@ def test_the_linear_core_moves_as_the_general_one(pieces, what):
             np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", [n for n in integrate.CONSTANTS if n not in {"length", "beyond_square", "heading_turn"}])
+MULTIPLY_ONLY = {"length", "beyond_square", "heading_turn", "cross_share", "strip_flow"}
+
+
+@pytest.mark.parametrize("name", [n for n in integrate.CONSTANTS if n not in MULTIPLY_ONLY])
 def test_a_motion_that_any_constant_bends_is_not_taken_for_a_linear_one(name):
     """Nor are its tangents, where only a parameter's derivative is of the constant."""
     steps, rows, c, start, at = np.full(N - 1, H), drive(), LINEAR.copy(), np.zeros(3), integrate.CONSTANTS.index(name)
     rows[:, 0], rows[:, 4], rows[:, 5:] = 1.1, 1.0, 0.0
     out, sens = np.empty((N, 3)), np.empty((1, 2, N))
     assert linear_motion(steps, rows, c, start, 1, out)
-    d_c, none = np.zeros((1, 14)), np.zeros((1, 3))
+    d_c, none = np.zeros((1, COUNT)), np.zeros((1, 3))
     assert linear_sensitivities(steps, rows, c, start, 1, *NOTHING(1), d_c, none, out, sens)
     d_c[0, at] = -1e-9
     assert not linear_sensitivities(steps, rows, c, start, 1, *NOTHING(1), d_c, none, out, sens)
@@ -201,7 +214,9 @@ def test_a_motion_with_a_cross_state_is_not_taken_for_a_linear_one(what):
     d_start[0, 2], factor[0, 5] = what == "a parameter's cross state", what == "a parameter's cross push"
     out, sens = np.empty((N, 3)), np.empty((1, 2, N))
     assert linear_motion(steps, rows, LINEAR, start, 1, out) == what.startswith("a parameter")
-    assert not linear_sensitivities(steps, rows, LINEAR, start, 1, columns, place, factor, np.zeros((1, 14)), d_start, out, sens)
+    assert not linear_sensitivities(
+        steps, rows, LINEAR, start, 1, columns, place, factor, np.zeros((1, COUNT)), d_start, out, sens
+    )
 
 
 def test_few_intervals_or_unlike_ones_are_not_even():

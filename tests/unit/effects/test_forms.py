@@ -24,9 +24,10 @@ NEUTRAL = {
     "roll_rate_moment": 0.0, "scale_cubic": 0.0, "clock_drift": 0.0, "depth_square": 0.0, "current_sin2": 0.0,
     "current_cos2": 0.0, "current_turn": 0.0, "stall_drop": 0.0, "munk_exponent": 2.0, "prop_trimmed": 0.0,
     "scale_side": 0.0, "bias_drift": 0.0, "roll_cubic": 0.0, "speed_power": 2.0, "current_power": 0.0,
+    "strip_drag": 0.0, "strip_inertia": 0.04, "strip_munk": 1.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
-GENTLE = {"cross_quadratic": 4.0, "cross_fin": 0.5}
+GENTLE = {"cross_quadratic": 4.0, "cross_fin": 0.5, "strip_drag": 4.0, "strip_munk": 0.5}
 """Other numbers of those whose bounds are far wider than any hull's."""
 
 

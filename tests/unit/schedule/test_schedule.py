@@ -69,6 +69,10 @@ def plant(speed=1.5, count=1, **own):
         "cross_rate": 0.0,
         "cross_fin": 0.0,
         "cross_quadratic": 0.0,
+        "cross_share": 1.0,
+        "strip_moment": 0.0,
+        "strip_force": 0.0,
+        "strip_flow": 0.0,
         "lag": 0.0,
         "delay": 0.0,
         "fin_rate": np.inf,
@@ -186,6 +190,7 @@ def test_integral_control_needs_no_feed_forward(yaw):
         {"lag": 0.2},
         {"lag": 0.2, "delay": 0.3},
         {"cross_rate": -0.5, "cross_damping": 0.8, "cross_fin": -0.3},
+        {"cross_rate": -0.5, "cross_damping": 0.8, "cross_fin": -0.3, "cross_share": 0.4},
         {"stiffness": 0.4},
     ],
 )
@@ -206,19 +211,26 @@ def test_margins_of_a_known_loop_are_those_of_the_textbook():
     assert margins(own, gains).gain_db[0] == pytest.approx(20 * np.log10(gain), abs=0.02)
 
 
+STRIPS = {"cross_share": 0.6, "strip_moment": 2.5, "strip_force": 3.0, "strip_flow": 1.1}
+
+
+@pytest.mark.parametrize("strips", [{}, STRIPS], ids=["sway", "strips"])
 @pytest.mark.parametrize("power", [2.0, 1.6, 3.0])
-def test_step_agrees_with_an_ode_solver(power):
+def test_step_agrees_with_an_ode_solver(power, strips):
     drags = {"quadratic": 0.8, "beyond_square": power - 2.0, "crossflow": 0.3}
-    own = plant(lag=0.25, **drags, cross_rate=-0.4, cross_damping=0.7, cross_quadratic=3.0, offset=0.01)
+    own = plant(lag=0.25, **drags, **strips, cross_rate=-0.4, cross_damping=0.7, cross_quadratic=3.0, offset=0.01)
+    xi = (np.arange(400) + 0.5) / 400 - 0.5
     row = replace(design_schedule_row(), gains=Gains(-0.6, 0.0, -0.2), feed_forward=-0.01, fin_limit=10.0)
     ours = step_response(own, row, reference=0.3, seconds=15.0)
 
     def slope(_t, s):
         y, p, x, fin = s
         command = -0.6 * (0.3 - y) + 0.2 * p - 0.01
-        sway = -(0.7 + 3.0 * abs(x)) * x + 0.4 * p
+        flow = strips.get("strip_flow", 0.0) * x + xi * p
+        sway = -(0.7 + 3.0 * abs(x)) * x + 0.4 * p - strips.get("strip_force", 0.0) * np.mean(flow * np.abs(flow))
         drag = 0.3 * p * abs(p) + 0.8 * np.sign(p) * 0.2**2 * (abs(p) / 0.2) ** power
-        return [p, -1.2 * p - 1.6 * (fin + 0.01) - drag + x, sway, (command - fin) / 0.25]
+        drag += strips.get("strip_moment", 0.0) * 32.0 * np.mean(flow * np.abs(flow) * xi)
+        return [p, -1.2 * p - 1.6 * (fin + 0.01) - drag + strips.get("cross_share", 1.0) * x, sway, (command - fin) / 0.25]
 
     theirs = solve_ivp(slope, (0.0, 15.0), [0.0, 0.0, 0.0, -0.01], t_eval=ours.time, rtol=1e-9, atol=1e-11)
     assert np.max(np.abs(ours.angle[:, 0] - theirs.y[0])) < 2e-3

@@ -97,7 +97,8 @@ def test_the_start_of_a_hidden_state_moves_with_the_coefficients_of_its_forms(va
     for run in range(2):
         values = problem.values_of(x, run)
         state, core = problem.state_of(x, run)[2], sway.core(values, problem.scales(run)[0])
-        held = core.cross_damping * state + core.cross_quadratic * state * abs(state)
+        square = core.cross_quadratic + core.strip_force * core.strip_flow**2
+        held = core.cross_damping * state + square * state * abs(state)
         assert held == pytest.approx(-core.cross_rate * values["rate_before"])
         compare_with_slopes(problem, x, run, 2e-5)
 

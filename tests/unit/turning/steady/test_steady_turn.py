@@ -8,11 +8,12 @@ import pytest
 from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.helpers.strip_theory import strip_moment
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.yaw_plant import yaw_plant
 from fieldsid.turning.steady.speed_loss import SpeedLoss, draw_speed_loss, fit_surge, no_speed_loss
-from fieldsid.turning.steady.steady_turn import crossflow, steady_turn
+from fieldsid.turning.steady.steady_turn import steady_turn
 from fieldsid.turning.steady.transient import turn_transient
 
 EFFECTS = {
@@ -21,6 +22,17 @@ EFFECTS = {
     "another power": (("quadratic_damping",), {"quadratic": 3.0, "rate_power": 1.5}),
     "sway": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4}),
     "sway squared": (("sway_coupling",), {"cross_damping": 0.9, "cross_rate": -0.4, "cross_quadratic": 4.0, "cross_fin": 0.1}),
+    "strips": (
+        ("sway_coupling",),
+        {
+            "cross_damping": 0.3,
+            "cross_rate": 0.5,
+            "cross_fin": 0.2,
+            "strip_drag": 4.0,
+            "strip_inertia": 0.04,
+            "strip_munk": -0.4,
+        },
+    ),
     "fins": (("servo_lag", "rate_limit", "asymmetric_fin"), {"lag": 0.2, "max_rate": 0.5, "asymmetry": 0.1}),
     "stall": (("stall",), None),
     "all": (
@@ -85,7 +97,7 @@ def test_an_unstable_model_turns_steadily_only_where_its_drag_holds_it():
 
 def test_crossflow_without_drift_is_quadratic_damping():
     rate = np.array([-0.5, 0.2, 1.0])
-    assert crossflow(np.zeros(3), rate) == pytest.approx(rate * np.abs(rate), rel=1e-3)
+    assert strip_moment(np.zeros(3), rate) == pytest.approx(rate * np.abs(rate), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["plain", "all"])
@@ -98,6 +110,18 @@ def test_the_transient_ends_on_the_settled_circle(name):
     assert after.path_180[0] > np.pi * turn.radius[0, 0]
     late = turn_transient(plant, slowing, np.array([1.5]), -1.0, 0.3)
     assert late.tactical_diameter[0] == pytest.approx(after.tactical_diameter[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["sway squared", "strips"])
+def test_the_transient_without_lost_speed_is_the_models_own_simulation(name):
+    model = model_of(name, C0=0.0)
+    plant, _ = turn_of(model, 1.0)
+    time = np.arange(0.0, 40.0, 0.02)
+    record = command_record(Axis.YAW, time, np.full(time.size, -0.3), speed=1.5)
+    heading = simulate(model, record, state=(0.0, 0.0, 0.0)).angle
+    after = turn_transient(plant, no_speed_loss(1), np.array([1.5]), 1.0, 0.3)
+    for angle, reached in ((0.5 * np.pi, after.time_90[0]), (np.pi, after.time_180[0])):
+        assert reached == pytest.approx(float(np.interp(angle, heading, time)), rel=5e-3)
 
 
 def test_the_transient_of_a_first_order_model_agrees_with_its_closed_form():
