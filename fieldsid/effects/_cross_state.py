@@ -68,7 +68,7 @@ SQUARE = Coefficient(
 )
 OF_FIN = Coefficient("cross_fin", "1/s^3", -50.0, 50.0, 0.0, says="what the fin's own lift does to it")
 STRIP_DRAG = Coefficient("strip_drag", "1/rad", 0.0, 100.0, 3.0, step=1e-3, says="drag of the cross flow, per rad/s of rate")
-STRIP_INERTIA = Coefficient("strip_inertia", "1", 0.0, 0.2, 0.04, step=1e-4, says="inertia over mass and length squared")
+STRIP_INERTIA = Coefficient("strip_inertia", "1", 0.0, 1.0 / 12.0, 0.04, step=1e-4, says="inertia over mass and length squared")
 STRIP_MUNK = Coefficient("strip_munk", "1/s", -50.0, 50.0, 0.0, step=1e-3, says="moment per drift speed over length")
 MUNK_POWER = Coefficient("munk_exponent", "1", -1.0, 6.0, 2.0, step=1e-3, says="power of the speed its moment goes with")
 OF_MEASURED = Coefficient("cross_moment", "rad/(m s)", -1e3, 1e3, 0.0, says="moment per m/s of the measured cross speed")

@@ -1,7 +1,8 @@
 """Speed changes within the run: authority goes as f^2, damping and cross state as f, f = (u/u_run)^speed_share.
 
 u is the smoothed surge, u_run its median over the run, where the run's parameters hold; 1 is lift theory (fin
-force ~ u^2, linear damping ~ u), 0 no dependence. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
+force ~ u^2, linear damping ~ u), 0 no dependence. In its other form the damping goes with a power of its own: that of potential
+damping and skin friction does not grow with the speed. Source: Fossen 2011, section 6.4; the paper's b2(u^2) law.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 
 from fieldsid.errors import EffectError
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values
+from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
 
 MIN_SPEED_RATIO = 0.05
@@ -26,8 +27,10 @@ def terms(values: Values, record: Record) -> Terms:
             found=f"median surge {record.speed:.3g} m/s",
             hint="leave `speed_varying` out, or check the sign of the surge speed on import",
         )
-    factor = np.maximum(surge / record.speed, MIN_SPEED_RATIO) ** values["speed_share"]
-    return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
+    ratio = np.maximum(surge / record.speed, MIN_SPEED_RATIO)
+    factor = ratio ** values["speed_share"]
+    damping = ratio ** values["damping_share"] if "damping_share" in values else factor
+    return Terms(damping_factor=damping, authority_factor=factor * factor, cross_factor=factor)
 
 
 EFFECT = Effect(
@@ -45,4 +48,10 @@ EFFECT = Effect(
     source="Fossen 2011, section 6.4: lift against u^2",
     needs=("surge",),
     terms=terms,
+    variants=(
+        Variant(
+            "the damping goes with a power of the speed of its own",
+            (Coefficient("damping_share", "1", -0.5, 2.0, 1.0, scan=(0.0, 1.5), step=1e-3, says="power of the damping's speed"),),
+        ),
+    ),
 )

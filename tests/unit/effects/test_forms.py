@@ -24,17 +24,19 @@ NEUTRAL = {
     "roll_rate_moment": 0.0, "scale_cubic": 0.0, "clock_drift": 0.0, "depth_square": 0.0, "current_sin2": 0.0,
     "current_cos2": 0.0, "current_turn": 0.0, "stall_drop": 0.0, "munk_exponent": 2.0, "prop_trimmed": 0.0,
     "scale_side": 0.0, "bias_drift": 0.0, "roll_cubic": 0.0, "speed_power": 2.0, "current_power": 0.0,
-    "strip_drag": 0.0, "strip_inertia": 0.04, "strip_munk": 1.0,
+    "strip_drag": 0.0, "strip_inertia": 0.04, "strip_munk": 1.0, "damping_share": 1.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 GENTLE = {"cross_quadratic": 4.0, "cross_fin": 0.5, "strip_drag": 4.0, "strip_munk": 0.5}
 """Other numbers of those whose bounds are far wider than any hull's."""
 
 
-def record():
+def record(*, faster=False):
     time = np.arange(0.0, 20.0, 0.05)
     fin = np.interp(time, [0.0, 4.0, 9.0, 15.0, 20.0], [0.0, 0.3, -0.25, 0.1, 0.0])
     signals = {"thrust": 2.0 + np.sin(time), "roll": 0.2 * np.sin(1.3 * time), "depth": 3.0 + np.cos(0.4 * time)}
+    if faster:
+        signals["surge"] = 1.4 + 0.3 * np.sin(0.5 * time)
     return command_record(Axis.YAW, time, fin, speed=1.4, signals=signals)
 
 
@@ -66,7 +68,7 @@ HAVE_NEUTRAL = [(n, i) for n, i in FORMS if n != "servo_lag" and not pick_effect
 
 @pytest.mark.parametrize(("name", "which"), HAVE_NEUTRAL)
 def test_a_form_is_the_textbooks_at_its_neutral_numbers_and_not_elsewhere(name, which):
-    effect, log = pick_effect(name), record()
+    effect, log = pick_effect(name), record(faster=True)
     form = effect.variants[which]
     shaped = with_variant(effect, form)
     values = effect.starts() | {c.name: NEUTRAL[c.name] for c in form.coefficients}
