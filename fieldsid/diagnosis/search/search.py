@@ -39,13 +39,12 @@ class Search(MoveEvaluation):
         self._expand()
         self._join_leaders()
         self._grow_rivals()
+        if self.error_ratio(self.best_admissible()) > MISSING_ERROR_RATIO:
+            self._fit_in_series(self._all_in_series())
         self._exchange_for_variants()
         self._exchange_for_lookalikes()
         self._drop_each()
         self.share_own_moments()
-        if self.error_ratio(self.best_admissible()) > MISSING_ERROR_RATIO:
-            self._fit_in_series(self._all_in_series())
-            self.share_own_moments()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -141,9 +140,15 @@ class Search(MoveEvaluation):
 
         The screens are of first order: where one stands for a lag of a sample, the lag itself may have passed none, or ended at a
         worse optimum beside the others. And an effect in another variant may stand for its textbook's and one of those. What
-        comes so near that a variant could lead is tried in its variants.
+        comes so near that a variant could lead is tried in its variants. What leads after it is exchanged in its turn.
         """
-        best = self._most_evident()
+        exchanged = set[ModelSpec]()
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged:
+            exchanged.add(spec)
+            self._exchange_each(best)
+
+    def _exchange_each(self, best: ScoredModel) -> None:
+        """Try a model with each effect exchanged for what it may be mistaken for."""
         for stands in (e for e in best.effects if e.name not in self.known):
             others = [e for e in best.effects if e is not stands]
             alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
