@@ -42,6 +42,8 @@ def sha256_of(path: Path) -> str:
 
 def check_output(path: Path, *, force: bool = False) -> None:
     """Raise ArtifactError where a file cannot be written: it exists and `force` is false, or its place cannot hold it."""
+    if os.path.isdir(path):  # noqa: PTH112 - says no where a folder is closed, and does not raise
+        raise ArtifactError(f"`{path}` is a folder, not a file", found="a folder", hint=f"name a file in it: `{path}/NAME`")
     if os.path.exists(path) and not force:  # noqa: PTH110 - says no where a folder is closed, and does not raise
         raise ArtifactError(
             f"`{path}` exists", found=f"{path.stat().st_size} bytes", hint="add `--force`, or name another output"

@@ -14,7 +14,7 @@ from fieldsid.models.effect import Effect, Stage
 
 EFFECT = Effect(
     name="heave_coupling",
-    says="the vehicle heaves while it pitches and the heave pitches it further (Munk moment)",
+    says="the vehicle heaves while it pitches, and the heave has a moment that pitches it on or back",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.PITCH,),
     equation="q' += x; x' = -cross_damping f x - cross_rate f^2 q, f = (speed/reference)^p, p the damping's exponent",

@@ -15,7 +15,7 @@ from fieldsid.models.effect import Effect, Stage
 
 EFFECT = Effect(
     name="sway_coupling",
-    says="the vehicle drifts sideways in a turn and the drift turns it further (Munk moment)",
+    says="the vehicle drifts sideways in a turn, and the drift has a moment that turns it on or back",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW,),
     equation="r' += x; x' = -cross_damping f x - cross_rate f^2 r, f = (speed/reference)^p, p the damping's exponent",

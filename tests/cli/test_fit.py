@@ -58,6 +58,15 @@ def test_the_file_is_written_with_its_figure_and_not_twice(run_cli, tmp_path):
     assert run_cli("turn-radius", law, "--rudder-max", "0.26", "--json").code == 0
 
 
+@pytest.mark.parametrize("force", [(), ("--force",)], ids=["", "force"])
+def test_a_folder_is_not_taken_for_the_file_to_write(run_cli, tmp_path, force):
+    (tmp_path / "laws").mkdir()
+    answer = run_cli("fit", table(tmp_path), "-o", tmp_path / "laws", *force)
+    assert answer.code == 2
+    assert "is a folder, not a file" in answer.err
+    assert f"name a file in it: `{tmp_path / 'laws'}/NAME`" in " ".join(answer.err.split())
+
+
 def test_one_speed_only_is_said_and_its_point_offered(run_cli, tmp_path):
     answer = run_cli("fit", table(tmp_path, rows=YAW[:1]))
     assert answer.code == 2
