@@ -48,7 +48,8 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is `disturbed` where
     the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the training runs
     better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one than
-    it leaves: a lag of a sample may be there, and is not what is missing.
+    it leaves: a lag of a sample may be there, and is not what is missing. A moment of the water alone is named where
+    what is left beside it follows nothing that was measured: that of a hull's roll swings as a wave's does.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -67,7 +68,9 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
         if error <= MISSING_ERROR_RATIO or search.is_noiseless
         else (*SHARES_TO_EXPLAIN, *(SHARES_TO_EXPLAIN_MISSING if error <= FAR_ERROR_RATIO else SHARES_TO_EXPLAIN_FAR))
     )
-    if visible and any(left.p < p and share < enough for enough, p in asked):
+    added = [e for e in found.effects if e.name not in search.known]
+    follows = 3.0 * left.signals < MIN_P_VALUE and all(e.is_of_the_water for e in added)
+    if follows or (visible and any(left.p < p and share < enough for enough, p in asked)):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
     if rivals:

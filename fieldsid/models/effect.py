@@ -205,6 +205,7 @@ class Effect:
     with that variant's `stand_in`.
     `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
+    `is_of_the_water` marks a moment that knows nothing of the vehicle: what is left beside it follows no measured signal.
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
     """
 
@@ -232,6 +233,7 @@ class Effect:
     equivalent_solution: Callable[[Values, Axis], dict[str, float] | None] | None = None
     variants: tuple[Variant, ...] = ()
     log_prior_penalty: float = 0.0
+    is_of_the_water: bool = False
     is_formed: bool = False
     stand_in: StandIn | None = None
     origin: str = field(default="built in")

@@ -19,7 +19,12 @@ from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
 from fieldsid.diagnosis.search.multistart import multistart
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import (
+    ALTERNATIVE_LOG_ODDS,
+    MAX_ERROR_RATIO,
+    MISSING_ERROR_RATIO,
+    SUFFICIENT_ERROR_RATIO,
+)
 from fieldsid.fitting.initial.effect_screen import linearise_at, overlay_parameters, scan_points, transfer_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect, Stage
@@ -39,7 +44,7 @@ class Search(MoveEvaluation):
         self._expand()
         self._join_leaders()
         self._grow_rivals()
-        if self.error_ratio(self.best_admissible()) > MISSING_ERROR_RATIO:
+        if self._leaves_visible_error(self.best_admissible()):
             self._fit_in_series(self._all_in_series())
         self._exchange_for_variants()
         self._exchange_for_lookalikes()
@@ -197,6 +202,10 @@ class Search(MoveEvaluation):
         """Whether a model is new, does not diverge, is below the largest size, and leaves an error above the noise floor."""
         is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
+
+    def _leaves_visible_error(self, h: ScoredModel) -> bool:
+        """Whether a model leaves more than a sufficient one may, on fitted or on unseen runs."""
+        return max(h.selection_errors.over(self.floor), h.train.over(self.floor)) > SUFFICIENT_ERROR_RATIO
 
     def _all_in_series(self) -> list[tuple[Effect, Effect]]:
         """Return every actuator with every hidden state that it is mistaken for, one in the variant that stands for it."""
