@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from fieldsid.diagnosis import verdict
+from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
 
 FLOOR = Noise(angle=0.005, rate=0.005)
@@ -16,10 +17,10 @@ def errors(ratio):
     return SimpleNamespace(mean=ratio, over=lambda _floor: ratio)
 
 
-def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
+def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None, named=("servo_lag",), signals=1.0):
     monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
     monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
-    monkeypatch.setattr(verdict, "added_effects", lambda *_of: ("servo_lag",))
+    monkeypatch.setattr(verdict, "added_effects", lambda *_of: named)
     base = SimpleNamespace(
         names=(),
         selection_errors=errors(before),
@@ -29,7 +30,8 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
         unseen_under=lambda _std: (errors(before), errors(before)),
     )
     found = SimpleNamespace(
-        names=("servo_lag",),
+        names=named,
+        effects=[effect_named(n) for n in named],
         selection_errors=errors(after),
         train=errors(after),
         validation=(),
@@ -38,8 +40,9 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None):
         log_evidence=50.0,
         unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
-    search = SimpleNamespace(floor=FLOOR, root=frozenset(), base=lambda: base, is_noiseless=noiseless)
-    return verdict.verdict_of(search, found, SimpleNamespace(p=p, dependence=p), SimpleNamespace(noise=FLOOR)).word
+    search = SimpleNamespace(floor=FLOOR, root=frozenset(), known=(), base=lambda: base, is_noiseless=noiseless)
+    left = SimpleNamespace(p=p, dependence=p, signals=signals)
+    return verdict.verdict_of(search, found, left, SimpleNamespace(noise=FLOOR)).word
 
 
 @pytest.mark.parametrize(("p", "word"), [(0.6, "disturbed"), (1e-4, "unexplained")])
@@ -59,3 +62,16 @@ def test_without_noise_no_floor_says_what_is_large(monkeypatch):
 @pytest.mark.parametrize(("settled", "word"), [(1.1, "effect"), (12.0, "unexplained")])
 def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, word):
     assert judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled) == word
+
+
+@pytest.mark.parametrize(
+    ("named", "signals", "word"),
+    [
+        (("wave",), 1e-6, "unexplained"), (("wave",), 0.3, "effect"), (("roll_coupling",), 1e-6, "effect"),
+        (("wave", "servo_lag"), 1e-6, "effect"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_wave_alone_is_named_where_what_is_left_follows_no_measured_signal(monkeypatch, named, signals, word):
+    """Also where what is left is no larger than a sufficient model may leave."""
+    assert judged(monkeypatch, 1.5, 1.1, 0.6, named=named, signals=signals) == word
