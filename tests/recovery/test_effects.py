@@ -85,6 +85,14 @@ HELD_BY_STRIPS = {
 """A torpedo of 1.6 m at 1.9 m/s whose sway is in no moment but that of the cross flow along it."""
 
 
+def noisy(physics: Physics, plan: maneuvers.Maneuver, rng: np.random.Generator, name: str, columns: tuple[str, ...]) -> Run:
+    """A run of a plan with the noise of a compass of 0.005 rad and a gyro of 0.003 rad/s."""
+    log = flown(physics, CLOCK, plan)
+    log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(CLOCK.time.size)
+    log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(CLOCK.time.size)
+    return Run(name, log["time_s"], {c: log[c] for c in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", *columns)})
+
+
 def test_a_hull_that_only_the_cross_flow_holds_is_told_by_its_strips():
     """No sway is measured. What turns the path into drift, the drag and the inertia's share are those that were put in.
 
@@ -97,12 +105,7 @@ def test_a_hull_that_only_the_cross_flow_holds_is_told_by_its_strips():
         maneuvers.pulses(time, 0.2, 0.12, recovery=4.0),
         maneuvers.multisine(time, rng, 0.15),
     )
-    runs = []
-    for i, plan in enumerate(plans):
-        log = flown(Physics(**HELD_BY_STRIPS), CLOCK, plan)
-        log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(time.size)
-        log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(time.size)
-        runs.append(Run(f"r{i}", log["time_s"], {name: log[name] for name in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad")}))
+    runs = [noisy(Physics(**HELD_BY_STRIPS), plan, rng, f"r{i}", ()) for i, plan in enumerate(plans)]
     found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
     assert (found.verdict, found.effects) == ("effect", ("sway_coupling",))
     assert found.final.validation.angle_rms_rad < 1.15 * 0.005
@@ -112,6 +115,24 @@ def test_a_hull_that_only_the_cross_flow_holds_is_told_by_its_strips():
     assert values["strip_drag"] == pytest.approx(4.4, rel=0.1)
     assert values["strip_inertia"] == pytest.approx(3.1 * 1.6 / (32.0 * 4.4), rel=0.2)
     assert abs(values["cross_rate"]) == pytest.approx(1.0 / 1.6, rel=0.15)
+
+
+def test_damping_that_does_not_grow_with_the_speed_is_told_from_that_of_lift():
+    rng, time = np.random.default_rng(6), CLOCK.time
+    physics = Physics(damping=1.1, authority=-0.9, fin_bend=-0.01, speed_varying=1.0, damping_power=0.0, surge_loss=8.0)
+    plans = (
+        maneuvers.circle(time, 0.25),
+        maneuvers.stairs(time, 0.25, length=6.0),
+        maneuvers.circle(time, -0.2),
+        maneuvers.stairs(time, 0.2, length=5.0),
+    )
+    runs = [noisy(physics, plan, rng, f"r{i}", ("surge_m_s",)) for i, plan in enumerate(plans)]
+    found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
+    assert (found.verdict, found.effects) == ("effect", ("speed_varying",))
+    assert found.final.validation.angle_rms_rad < 1.15 * 0.005
+    values = found.candidates[0].parameters
+    assert values["speed_share"] == pytest.approx(1.0, abs=0.1)
+    assert values["damping_share"] == pytest.approx(0.0, abs=0.25)
 
 
 def test_every_effect_that_needs_no_helper_signal_is_in_the_list():

@@ -74,7 +74,7 @@ def slope(y, out, q, t, fin, now, pitching):
     if q.speed_varying > 0.0:
         ratio = y[SURGE] / q.median_speed
         authority *= ratio * ratio
-        damping *= ratio
+        damping *= ratio**q.damping_power
     m = moments(y, q, t, now[EVENT], now[THRUST]) + now[DISTURBANCE]
     if t >= q.step_time:
         share = 1.0 if q.step_ramp <= 0.0 else min((t - q.step_time) / q.step_ramp, 1.0)

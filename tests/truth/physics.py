@@ -43,6 +43,7 @@ class Physics(NamedTuple):
     crossflow: float = 0.0
     length: float = 1.6
     speed_varying: float = 0.0
+    damping_power: float = 1.0
     median_speed: float = 1.5
     drift: float = 0.0
     drift_tau: float = 0.0
