@@ -23,6 +23,7 @@ from fieldsid.diagnosis.thresholds import (
     ALTERNATIVE_LOG_ODDS,
     MAX_ERROR_RATIO,
     MISSING_ERROR_RATIO,
+    RIVAL_LOG_ODDS,
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.fitting.initial.effect_screen import linearise_at, overlay_parameters, scan_points, transfer_parameters
@@ -218,7 +219,7 @@ class Search(MoveEvaluation):
         """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
 
         Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
-        the two.
+        the two. Of two optima of the same effects that are rivals by evidence the one stands whose free run predicts better.
         """
         base = self.base().likelihood_fit
         at = linearise_at(base.fitted.problem, base.fitted.x, base.noise)
@@ -230,8 +231,13 @@ class Search(MoveEvaluation):
             best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
             return [fit_maximum_likelihood(problem, x, base.noise, self.resolution_floor, self.noise_kind) for x in best]
 
+        before = dict(self.tried)
         for ml_fit in chain.from_iterable(self.parallel.map(fit, pairs)):
             self._keep(ml_fit)
+        found = [h for key, h in self.tried.items() if h is not before.get(key)]
+        flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(fitted=True), found)
+        for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
+            self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
 
     def _drop_each(self) -> None:
         """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.
@@ -300,6 +306,13 @@ class Search(MoveEvaluation):
         if kept is not before:
             self.tried[key] = prefer_output_error(kept, self.floor)
         return self.tried[key]
+
+
+def _better_optimum(known: ScoredModel, h: ScoredModel) -> ScoredModel:
+    """Return the one with more evidence of two fits of the same effects; of rivals the one whose free run predicts better."""
+    if abs(known.log_evidence - h.log_evidence) < RIVAL_LOG_ODDS:
+        return min(known, h, key=lambda one: one.selection_errors.mean)
+    return max(known, h, key=lambda one: one.log_evidence)
 
 
 def _in_series(effect: Effect, other: Effect) -> bool:
