@@ -123,8 +123,7 @@ def _lower(search: Search, current: FreeRunFit, seen: Seen) -> list[FreeRunFit]:
 
 
 def _thin(
-    search: Search, found: ScoredModel, without: Sequence[FreeRunFit], seen: Seen,
-    explains: Callable[[ScoredModel], bool],
+    search: Search, found: ScoredModel, without: Sequence[FreeRunFit], seen: Seen, explains: Callable[[ScoredModel], bool]
 ) -> ScoredModel:  # fmt: skip
     """Return a model without the effects that the log evidence speaks against; it, and it without each, count as tried."""
     while True:
