@@ -105,6 +105,7 @@ FORMS = (
         (OF_MEASURED,),
         needs=("cross",),
         without=STATE,
+        extra_states=(),
         stand_in=STAND_IN,
     ),
     Variant(
@@ -112,6 +113,7 @@ FORMS = (
         (OF_LIFT,),
         needs=("cross", "surge"),
         without=STATE,
+        extra_states=(),
         stand_in=STAND_IN,
     ),
     Variant(

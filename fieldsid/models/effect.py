@@ -91,8 +91,9 @@ class Variant:
     The effect's hooks compute the textbook's variant where the values lack these coefficients. `initial_guesses` gives start
     values of the shared ones as an effect's does, from the residuals of the textbook's variant, in place of their scan grids.
     `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals. `without` are
-    coefficients of the effect that it does without, and with them the effect's extra states. `stand_in` is
-    what a model is flown by in a plan or a turn, where no signal is measured.
+    coefficients of the effect that it does without. `extra_states` are the variant's, None for those of the effect; a state
+    of its own is in place of the signals that the effect needs. `stand_in` is what a model is flown by in a plan or a turn, where
+    no signal is measured.
     """
 
     says: str
@@ -101,6 +102,7 @@ class Variant:
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    extra_states: tuple[str, ...] | None = None
     stand_in: StandIn | None = None
 
 
@@ -201,8 +203,8 @@ class Effect:
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
-    `variants` are other shapes, tried where the textbook's leaves something; `is_formed` where it is in one of them,
-    with that variant's `stand_in`.
+    `variants` are other shapes, tried where the textbook's leaves something; `textbook` is the effect that one of them is of,
+    with that variant's `stand_in`, None for the textbook's own.
     `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     `is_of_the_water` marks a moment that knows nothing of the vehicle: what is left beside it follows no measured signal.
@@ -234,10 +236,20 @@ class Effect:
     variants: tuple[Variant, ...] = ()
     log_prior_penalty: float = 0.0
     is_of_the_water: bool = False
-    is_formed: bool = False
+    textbook: Effect | None = None
     stand_in: StandIn | None = None
     origin: str = field(default="built in")
     definition: Definition | None = None
+
+    @property
+    def is_formed(self) -> bool:
+        """Whether it is in another variant than the textbook's."""
+        return self.textbook is not None
+
+    @property
+    def takes_cross_state(self) -> bool:
+        """Whether it is in a variant with a cross state, which its textbook's has not."""
+        return self.textbook is not None and bool(self.extra_states) and not self.textbook.extra_states
 
     @property
     def shared(self) -> tuple[Coefficient, ...]:
@@ -279,12 +291,18 @@ def with_variant(effect: Effect, form: Variant) -> Effect:
     return replace(
         effect,
         coefficients=(*(c for c in effect.coefficients if c.name not in form.without), *form.coefficients),
-        needs=tuple(dict.fromkeys((*effect.needs, *form.needs))),
-        extra_states=() if form.without else effect.extra_states,
+        needs=form.needs if form.extra_states else tuple(dict.fromkeys((*effect.needs, *form.needs))),
+        extra_states=effect.extra_states if form.extra_states is None else form.extra_states,
         variants=(),
-        is_formed=True,
+        textbook=effect,
         stand_in=form.stand_in,
     )
+
+
+def with_one_cross_state(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return effects of which no variant takes the one cross state of a model from an effect that has it by its textbook."""
+    owned = any((e if e.textbook is None else e.textbook).extra_states for e in effects)
+    return tuple(e.textbook if owned and e.textbook is not None and e.takes_cross_state else e for e in effects)
 
 
 def variant_of(effect: Effect, known: Collection[str]) -> Variant | None:

@@ -117,6 +117,35 @@ def test_a_hull_that_only_the_cross_flow_holds_is_told_by_its_strips():
     assert abs(values["cross_rate"]) == pytest.approx(1.0 / 1.6, rel=0.15)
 
 
+CROSS_FLOW = {"damping": 0.9, "authority": -1.4, "fin_bend": -0.01, "crossflow": 6.0, "length": 1.8}
+
+
+@pytest.mark.parametrize("drift", [0.5, -0.5], ids=["outwards", "inwards"])
+def test_drag_of_a_cross_flow_is_told_beside_a_sway_sensor_whose_noise_is_half_of_what_it_measures(drift):
+    """What smoothing leaves in the measured sway is a moment that was not there: the drift then follows from its own law."""
+    rng, time = np.random.default_rng(9), CLOCK.time
+    physics = Physics(**CROSS_FLOW, cross_damping=1.1, cross_rate=drift * 1.8 * 1.1)
+    plans = (
+        maneuvers.multisine(time, rng, 0.25),
+        maneuvers.stairs(time, 0.3, length=4.0),
+        maneuvers.pulses(time, 0.3, 0.15, recovery=4.0),
+        maneuvers.multisine(time, rng, 0.2),
+    )
+    runs = []
+    for i, plan in enumerate(plans):
+        run = noisy(physics, plan, rng, f"r{i}", ("sway_m_s",))
+        sway = run.signals["sway_m_s"]
+        runs.append(replace(run, signals={**run.signals, "sway_m_s": sway + 0.5 * np.std(sway) * rng.standard_normal(time.size)}))
+    found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
+    assert (found.verdict, found.effects) == ("effect", ("crossflow_drag",))
+    assert found.final.validation.rate_rms_rad_s < 1.15 * 0.003
+    values = found.candidates[0].parameters
+    assert values["crossflow"] == pytest.approx(6.0, rel=0.05)
+    assert values["flow_damping"] == pytest.approx(1.1, rel=0.15)
+    assert values["flow_rate"] == pytest.approx(drift * 1.1, rel=0.15)
+    assert values["flow_fin"] == pytest.approx(0.0, abs=0.15)
+
+
 def test_damping_that_does_not_grow_with_the_speed_is_told_from_that_of_lift():
     rng, time = np.random.default_rng(6), CLOCK.time
     physics = Physics(damping=1.1, authority=-0.9, fin_bend=-0.01, speed_varying=1.0, damping_power=0.0, surge_loss=8.0)

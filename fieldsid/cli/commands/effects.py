@@ -164,10 +164,12 @@ def _axes(effect: Effect, form: Variant) -> list[Axis]:
 
 
 def _form(effect: Effect, form: Variant) -> dict[str, Any]:
+    from fieldsid.models.effect import with_variant
+
     return {
         "says": form.says,
         "axes": _axes(effect, form),
-        "needs": [*effect.needs, *form.needs],
+        "needs": with_variant(effect, form).needs,
         "coefficients": [_coefficient(c) for c in form.coefficients],
     }
 

@@ -18,7 +18,7 @@ from fieldsid.fitting.initial.effect_screen import transfer_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, cost_of, levenberg_marquardt
 from fieldsid.fitting.problem.parameters import ParameterLayout
 from fieldsid.fitting.problem.problem import Problem
-from fieldsid.models.effect import Coefficient, Effect, InitialGuesses, Stage, Variant, with_variant
+from fieldsid.models.effect import Coefficient, Effect, InitialGuesses, Stage, Variant, with_one_cross_state, with_variant
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
@@ -79,6 +79,7 @@ class FormSearch:
             for e in request.model.effects
             if request.effects is None or e.name in request.effects
             for variant in e.variants
+            if with_variant(e, variant) in with_one_cross_state(_exchanged(request.model.effects, e, variant))
         ]
         ml_fit = list(zip(forms, self.parallel.map(lambda of: self._fit_variant(*of), forms), strict=True))
         found = [[h for (g, _, _), h in ml_fit if g is linearisation and h is not None] for linearisation in grounds]
@@ -128,7 +129,7 @@ def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence
     """
     fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
     old = fitted.problem.layout
-    problem = fitted.problem.with_effects([with_variant(e, variant) if e is effect else e for e in h.effects])
+    problem = fitted.problem.with_effects(_exchanged(h.effects, effect, variant))
     records = fitted.problem.records
     again = [{}, *_start_points(records, left, effect.initial_guesses, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
     points = [
@@ -144,6 +145,11 @@ def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence
         (levenberg_marquardt(problem, d.x, noise, max_iterations=CONTINUED_ITERATIONS, tolerance=COST_TOLERANCE) for d in best),
         key=lambda d: d.cost,
     )
+
+
+def _exchanged(effects: Sequence[Effect], effect: Effect, variant: Variant) -> list[Effect]:
+    """Return effects with one of them in a variant."""
+    return [with_variant(e, variant) if e is effect else e for e in effects]
 
 
 def _start_points(

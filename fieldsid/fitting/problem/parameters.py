@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Effect
+from fieldsid.models.effect import Effect, with_one_cross_state
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import GROUP_WIDTH, TRIM_OF_FIN, SpeedLaw, with_speed
 from fieldsid.numerics.arrays import BoolArray, FloatArray
@@ -165,7 +165,8 @@ def group_name(authority: str, groups: SpeedGroups, index: int) -> str:
 def layout_of(
     records: Sequence[Record], axis: Axis, effects: Sequence[Effect], groups: SpeedGroups | None = None
 ) -> ParameterLayout:
-    """Return the parameters of a joint fit of records with effects."""
+    """Return the parameters of a joint fit of records with effects, at most one of them with the cross state."""
+    effects = with_one_cross_state(effects)
     names, groups = NAMES[axis], speed_groups(records) if groups is None else groups
     slots = [Parameter(names.damping, "1/s", *BASE_BOUNDS["damping"], 1.0)]
     if names.stiffness is not None:
@@ -180,7 +181,7 @@ def layout_of(
     before = _fastest_before(records)
     for i, record in enumerate(records):
         slots += _run_nuisances(i, record, effects, before)
-    return ParameterLayout(axis, tuple(effects), groups, tuple(slots), shared)
+    return ParameterLayout(axis, effects, groups, tuple(slots), shared)
 
 
 def _run_nuisances(run: int, record: Record, effects: Sequence[Effect], before: float) -> list[Parameter]:

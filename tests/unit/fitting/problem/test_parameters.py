@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from fieldsid.dynamics.free_run import command_record
+from fieldsid.effects import pick_effect
 from fieldsid.fitting.problem.parameters import layout_of, speed_groups
 from fieldsid.models.axis import Axis
+from fieldsid.models.effect import with_variant
 
 TIME = np.arange(100) * 0.05
 
@@ -51,3 +53,15 @@ def test_runs_of_a_group_keep_speeds_of_their_own_however_near():
 
 def test_snapped_runs_count_as_flown_at_their_groups_speed():
     assert speed_groups(runs(1.0, 1.05), snapped=True).run_speeds == pytest.approx((1.025, 1.025))
+
+
+def test_the_one_cross_state_is_that_of_the_effect_whose_textbook_has_it():
+    flow, sway = pick_effect("crossflow_drag"), pick_effect("sway_coupling")
+    computed = with_variant(flow, flow.variants[0])
+    of_sensor = next(with_variant(sway, v) for v in sway.variants if v.without)
+    assert layout_of(runs(1.4), Axis.YAW, [computed]).effects == (computed,)
+    assert "rate_before" in {p.name for p in layout_of(runs(1.4), Axis.YAW, [computed]).parameters}
+    assert layout_of(runs(1.4), Axis.YAW, [computed, sway]).effects == (flow, sway)
+    assert layout_of(runs(1.4), Axis.YAW, [sway, computed]).effects == (sway, flow)
+    # flown where no sway is measured, it has a state after all
+    assert layout_of(runs(1.4), Axis.YAW, [computed, of_sensor]).effects == (flow, of_sensor)

@@ -8,6 +8,7 @@ import pytest
 from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
+from fieldsid.models.effect import as_fitted
 from fieldsid.models.helpers.strip_theory import strip_moment
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
@@ -33,6 +34,10 @@ EFFECTS = {
             "strip_munk": -0.4,
         },
     ),
+    "cross flow": (
+        ("crossflow_drag",),
+        {"crossflow": 4.0, "flow_damping": 0.8, "flow_rate": 0.5, "flow_fin": 0.2},
+    ),
     "fins": (("servo_lag", "rate_limit", "asymmetric_fin"), {"lag": 0.2, "max_rate": 0.5, "asymmetry": 0.1}),
     "stall": (("stall",), None),
     "all": (
@@ -46,7 +51,7 @@ def model_of(name, sign=-1.0, **base):
     from fieldsid.effects import pick_effect
 
     effects, own = EFFECTS[name]
-    starts = {c.name: c.start for e in effects for c in pick_effect(e).shared}
+    starts = {c.name: c.start for e in effects for c in as_fitted(pick_effect(e), own or {}).shared}
     values = {"a22": 1.5, "b2": sign * 2.0, "C0": 0.02} | starts | (own or {}) | base
     return Model(Axis.YAW, effects, values, {}, tuple(values), np.zeros((len(values),) * 2), SpeedLaw(1.5), Noise(0.01, 0.01))
 
@@ -112,7 +117,7 @@ def test_the_transient_ends_on_the_settled_circle(name):
     assert late.tactical_diameter[0] == pytest.approx(after.tactical_diameter[0], rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["sway squared", "strips"])
+@pytest.mark.parametrize("name", ["sway squared", "strips", "cross flow"])
 def test_the_transient_without_lost_speed_is_the_models_own_simulation(name):
     model = model_of(name, C0=0.0)
     plant, _ = turn_of(model, 1.0)
