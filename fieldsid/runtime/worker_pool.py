@@ -41,7 +41,11 @@ PR_SET_PDEATHSIG = 1
 
 
 class Worker:
-    """A forked worker. As a context manager it is waited for; where the context is left with an error it is killed."""
+    """A forked worker. Where its context is left with an error it is killed, else it may end by itself.
+
+    The system takes some milliseconds to clear a copy of this process away, in which this process works on: the end is asked for
+    when the next worker is forked, see `_ending`.
+    """
 
     def __init__(self, process: int, source: int) -> None:
         self.process, self._stream = process, os.fdopen(source, "rb")
@@ -65,13 +69,18 @@ class Worker:
 
     def __exit__(self, error: object, *_more: object) -> None:
         if error is None:
-            self._end()
+            self._stream.close()
+            _ending.append(self.process)
         else:
             self.kill()
 
     def _end(self) -> None:
         self._stream.close()
         os.waitpid(self.process, 0)
+
+
+_ending: list[int] = []
+"""Workers that have answered and whose end was not asked for; of the last one the system keeps a number until this process ends."""
 
 
 def parallel_map(
@@ -123,6 +132,8 @@ def fork_worker(work: Callable[[], bytes]) -> Worker | None:
     """
     if not can_fork():
         return None
+    while _ending:
+        os.waitpid(_ending.pop(), 0)
     parent = os.getpid()
     source, target = os.pipe()
     try:
@@ -145,6 +156,7 @@ def _work(work: Callable[[], bytes], target: int, parent: int) -> Never:
         if os.getppid() != parent:  # it ended before the signal was asked for
             os._exit(0)
         os.environ[IS_WORKER] = "1"
+        _ending.clear()
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)

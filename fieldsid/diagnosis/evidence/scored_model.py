@@ -46,8 +46,8 @@ from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 
 ValidationFits = tuple[tuple[Problem, FloatArray], ...]
-FREE_RUNS = ("training_runs", "validation_runs", "settled_runs")
-"""What a scored model keeps of its free runs, whatever moments of their own the runs may have."""
+FREE_RUNS = ("training_runs", "validation_runs", "settled_runs", "errors_by_moment")
+"""What a scored model keeps of its free runs and their errors, whatever moments of their own the runs may have."""
 
 
 @dataclass(frozen=True)
@@ -122,12 +122,27 @@ class ScoredModel:
     @cached_property
     def validation_errors(self) -> Errors:
         """Errors on the validation runs."""
-        return errors_of(self.validation_runs, self.own_moment)
+        return self._errors_of("validation_runs", self.own_moment)
 
     @cached_property
     def settled_errors(self) -> Errors | None:
         """Errors on the validation runs at the parameters that all runs leave together, None where there are none."""
-        return errors_of(self.settled_runs, self.own_moment) if self.validation else None
+        return self._errors_of("settled_runs", self.own_moment) if self.validation else None
+
+    @cached_property
+    def errors_by_moment(self) -> dict[tuple[str, float], Errors]:
+        """The errors computed so far, by the name of their free runs and the runs' own moment (rad/s^2).
+
+        A search compares each model with many others, under few moments.
+        """
+        return {}
+
+    def _errors_of(self, runs: str, own_moment: float) -> Errors:
+        """Return the errors of free runs, by their name here, where the runs' own moments have a standard deviation (rad/s^2)."""
+        known = self.errors_by_moment
+        if (runs, own_moment) not in known:
+            known[runs, own_moment] = errors_of(getattr(self, runs), own_moment)
+        return known[runs, own_moment]
 
     def with_own_moment(self, own_moment: float) -> ScoredModel:
         """Return the model with another standard deviation (rad/s^2) of the runs' own moments, its free runs kept."""
@@ -137,13 +152,13 @@ class ScoredModel:
 
     def train_under(self, own_moment: float) -> Errors:
         """Return the errors on the training runs where the runs' own moments have another standard deviation (rad/s^2)."""
-        return errors_of(self.training_runs, own_moment)
+        return self._errors_of("training_runs", own_moment)
 
     def unseen_under(self, own_moment: float) -> tuple[Errors, ...]:
         """Return what `unseen_errors` does where the runs' own moments have another standard deviation (rad/s^2)."""
         if not self.validation:
             return (self.train_under(own_moment),)
-        return errors_of(self.validation_runs, own_moment), errors_of(self.settled_runs, own_moment)
+        return self._errors_of("validation_runs", own_moment), self._errors_of("settled_runs", own_moment)
 
     @property
     def selection_errors(self) -> Errors:
@@ -187,7 +202,7 @@ class ScoredModel:
         """The complexity penalty with the prior log odds once: what is worth trying need not be worth naming."""
         return self.complexity_penalty - (EVIDENCE_TEMPERATURE - 1.0) * ALTERNATIVE_LOG_ODDS * len(self.names)
 
-    @property
+    @cached_property
     def log_evidence(self) -> float:
         """Log evidence up to a constant that all models share."""
         return float(self.log_likelihood_by_run.sum() + self.validation_log_density.sum() - self.complexity_penalty)

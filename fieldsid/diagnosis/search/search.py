@@ -249,9 +249,9 @@ class Search(MoveEvaluation):
         spec = ModelSpec.of(best)
         if len(best.names) > len(self.known) + 1 and spec not in self.tried.progress.thinned:
             self.tried.progress.thinned.add(spec)
-            for gone in best.effects:
-                if gone.name not in self.known:
-                    self._drop_effect(best, gone)
+            effects = [e for e in best.effects if e.name not in self.known]
+            less = self.parallel.map(lambda gone: self._drop_effect(best, gone).evaluate_errors(fitted=True), effects)
+            self.tried.update({frozenset(h.names): h for h in less})
 
     def _switch_noise_or_trim(self) -> bool:
         """Start again under another kind of noise (once each), or under the other trim law, where that fits better.

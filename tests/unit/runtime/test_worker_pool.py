@@ -49,11 +49,13 @@ def test_an_error_beside_a_copy_ends_it():
 
 
 @pytest.mark.forks
-def test_a_worker_that_has_answered_is_gone():
+def test_a_worker_that_has_answered_is_gone_when_the_next_is_forked():
     with fork_worker(lambda: b"") as worker:
         worker.answer()
-    with pytest.raises(ChildProcessError):
-        os.waitpid(worker.process, os.WNOHANG)
+    with fork_worker(lambda: b"") as following:
+        with pytest.raises(ChildProcessError):
+            os.waitpid(worker.process, 0)
+        following.answer()
 
 
 KILLED = """
