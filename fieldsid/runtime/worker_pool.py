@@ -80,7 +80,7 @@ class Worker:
 
 
 _ending: list[int] = []
-"""Workers that have answered and whose end was not asked for; of the last one the system keeps a number until this process ends."""
+"""Workers that have answered and whose end was not asked for; the system keeps a number of the last until this process ends."""
 
 
 def parallel_map(
