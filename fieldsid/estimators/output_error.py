@@ -17,7 +17,7 @@ from fieldsid.fitting.covariance.kenward_roger import (
 from fieldsid.fitting.covariance.noise_selection import chosen_noise
 from fieldsid.fitting.covariance.output_error_covariance import white_weight_covariance
 from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood
-from fieldsid.fitting.initial.effect_screen import backtrack, linearise_at, screen_effect, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import backtrack, carry_parameters, linearise_at, screen_effect
 from fieldsid.fitting.initial.forward_build import forward_build
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations
 from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, squares_of
@@ -110,9 +110,9 @@ def _screened_again(problem: Problem, x: FloatArray, effect: Effect, weights: No
     The first screen stood on a model that lacked the effect, whose parameters it had biased.
     """
     rest = problem.with_effects([e for e in problem.layout.effects if e is not effect])
-    linearisation = linearise_at(rest, transfer_parameters(problem.layout, x, rest.layout), weights)
+    linearisation = linearise_at(rest, carry_parameters(rest.layout, (problem.layout, x)), weights)
     screened = backtrack(linearisation, screen_effect(linearisation, effect))
-    return transfer_parameters(screened.problem.layout, screened.start, problem.layout)
+    return carry_parameters(problem.layout, (screened.problem.layout, screened.start))
 
 
 def found_minimum(problem: Problem) -> tuple[Minimum, Noise]:

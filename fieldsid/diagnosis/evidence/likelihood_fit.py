@@ -19,6 +19,7 @@ from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.initial.effect_screen import equivalent_solution
 from fieldsid.fitting.optimise.levenberg_marquardt import dynamics_of, levenberg_marquardt
 from fieldsid.fitting.optimise.residual_weights import white_weights
+from fieldsid.fitting.problem.parameters import ParameterLayout
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
@@ -46,6 +47,11 @@ class FittedProblem:
     problem: Problem
     x: FloatArray
     weights: Noise
+
+    @property
+    def vector(self) -> tuple[ParameterLayout, FloatArray]:
+        """Its parameters, as `carry_parameters` takes them."""
+        return self.problem.layout, self.x
 
     @property
     def effects(self) -> tuple[Effect, ...]:

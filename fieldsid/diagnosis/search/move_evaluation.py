@@ -35,7 +35,7 @@ from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
-from fieldsid.fitting.initial.effect_screen import equivalent_solution, overlay_parameters, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import carry_parameters, equivalent_solution
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
@@ -106,13 +106,13 @@ class MoveEvaluation(SearchState):
         def fit_all(group: Sequence[SearchMove]) -> ScoredModel:
             effect = group[0].screened.effect
             problem = fitted.problem.with_effects([*parent.effects, effect])
-            own = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
             for move in group:
                 plain, x = move.screened.problem, move.screened.start
                 if move.by_output_error:
                     x = fit_output_error(plain, x, fitted.weights).x
                     if plain.layout.names != problem.layout.names:
-                        self._fit_child(parent, problem, overlay_parameters(plain.layout, x, problem.layout, own), effect)
+                        start = carry_parameters(problem.layout, (plain.layout, x), fitted.vector)
+                        self._fit_child(parent, problem, start, effect)
                 self._fit_child(other, plain, x, effect)
             return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()
 
@@ -209,7 +209,7 @@ class MoveEvaluation(SearchState):
     def _fit_from(self, h: ScoredModel, other: ScoredModel) -> LikelihoodFit:
         """Fit a model from another model's parameters where that has them, from its own elsewhere."""
         here, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
-        x = overlay_parameters(there.problem.layout, there.x, here.problem.layout, here.x)
+        x = carry_parameters(here.problem.layout, there.vector, here.vector)
         return fit_maximum_likelihood(here.problem, x, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
 
     def _prefer_output_error(self, key: frozenset[str]) -> None:

@@ -8,7 +8,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, fit_
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.add_effect import iterate_points
-from fieldsid.fitting.initial.effect_screen import linearise_at, screen_points, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, screen_points
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
@@ -42,7 +42,7 @@ def _start(h: ScoredModel, effect: Effect, *, plain: bool) -> tuple[Problem, Flo
     """Return the problem and start that the best scan points of an effect lead to, by output error or the model's noise."""
     fitted = h.likelihood_fit.fitted
     rest = fitted.problem.with_effects([e for e in h.effects if e is not effect])
-    x = transfer_parameters(fitted.problem.layout, fitted.x, rest.layout)
+    x = carry_parameters(rest.layout, fitted.vector)
     noise = h.likelihood_fit.noise
     if plain:
         free = fit_output_error(rest, x, fitted.weights)

@@ -27,7 +27,7 @@ from fieldsid.diagnosis.evidence.scored_model import (
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO, MIN_BASE_ERROR_SHARE
-from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, linearise_at, screen_effect, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, carry_parameters, linearise_at, screen_effect
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.models.effect import Effect
 
@@ -166,7 +166,7 @@ def _without_each(search: Search, best: FreeRunFit, seen: Seen) -> list[FreeRunF
 
 def _drop_effect(search: Search, fitted: FittedProblem, gone: Effect) -> FreeRunFit:
     problem = fitted.problem.with_effects([e for e in fitted.effects if e is not gone])
-    x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
+    x = carry_parameters(problem.layout, fitted.vector)
     return _evaluate(search, fit_output_error(problem, x, fitted.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE))
 
 

@@ -26,7 +26,7 @@ from fieldsid.diagnosis.thresholds import (
     RIVAL_LOG_ODDS,
     SUFFICIENT_ERROR_RATIO,
 )
-from fieldsid.fitting.initial.effect_screen import linearise_at, overlay_parameters, scan_points, transfer_parameters
+from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect, Stage
 
@@ -104,8 +104,7 @@ class Search(MoveEvaluation):
         """Fit a model with effects of another besides, at the parameters that they have there."""
         fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
         problem = fitted.problem.with_effects([*h.effects, *more])
-        own = transfer_parameters(there.problem.layout, there.x, problem.layout)
-        start = overlay_parameters(fitted.problem.layout, fitted.x, problem.layout, own)
+        start = carry_parameters(problem.layout, fitted.vector, there.vector)
         ml_fit = fit_maximum_likelihood(problem, start, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
         self.tried[frozenset(ml_fit.fitted.names)] = prefer_output_error(self._keep(ml_fit), self.floor)
 
@@ -174,7 +173,7 @@ class Search(MoveEvaluation):
         """Return a model with other effects at the parameters of one that was fitted, itself not fitted, to add to."""
         fitted = h.likelihood_fit.fitted
         problem = fitted.problem.with_effects(effects)
-        x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
+        x = carry_parameters(problem.layout, fitted.vector)
         at = replace(h.likelihood_fit, fitted=FittedProblem(problem, x, fitted.weights))
         return replace(h, likelihood_fit=replace(at, log_likelihood=likelihood_at(problem, x, at)))
 
@@ -227,7 +226,7 @@ class Search(MoveEvaluation):
         def fit(pair: tuple[Effect, Effect]) -> list[LikelihoodFit]:
             problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
             points = scan_points(at, next(e for e in pair if e.extra_states))
-            starts = [transfer_parameters(base.fitted.problem.layout, base.fitted.x, problem.layout, v) for v in points]
+            starts = [carry_parameters(problem.layout, base.fitted.vector, otherwise=v) for v in points]
             best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
             return [fit_maximum_likelihood(problem, x, base.noise, self.resolution_floor, self.noise_kind) for x in best]
 
@@ -292,12 +291,11 @@ class Search(MoveEvaluation):
         """Return a model without one of its effects, fitted from the parameters it has with it."""
         fitted = h.likelihood_fit.fitted
         problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
-        x = transfer_parameters(fitted.problem.layout, fitted.x, problem.layout)
-        starts, before = [x], self.tried.get(frozenset(e.name for e in problem.layout.effects))
+        starts = [carry_parameters(problem.layout, fitted.vector)]
+        before = self.tried.get(frozenset(e.name for e in problem.layout.effects))
         if before is not None and any(e not in before.effects for e in problem.layout.effects):
             # in its variants the others' numbers may be far from those without it
-            own = before.likelihood_fit.fitted
-            starts.append(overlay_parameters(own.problem.layout, own.x, problem.layout, x))
+            starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
         for start in starts:
             kept = self._keep(
                 fit_maximum_likelihood(problem, start, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)

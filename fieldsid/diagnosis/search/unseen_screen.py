@@ -14,7 +14,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, MIN_OUTPUT_ERROR_COST_SHARE, SearchMove, iterate_points
-from fieldsid.fitting.initial.effect_screen import linearise_at, overlay_parameters, screen_points, with_effect
+from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, screen_points, with_effect
 from fieldsid.fitting.problem.parameters import layout_of, speed_groups
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
@@ -27,7 +27,7 @@ def moves_of_all_runs(parent: ScoredModel, left: Sequence[Effect], parallel: Par
     groups = speed_groups(records, snapped=old.groups.snapped, trim_of_fin=old.groups.trim_of_fin)
     layout = layout_of(records, old.axis, old.effects, replace(groups, by_law=True))
     problem = Problem(records, layout, fitted.problem.evaluations)
-    start = overlay_parameters(old, fitted.x, layout, problem.start())
+    start = carry_parameters(layout, (old, fitted.x))
     found = fit_output_error(problem, start, fitted.weights)
     ground = linearise_at(found.problem, found.x, found.weights)
     points = sorted(parallel.map(lambda e: screen_points(ground, e), left), key=lambda p: p[0].predicted_cost)

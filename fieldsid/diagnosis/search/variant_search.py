@@ -14,7 +14,7 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import MAX_VALIDATION_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
-from fieldsid.fitting.initial.effect_screen import transfer_parameters
+from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, cost_of, levenberg_marquardt
 from fieldsid.fitting.problem.parameters import ParameterLayout
 from fieldsid.fitting.problem.problem import Problem
@@ -128,7 +128,6 @@ def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence
     The edges of an actuator (dead band, limit) are scanned again together with the variant: a cost with edges has local minima.
     """
     fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
-    old = fitted.problem.layout
     problem = fitted.problem.with_effects(_exchanged(h.effects, effect, variant))
     records = fitted.problem.records
     again = [{}, *_start_points(records, left, effect.initial_guesses, effect.shared)] if effect.stage is Stage.ACTUATOR else [{}]
@@ -136,7 +135,7 @@ def _best_start(h: ScoredModel, effect: Effect, variant: Variant, left: Sequence
         (point, edges) for point in _start_points(records, left, variant.initial_guesses, variant.coefficients) for edges in again
     ]
     starts = [
-        _with_values(problem.layout, transfer_parameters(old, fitted.x, problem.layout), point | edges) for point, edges in points
+        _with_values(problem.layout, carry_parameters(problem.layout, fitted.vector), point | edges) for point, edges in points
     ]
     likely = sorted(starts, key=lambda x: cost_of(problem, x, noise))[:MAX_STARTS]
     found = [levenberg_marquardt(problem, x, noise, max_iterations=SCREEN_ITERATIONS, tolerance=COST_TOLERANCE) for x in likely]

@@ -71,7 +71,7 @@ def with_effect(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[
     """Return the problem with one effect more, and the parent's x with the effect's coefficients at the given values."""
     problem = parent.with_effects((*parent.layout.effects, effect))
     layout = problem.layout
-    start = transfer_parameters(parent.layout, x, layout, values)
+    start = carry_parameters(layout, (parent.layout, x), otherwise=values)
     if effect.extra_states and "damping_exponent" in layout.names:
         # a hidden state that is missing drives the exponent far from physics, and a descent does not come back
         place = layout.names.index("damping_exponent")
@@ -79,12 +79,15 @@ def with_effect(parent: Problem, x: FloatArray, effect: Effect, values: Mapping[
     return problem, start
 
 
-def transfer_parameters(
-    old: ParameterLayout, x: FloatArray, new: ParameterLayout, values: Mapping[str, float] = MappingProxyType({})
+def carry_parameters(
+    to: ParameterLayout, *of: tuple[ParameterLayout, FloatArray], otherwise: Mapping[str, float] = MappingProxyType({})
 ) -> FloatArray:
-    """Return x of one layout in another's order; parameters the first lacks take the given values, else their start values."""
-    known = {(s.name, s.run): v for s, v in zip(old.parameters, x, strict=True)}
-    return np.array([known.get((s.name, s.run), values.get(s.name, s.start)) for s in new.parameters])
+    """Return the vector of a layout with each parameter of the first of some layouts and vectors that has it.
+
+    What none of them has takes the value given for its name otherwise, else its start value.
+    """
+    known = {(s.name, s.run): v for layout, x in reversed(of) for s, v in zip(layout.parameters, x, strict=True)}
+    return np.array([known.get((s.name, s.run), otherwise.get(s.name, s.start)) for s in to.parameters])
 
 
 def under_other_speed_law(problem: Problem, x: FloatArray) -> tuple[Problem, FloatArray]:
@@ -107,13 +110,7 @@ def under_speed_groups(problem: Problem, x: FloatArray, groups: SpeedGroups) -> 
     authority = NAMES[old.axis].authority
     shared = float(x[old.names.index(authority)])
     lifted = {group_name(authority, groups, g): shared * groups.over_reference(g) ** 2 for g in range(len(groups.speeds))}
-    return replace(problem, layout=new), transfer_parameters(old, x, new, lifted)
-
-
-def overlay_parameters(old: ParameterLayout, x: FloatArray, new: ParameterLayout, own: FloatArray) -> FloatArray:
-    """Return a layout's own vector with the numbers of another layout's wherever that has them."""
-    known = {(s.name, s.run): v for s, v in zip(old.parameters, x, strict=True)}
-    return np.array([known.get((s.name, s.run), v) for s, v in zip(new.parameters, own, strict=True)])
+    return replace(problem, layout=new), carry_parameters(new, (old, x), otherwise=lifted)
 
 
 def equivalent_solution(problem: Problem, x: FloatArray, effect: Effect) -> FloatArray | None:

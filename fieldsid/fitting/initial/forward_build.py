@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from fieldsid.fitting.covariance.reml import MAX_NOISE_SAMPLES, linearise_runs, select_noise, whitened_products
 from fieldsid.fitting.initial.effect_screen import (
     backtrack,
+    carry_parameters,
     equivalent_solution,
     linearise_at,
     screen_points,
-    transfer_parameters,
 )
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
@@ -51,7 +51,7 @@ def forward_build(problem: Problem, floor: Noise) -> FloatArray:
         left.remove(effect)
     x = _best(
         problem,
-        [transfer_parameters(current.layout, x, layout), _refined(problem, equation_error_start(problem.records, layout), floor)],
+        [carry_parameters(layout, (current.layout, x)), _refined(problem, equation_error_start(problem.records, layout), floor)],
     )
     return plausible(problem, x, floor)
 
