@@ -35,7 +35,7 @@ SUB_ROOMS = {
     "plant": ("laws",),
     "turning": ("measured", "steady", "maneuvering"),
     "schedule": ("flown",),
-    "cli": ("help", "headlines", "live", "trial", "commands"),
+    "cli": ("help", "trial", "headlines", "live", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its
 entry and what its folders share: of them, as of all files, no two import each other by any way round."""

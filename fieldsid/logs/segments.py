@@ -57,6 +57,15 @@ def segment(run: Run, axis: str) -> Segment:
     return _around(run, time, away, signal, limit)
 
 
+def is_excited(run: Run, axis: str) -> bool:
+    """Whether a run has a fin for an axis (`yaw` or `pitch`) that leaves its trim."""
+    signal = next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
+    if signal is None:
+        return False
+    seen = np.isfinite(run[signal])
+    return bool(_away(run.time[seen], run[signal][seen])[0].any())
+
+
 def excursions(name: str, axis: str, signal: str, time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
     """Return where the fin (n,) rad of a run is clearly away from its trim, and the limit in rad.
 

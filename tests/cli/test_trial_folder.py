@@ -12,6 +12,7 @@ import pytest
 import yaml
 from cli import trial
 
+from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.trial.filled import FILLS
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.logs import load_run, save_run
@@ -43,6 +44,40 @@ def test_runs_and_the_folder_of_models_need_not_be_typed(run_cli, folder):
     assert [f["run"] for f in answer.json["fits"]] == ["pulses_1.0", "pulses_1.4"]
     assert "taken from the trial folder: -o models runs/pulses_1.0.parquet" in answer.err
     assert sorted(p.name for p in (folder / "models").iterdir()) == ["pulses_1.0_yaw.yaml", "pulses_1.4_yaw.yaml"]
+
+
+def test_runs_that_excite_the_other_plane_alone_are_left_out_where_none_is_typed(run_cli, folder):
+    trial.flown(folder / "runs", Axis.PITCH, name="stairs")
+    run, pitching = load_run(folder / BOTH_RUNS[1]), load_run(folder / "runs/stairs.parquet")
+    steady = replace(pitching, signals={**pitching.signals, "rudder_rad": 0.01 + 0.0 * pitching.time})
+    save_run(steady, folder / "runs/stairs.parquet", force=True)
+    still = {n: v for n, v in run.signals.items() if n != "rudder_rad"} | {"rudder_rad": 0.0 * run.time}
+    save_run(replace(run, name="still", signals=still), folder / "runs/still.parquet")
+    answer = run_cli("identify", "--axis", "yaw", "--no-figures", "--json")
+    body = json.loads(answer.out)
+    assert [f["run"] for f in body["fits"]] == ["pulses_1.0", "pulses_1.4"]
+    assert "1 more excite the other plane alone" in answer.err
+    # that in which no fin moves was flown for nothing: that is told
+    assert [s["run"] for s in body["skipped_runs"]] == ["still"]
+
+
+@pytest.mark.parametrize(
+    ("words", "spared"),
+    [
+        (("identify", *BOTH_RUNS, "--axis", "yaw", "--joint", "-o", "models/"), "identify --axis yaw --joint"),
+        (("identify", BOTH_RUNS[0], "--axis", "yaw"), f"identify {BOTH_RUNS[0]} --axis yaw"),
+        (("diagnose", *BOTH_RUNS, "--axis", "yaw", "--model", "models/m.yaml"), "diagnose --axis yaw --model models/m.yaml"),
+        (("turn-radius", "models/m.yaml"), "turn-radius"),
+        (("schedule", "design", "models/m.yaml", "-o", "gains.yaml"), "schedule design -o gains.yaml"),
+        (("schedule", "design", "elsewhere.yaml", "-o", "gains.yaml"), "schedule design elsewhere.yaml -o gains.yaml"),
+        (("plan", "--axis", "yaw", "-o", "plan"), "plan --axis yaw"),
+        (("effects", "show", "stall"), "effects show stall"),
+    ],
+)
+def test_a_line_to_paste_leaves_out_just_what_the_folder_fills_in(folder, words, spared):
+    (folder / "models").mkdir(exist_ok=True)
+    trial.model_file(folder / "models").rename(folder / "models/m.yaml")
+    assert pasted(*words) == f"sysid {spared}"
 
 
 def test_a_command_that_comes_too_early_is_told_what_comes_before_it(run_cli, folder):
@@ -307,6 +342,8 @@ def test_import_takes_the_logs_that_are_no_runs_yet_and_status_and_inspect_say_s
         run.unlink()
     assert run_cli("status", "--json").json["next"]["command"] == "sysid import"
     assert run_cli("inspect", "logs/pulses_1.0.csv", "--json").json["headline"]["next"] == "sysid import"
+    written = run_cli("inspect", "logs/pulses_1.0.csv", "--write-mapping", "mapping.yaml", "--force", "--json")
+    assert written.json["headline"]["next"] == "sysid import"
     assert [r["run"] for r in run_cli("import", "logs/pulses_1.0.csv", "--json").json["runs"]] == ["pulses_1.0"]
     answer = run_cli("import", "--json")
     assert [r["run"] for r in answer.json["runs"]] == ["pulses_1.4"]

@@ -49,10 +49,10 @@ def _after(body: Body, mapping: Path | None) -> str:
     return pasted("import", body["path"], *(("--mapping", known) if known else ()), *body["import_options"], "-o", "runs/")
 
 
-def _is_taken(log: Path, mapping: Path | None) -> bool:
-    """Whether an import here takes a log, and its mapping, from the trial folder."""
+def _is_taken(log: Path, mapping: str | Path | None) -> bool:
+    """Whether an import here takes a log, among others, and its mapping from the trial folder."""
     is_here = is_trial(Path()) and log.resolve().parent == Path(LOGS).resolve()
-    return is_here and (mapping is None or mapping.resolve() == Path(MAPPING).resolve())
+    return is_here and (mapping is None or Path(mapping).resolve() == Path(MAPPING).resolve())
 
 
 def of_import(body: Body) -> Headline:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
+from fieldsid.cli.trial.spared import without_the_filled
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
 _WORDS: list[tuple[str, ...]] = [()]
@@ -26,8 +27,14 @@ def typed_with(*more: str) -> str:
 
 
 def pasted(*words: str | Path | Sequence[str | Path]) -> str:
-    """Return a command line of `sysid`; a word may be a list of files, all of them or the pattern that stands for them."""
+    """Return a command line of `sysid`; a word may be a list of files, all of them or the pattern that stands for them.
+
+    In a trial folder, without what it is filled in with there.
+    """
     parts: list[str] = ["sysid"]
+    flat = [_near(w) for word in words for w in ([word] if isinstance(word, (str, Path)) else word)]
+    if (short := without_the_filled(flat)) != flat:
+        return shlex.join(["sysid", *short])
     for word in words:
         parts += [shlex.quote(_near(word))] if isinstance(word, (str, Path)) else pattern_of([Path(_near(p)) for p in word])
     return " ".join(parts)

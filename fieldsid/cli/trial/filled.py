@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from fieldsid.cli.trial.parsed import Parsed
 from fieldsid.errors import FieldsidError
+from fieldsid.models.axis import Axis
 from fieldsid.trial_folder.make import LOGS, MODELS, RUNS
 from fieldsid.trial_folder.next_step import chosen_models, diagnosed_runs, logs_to_import, run_words, unseen_runs
 from fieldsid.trial_folder.state import LOG, MODEL, RUN, FolderState, Item
@@ -32,7 +33,35 @@ def wants(parsed: Parsed) -> bool:
 
 
 def _runs(parsed: Parsed, state: FolderState) -> list[str]:
-    return [] if parsed.values.get("runs") else run_words(state)
+    """Return the folder's runs without those that excite the other plane alone."""
+    return [] if parsed.values.get("runs") else _of_plane(parsed, state)
+
+
+def _of_plane(parsed: Parsed, state: FolderState) -> list[str]:
+    axis = parsed.values.get("axis")
+    others = [a for a in Axis if a != axis]
+    mine = [i.path for i in state.of_kind(RUN) if axis is None or _excites(state, i, axis) or not _excites(state, i, *others)]
+    return mine or run_words(state)
+
+
+def _excites(state: FolderState, item: Item, *axes: str) -> bool:
+    """Whether a run moves the fin of one of some planes; of one that cannot be read the command itself says so."""
+    from fieldsid.logs import load_run
+    from fieldsid.logs.segments import is_excited
+
+    try:
+        run = load_run(state.place(item))
+    except FieldsidError:
+        return False
+    return any(is_excited(run, axis) for axis in axes)
+
+
+def left_out(parsed: Parsed, state: FolderState) -> list[str]:
+    """Return the folder's runs that a command does not take because they excite the other plane alone."""
+    if parsed.name not in ("identify", "diagnose") or parsed.values.get("runs"):
+        return []
+    taken = set(_of_plane(parsed, state))
+    return [r for r in run_words(state) if r not in taken]
 
 
 def _output(parsed: Parsed, folder: str) -> list[str]:

@@ -15,7 +15,7 @@ import typer
 
 from fieldsid.cli.console import say
 from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
-from fieldsid.cli.trial.filled import filled, in_words, wants
+from fieldsid.cli.trial.filled import filled, in_words, left_out, wants
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, Stamp, append, read
@@ -38,7 +38,9 @@ def run_in_trial(arguments: Sequence[str], run: Callable[[Sequence[str]], Any]) 
     folder, state = Path(), cache(_state)
     added = filled(parsed, state) if wants(parsed) else []
     if added:
-        say(f"taken from the trial folder: {in_words(added)}")
+        others = len(left_out(parsed, state()))
+        more = f"; {others} more excite the other plane alone" if others else ""
+        say(f"taken from the trial folder: {in_words(added)}{more}")
     words = [*arguments, *added]
     whole = parse(words) or parsed
     kept = _Kept(folder, words, whole)
