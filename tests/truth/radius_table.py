@@ -4,6 +4,7 @@ Every hull is drawn, flown with sensor noise, identified, and turned to both sid
     python tests/truth/radius_table.py --draws 300 --seed 7 --json rows.json [--minutes 8] [--sets pulses,pulses+zigzag]
     python tests/truth/radius_table.py --pool rows.json more.json
 Rows are saved after every hull; the same command goes on where the last one ended, after so many minutes if asked to.
+With `--length` the hull's length is stated, as vehicle.yaml has it.
 Further sets: pulses+uturn, pulses+half, "pulses+zigzag by rpm".
 Of every fourteen hulls seven log no sway. Seed 1 is that of the prior (`radius_prior.py`): measure with another.
 """
@@ -55,6 +56,7 @@ class Outcome:
     trust: str
     refused: str = ""
     seed: int = 0
+    length_stated: bool = False
 
     @property
     def error(self) -> float:
@@ -77,16 +79,17 @@ def as_run(log: Log) -> Run:
     return Run(log.name, log.time, log.columns)
 
 
-def evaluate(hull: Hull, draw: int, which: str, seed: int) -> list[Outcome]:
-    """Return the turns of one hull after one training set."""
+def evaluate(hull: Hull, draw: int, which: str, seed: int, *, length_stated: bool) -> list[Outcome]:
+    """Return the turns of one hull after one training set, its length stated or not."""
     sway = draw // len(KINDS) % 2 == 0
     rng = np.random.default_rng([seed, draw, (*SETS, *MORE_SETS).index(which)])
     logs = training(hull, which, rng, sway=sway)
     truth = {(v, side): true_turn(hull, v, sign)[0] for v in hull.speeds for side, sign in (("port", -1.0), ("starboard", 1.0))}
-    nan = float("nan")
+    nan, length = float("nan"), hull.of.length if length_stated else None
 
     def outcome(key: tuple[float, str], radius: float, low: float, high: float, trust: str, refused: str = "") -> Outcome:
-        return Outcome(draw, hull.kind, which, sway, key[0], key[1], truth[key], radius, low, high, trust, refused, seed)
+        of, turn = (draw, hull.kind, which, sway, *key), (truth[key], radius, low, high)
+        return Outcome(*of, *turn, trust, refused, seed, length_stated)
 
     try:
         models = []
@@ -96,7 +99,7 @@ def evaluate(hull: Hull, draw: int, which: str, seed: int) -> list[Outcome]:
         source = source_of_models(models, [f"m{i}" for i in range(len(models))])
         circles = [as_run(log) for log in logs if log.name in TURNS]
         runs = [as_run(log) for log in logs if log.name not in TURNS]
-        found = turn_radius(source, hull.speeds, hull.rudder_limit, runs=runs, measured=circles)
+        found = turn_radius(source, hull.speeds, hull.rudder_limit, runs=runs, measured=circles, length=length)
     except FieldsidError as error:
         return [outcome(key, nan, nan, nan, "refused", str(error)) for key in truth]
     return [outcome((r.speed, r.side), r.radius, *r.interval95, r.trust) for r in found.rows]
@@ -140,16 +143,16 @@ def table(rows: list[Outcome]) -> list[str]:
 def saved(paths: Sequence[Path]) -> list[Outcome]:
     """Return the rows that were saved, those of files that hold the same ones once."""
     rows = [Outcome(**row) for path in paths if path.exists() for row in json.loads(path.read_text())]
-    return list({(r.seed, r.draw, r.training, r.speed, r.side): r for r in rows}.values())
+    return list({(r.seed, r.draw, r.training, r.length_stated, r.speed, r.side): r for r in rows}.values())
 
 
 def measured(given: argparse.Namespace) -> list[Outcome]:
     """Return the rows asked for, those saved before taken as they are."""
     rows = saved([given.json] if given.json else [])
-    done = {(r.seed, r.draw, r.training) for r in rows}
+    done = {(r.seed, r.draw, r.training, r.length_stated) for r in rows}
     begun = time.monotonic()
     for draw in range(given.first, given.first + given.draws):
-        missing = [which for which in given.sets.split(",") if (given.seed, draw, which) not in done]
+        missing = [which for which in given.sets.split(",") if (given.seed, draw, which, given.length) not in done]
         if not missing:
             continue
         if time.monotonic() - begun > 60.0 * given.minutes:
@@ -159,7 +162,7 @@ def measured(given: argparse.Namespace) -> list[Outcome]:
         for which in missing:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                rows += evaluate(hull, draw, which, given.seed)
+                rows += evaluate(hull, draw, which, given.seed, length_stated=given.length)
         print(f"{draw} {hull.kind} {time.monotonic() - begun:.0f} s", file=sys.stderr, flush=True)
         if given.json:
             given.json.write_text(json.dumps([asdict(r) for r in rows]))
@@ -173,6 +176,7 @@ def main() -> None:
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--seed", type=int, default=7)
     asked.add_argument("--sets", default=",".join(SETS))
+    asked.add_argument("--length", action="store_true", help="state the hull's length")
     asked.add_argument("--minutes", type=float, default=float("inf"))
     asked.add_argument("--json", type=Path)
     asked.add_argument("--pool", type=Path, nargs="+", default=())

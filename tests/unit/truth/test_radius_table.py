@@ -17,14 +17,14 @@ def outcome(hull, draw, which, seed):
 
 
 def asked(path, **changed):
-    given = {"draws": 3, "first": 0, "seed": 4, "sets": "pulses", "minutes": float("inf"), "json": path}
+    given = {"draws": 3, "first": 0, "seed": 4, "sets": "pulses", "minutes": float("inf"), "json": path, "length": False}
     return argparse.Namespace(**(given | changed))
 
 
 def test_a_table_goes_on_where_it_ended(tmp_path, monkeypatch):
     flown = []
 
-    def evaluate(hull, draw, which, seed):
+    def evaluate(hull, draw, which, seed, *, length_stated):
         flown.append(draw)
         return [outcome(hull, draw, which, seed)]
 
