@@ -18,17 +18,24 @@ from fieldsid.logs.several.sifting import Refused, attempt, sifted
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.rounding import MANY
 
 DOWN_TO_NOISE = 1.15
 """Rms over the noise up to which a channel has nothing left to show: the noise is itself an estimate."""
 
 
+def left_in_words(over_floor: float, fit: float, digits: int = 1) -> str:
+    """Return what a model leaves of a channel: the error over its noise; of a log without noise the fit in percent."""
+    return f"{over_floor:.{digits}f} x its noise" if over_floor < MANY else f"fit {fit:.1f} %"
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Channel(Brief):
-    """One measured channel, `angle` or `rate`: its rms over its noise floor, its metrics, and where its error falls."""
+    """One measured channel, `angle` or `rate`: rms over its noise floor, fit in percent, metrics, and where its error falls."""
 
     name: str
     over_floor: float
+    fit: float
     metrics: Metrics
     where: tuple[Place, ...]
     worst: tuple[Stretch, ...]
@@ -38,10 +45,18 @@ class Channel(Brief):
         """Whether more is left than the sensor's noise."""
         return self.over_floor > DOWN_TO_NOISE
 
+    @property
+    def badness(self) -> tuple[float, float]:
+        """What channels and runs are ordered by: the error over the noise, and of logs without noise what the fit leaves.
+
+        The floor of a log without noise is that of its digits, which says nothing of one channel against the other.
+        """
+        return min(self.over_floor, MANY), 100.0 - self.fit
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Comparison(Plotted):
-    """One run: free run, merit, noise floor, its channels, the one furthest above its floor first, and the model."""
+    """One run: free run, merit, noise floor, its channels, the worst first, and the model."""
 
     shown: Prediction
     merit: GoodnessOfFit
@@ -57,7 +72,7 @@ class Comparison(Plotted):
 
     @property
     def leading(self) -> Channel:
-        """The channel furthest above its noise floor."""
+        """The worst channel: the one furthest above its noise floor, or of less fit in a log without noise."""
         return self.channels[0]
 
     @property
@@ -97,14 +112,14 @@ def compare_one(model: Model, run: Run) -> Comparison:
 
 
 def _channels(shown: Prediction, floor: Noise, trim: float) -> tuple[Channel, ...]:
-    """Return the measured channels, the one furthest above its floor first; trim is the fin at rest in rad."""
+    """Return the measured channels, the worst first; trim is the fin at rest in rad."""
     record, found = shown.record, goodness_of_fit([shown])
-    parts = (("angle", found.angle_rms / floor.angle), ("rate", found.rate_rms / floor.rate))
+    parts = (("angle", found.angle_rms / floor.angle, found.angle_fit), ("rate", found.rate_rms / floor.rate, found.rate_fit))
     cases = conditions(record, shown.rate, trim)
     channels = []
-    for i, (name, over) in enumerate(parts):
+    for i, (name, over, fit) in enumerate(parts):
         ok, square = record.ok[i], shown.residual[i] ** 2
         if ok.any():
             falls = places(record.time, square, ok, cases), stretches(record.time, square, ok)
-            channels.append(Channel(name, over, metrics(shown, i), *falls))
-    return tuple(sorted(channels, key=lambda c: -c.over_floor))
+            channels.append(Channel(name, over, fit, metrics(shown, i), *falls))
+    return tuple(sorted(channels, key=lambda c: c.badness, reverse=True))

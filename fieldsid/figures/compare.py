@@ -8,7 +8,7 @@ from textwrap import fill
 
 from matplotlib.figure import Figure, SubFigure
 
-from fieldsid.comparison.compare import Channel, Comparison
+from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.figures import canvas, motion, where
 from fieldsid.models.model import Model
 from fieldsid.rounding import number
@@ -41,7 +41,7 @@ def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
         shown = channel.where[: MOST_BARS // len(failing)]
         where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in shown], ax)
         says = f"the {channel.name} fails most at {shown[0].condition}" if shown else f"where the {channel.name} fails"
-        how = f"{channel.over_floor:.1f} x its noise; beside a bar: rms there\nover that of the whole run"
+        how = f"{left_in_words(channel.over_floor, channel.fit)}; beside a bar: rms there\nover that of the whole run"
         ax.set_title(f"{fill(says, TITLE_WIDTH)}\n{how}", loc="left", fontsize=10)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid._version import __version__
-from fieldsid.comparison.compare import DOWN_TO_NOISE, Channel, Comparison
+from fieldsid.comparison.compare import DOWN_TO_NOISE, Channel, Comparison, left_in_words
 from fieldsid.reporting import figures
 from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
@@ -54,7 +54,7 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
         judged = unseen or seen
         over = exp(sum(log(c.leading.over_floor) for c in judged) / len(judged))
         on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
-        worst = max(judged, key=lambda c: c.leading.over_floor)
+        worst = max(judged, key=lambda c: c.leading.badness)
         good = worst.leading.over_floor <= DOWN_TO_NOISE
         tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
         most = f", {worst.leading.over_floor:.2f} x on {worst.run}" if len(judged) > 1 and not good else ""
@@ -132,7 +132,7 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "models": [{"path": s.path, "effects": ", ".join(s.model.effects) or "none", "rows": _errors(s)} for s in axis.shown],
         "failures": [
             {
-                "title": f"{run}: the {_followed(c, channel)}",
+                "title": f"{run}: the {_followed(channel)}",
                 "chart": figures.failures(channel, f"where the {channel.name} of {run} fails"),
                 "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
             }
@@ -150,23 +150,20 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _followed(found: Comparison, channel: Channel) -> str:
-    """Return a channel with its error over its noise; of a log without noise, whose floor is that of its digits, with its fit."""
-    if channel.over_floor < MANY:
-        return f"{channel.name} {channel.over_floor:.2f} x its noise"
-    fit = found.merit.angle_fit if channel.name == "angle" else found.merit.rate_fit
-    return f"{channel.name} fit {fit:.1f} %"
+def _followed(channel: Channel) -> str:
+    """Return a channel with what the model leaves of it."""
+    return f"{channel.name} {left_in_words(channel.over_floor, channel.fit, 2)}"
 
 
 def _without_noise(judged: Sequence[Comparison], on: str) -> str:
-    worst = max(judged, key=lambda c: c.leading.over_floor)
-    return f"{_followed(worst, worst.leading)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
+    worst = max(judged, key=lambda c: c.leading.badness)
+    return f"{_followed(worst.leading)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
 
 
 def _pair(shown: Shown, found: Any, axis: AxisMaterial) -> dict[str, Any]:
     title = f"{shown.path} on {found.run}"
     drawn, key = figures.free_run(found, f"{title}: free run and measurement")
-    over = ", ".join(_followed(found, c) for c in found.channels)
+    over = ", ".join(_followed(c) for c in found.channels)
     return {
         "model": shown.path, "run": found.run, "chart": drawn, "legend": key, "over": over,
         "fitted": shown.was_fitted_to(found.run), "first": shown is axis.shown[0],

@@ -265,11 +265,14 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]], top: int) -> None
 
 def _render_where(to: Console, e: Mapping[str, Any], top: int) -> None:
     """Say where each channel fails, the worse one first, and which are down to their noise."""
+    from fieldsid.comparison.compare import left_in_words
+
     over, failing = e["over_floor"], e["failing"]
     for fault in failing:
         name = fault["channel"]
         to.print()
-        to.print(_places(f"{e['run']}: where the {name} fails, {over[name]:.1f} x its noise", fault["where"][:top]))
+        how = left_in_words(over[name], e[f"{name}_fit_percent"])
+        to.print(_places(f"{e['run']}: where the {name} fails, {how}", fault["where"][:top]))
     quiet = [f"{name} {ratio:.2f} x" for name, ratio in over.items() if name not in {f["channel"] for f in failing}]
     if quiet:
         if not failing:

@@ -68,7 +68,7 @@ def _after_fit(body: Body, axis: str, over: Sequence[float], files: Sequence[Seq
 def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
     """Return the worst run's worse channel, and on what it was judged; inputs: what the model was fitted to."""
     entries, axis = body["runs"], str(body["axis"])
-    worst = max(entries, key=_leading)
+    worst = max(entries, key=_badness)
     channel = worst["judged_by"]
     over = f"{_leading(worst):.2f} x its noise, " if _leading(worst) < MANY else ""
     says = f"{worst['run']}: {channel} {f'error {over}' if over else ''}fit {worst[f'{channel}_fit_percent']:.1f} %"
@@ -126,6 +126,11 @@ def _searched(model: Path) -> bool:
 
 def _leading(entry: Body) -> float:
     return float(entry["over_floor"][entry["judged_by"]])
+
+
+def _badness(entry: Body) -> tuple[float, float]:
+    """Return what runs are ordered by, as `comparison` has it."""
+    return min(_leading(entry), MANY), 100.0 - float(entry[f"{entry['judged_by']}_fit_percent"])
 
 
 def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: Sequence[Path], *, close: float) -> Headline:

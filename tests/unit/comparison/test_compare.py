@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fieldsid.comparison.compare import compare
+from fieldsid.comparison.compare import compare, left_in_words
 from fieldsid.comparison.residuals import companions
 from fieldsid.errors import DataError
 from fieldsid.figures.compare import figure, view_of
@@ -61,6 +61,20 @@ def test_the_channel_further_above_its_noise_leads_and_the_other_is_not_hidden()
     assert c.leading.over_floor == pytest.approx(c.merit.angle_rms / c.floor.angle)
     assert c.leading.over_floor > c.channels[1].over_floor
     assert c.where == c.leading.where
+
+
+def test_in_a_log_without_noise_the_channel_of_less_fit_leads_and_no_multiple_of_its_digits_is_said():
+    """A rate of all digits beside an angle of three: the floors say how a file was written, not which channel fails."""
+    truth = model()
+    run = dry_run(truth, *parse_spec("zigzag"), speed=1.4, limits=Limits(0.35))
+    run = replace(run, signals={**run.signals, "yaw_rad": np.round(run.signals["yaw_rad"], 3)})
+    (c,) = compare(replace(truth, values=truth.values | {"C0": 0.04}), [run])
+    angle, rate = sorted(c.channels, key=lambda channel: channel.name)
+    assert rate.over_floor > angle.over_floor > 100.0
+    assert c.merit.angle_fit < c.merit.rate_fit
+    assert c.leading is angle
+    assert left_in_words(angle.over_floor, angle.fit) == f"fit {c.merit.angle_fit:.1f} %"
+    assert left_in_words(4.26, 50.0) == "4.3 x its noise"
 
 
 def test_the_figure_shows_the_channels_that_fail_in_their_order_and_shades_nothing_at_the_noise():

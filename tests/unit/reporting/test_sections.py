@@ -6,18 +6,30 @@ from types import SimpleNamespace
 
 import pytest
 
+from fieldsid.comparison.compare import Channel
+from fieldsid.comparison.metrics import Metrics
 from fieldsid.reporting.sections import _followed, _without_noise
 
-MERIT = SimpleNamespace(angle_fit=79.04, rate_fit=86.52)
+
+def channel(name, over, fit):
+    return Channel(name, over, fit, Metrics(0.1, 0.9, 0.5), (), ())
 
 
 @pytest.mark.parametrize(
-    ("name", "over", "says"),
-    [("rate", 1.684, "rate 1.68 x its noise"), ("rate", 34503.16, "rate fit 86.5 %"), ("angle", 34503.16, "angle fit 79.0 %")],
+    ("name", "over", "fit", "says"),
+    [
+        ("rate", 1.684, 86.52, "rate 1.68 x its noise"),
+        ("rate", 34503.16, 86.52, "rate fit 86.5 %"),
+        ("angle", 34503.16, 79.04, "angle fit 79.0 %"),
+    ],
 )
-def test_an_error_is_told_over_the_noise_where_there_is_some_and_else_as_the_fit(name, over, says):
-    channel = SimpleNamespace(name=name, over_floor=over)
-    found = SimpleNamespace(merit=MERIT, leading=channel)
-    assert _followed(found, channel) == says
+def test_an_error_is_told_over_the_noise_where_there_is_some_and_else_as_the_fit(name, over, fit, says):
+    found = SimpleNamespace(leading=channel(name, over, fit))
+    assert _followed(found.leading) == says
     if over > 100.0:
         assert _without_noise([found], "1 run") == f"{says} on 1 run; the log has next to no noise"
+
+
+def test_of_runs_without_noise_the_worst_is_that_of_the_least_fit_whatever_their_digits():
+    runs = [SimpleNamespace(leading=channel("rate", 25000.0, 93.3)), SimpleNamespace(leading=channel("angle", 5600.0, 65.4))]
+    assert _without_noise(runs, "2 runs") == "angle fit 65.4 % on 2 runs, the worst; the log has next to no noise"
