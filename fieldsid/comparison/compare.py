@@ -29,6 +29,14 @@ def left_in_words(over_floor: float, fit: float, digits: int = 1) -> str:
     return f"{over_floor:.{digits}f} x its noise" if over_floor < MANY else f"fit {fit:.1f} %"
 
 
+def badness(over_floor: float, fit: float) -> tuple[float, float]:
+    """Return what channels and runs are ordered by: the error over the noise, and of logs without noise what the fit leaves.
+
+    The floor of a log without noise is that of its digits, which says nothing of one channel against the other.
+    """
+    return min(over_floor, MANY), 100.0 - fit
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Channel(Brief):
     """One measured channel, `angle` or `rate`: rms over its noise floor, fit in percent, metrics, and where its error falls."""
@@ -47,11 +55,8 @@ class Channel(Brief):
 
     @property
     def badness(self) -> tuple[float, float]:
-        """What channels and runs are ordered by: the error over the noise, and of logs without noise what the fit leaves.
-
-        The floor of a log without noise is that of its digits, which says nothing of one channel against the other.
-        """
-        return min(self.over_floor, MANY), 100.0 - self.fit
+        """What it is ordered by among channels, and its run among runs."""
+        return badness(self.over_floor, self.fit)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

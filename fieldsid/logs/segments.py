@@ -47,23 +47,29 @@ def segment(run: Run, axis: str) -> Segment:
 
     Raises DataError when the log has no fin for the axis, or the fin never leaves its trim.
     """
-    signal = next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
+    signal = _fin_of(run, axis)
     if signal is None:
         raise no_fin(run, axis, _FINS[axis][1])
-    fin = run[signal]
-    seen = np.isfinite(fin)
-    time, fin = run.time[seen], fin[seen]
+    time, fin = _seen(run, signal)
     away, limit = excursions(run.name, axis, signal, time, fin)
     return _around(run, time, away, signal, limit)
 
 
 def is_excited(run: Run, axis: str) -> bool:
     """Whether a run has a fin for an axis (`yaw` or `pitch`) that leaves its trim."""
-    signal = next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
-    if signal is None:
-        return False
+    signal = _fin_of(run, axis)
+    return signal is not None and bool(_away(*_seen(run, signal))[0].any())
+
+
+def _fin_of(run: Run, axis: str) -> str | None:
+    """Return the signal of an axis' fin, the command where both are there; None where there is none."""
+    return next((s for s in reversed(_FINS[axis]) if run.has(s)), None)
+
+
+def _seen(run: Run, signal: str) -> tuple[FloatArray, FloatArray]:
+    """Return times and values of a signal where it was measured."""
     seen = np.isfinite(run[signal])
-    return bool(_away(run.time[seen], run[signal][seen])[0].any())
+    return run.time[seen], run[signal][seen]
 
 
 def excursions(name: str, axis: str, signal: str, time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:

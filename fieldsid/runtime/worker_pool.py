@@ -62,7 +62,8 @@ class Worker:
     def kill(self) -> None:
         """End the worker, whatever it is doing, and wait for its end."""
         os.kill(self.process, signal.SIGKILL)
-        self._end()
+        self._stream.close()
+        os.waitpid(self.process, 0)
 
     def __enter__(self) -> Self:
         return self
@@ -73,10 +74,6 @@ class Worker:
             _ending.append(self.process)
         else:
             self.kill()
-
-    def _end(self) -> None:
-        self._stream.close()
-        os.waitpid(self.process, 0)
 
 
 _ending: list[int] = []

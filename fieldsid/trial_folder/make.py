@@ -10,7 +10,7 @@ from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.registry import near
 from fieldsid.templates import template_path
 
-LOGS, RUNS, MODELS = "logs", "runs", "models"
+LOGS, RUNS, MODELS, MAPPING = "logs", "runs", "models", "mapping.yaml"
 VEHICLE = "vehicle.yaml"
 
 _NAME = re.compile(r"^name: .*$", re.MULTILINE)
@@ -27,7 +27,7 @@ def new_trial(folder: Path, template: str = "torpedo") -> list[Path]:
     vehicle = _NAME.sub(f"name: {_yaml_name(folder)}", kinds[template].read_text(encoding="utf-8"), count=1)
     texts = {
         VEHICLE: vehicle,
-        "mapping.yaml": template_path("mapping.yaml").read_text(encoding="utf-8"),
+        MAPPING: template_path("mapping.yaml").read_text(encoding="utf-8"),
         "notes.md": template_path("notes.md").read_text(encoding="utf-8"),
     }
     there = [n for n in texts if (folder / n).exists()]

@@ -10,9 +10,7 @@ from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.trial_folder.journal import is_trial
-from fieldsid.trial_folder.make import LOGS
-
-MAPPING = "mapping.yaml"
+from fieldsid.trial_folder.make import LOGS, MAPPING
 
 PROOF = "evidence"
 """Code of a finding that says why a column was taken for a signal: nothing is wrong there."""

@@ -129,8 +129,9 @@ def _leading(entry: Body) -> float:
 
 
 def _badness(entry: Body) -> tuple[float, float]:
-    """Return what runs are ordered by, as `comparison` has it."""
-    return min(_leading(entry), MANY), 100.0 - float(entry[f"{entry['judged_by']}_fit_percent"])
+    from fieldsid.comparison.compare import badness
+
+    return badness(_leading(entry), float(entry[f"{entry['judged_by']}_fit_percent"]))
 
 
 def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: Sequence[Path], *, close: float) -> Headline:

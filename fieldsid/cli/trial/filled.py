@@ -6,6 +6,8 @@ What was typed always counts. The words are put behind it, so that the journal h
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 
 from fieldsid.cli.trial.parsed import Parsed
@@ -39,21 +41,23 @@ def _runs(parsed: Parsed, state: FolderState) -> list[str]:
 
 def _of_plane(parsed: Parsed, state: FolderState) -> list[str]:
     axis = parsed.values.get("axis")
-    others = [a for a in Axis if a != axis]
-    mine = [i.path for i in state.of_kind(RUN) if axis is None or _excites(state, i, axis) or not _excites(state, i, *others)]
+    places = {i.path: state.place(i) for i in state.of_kind(RUN)}
+    excited = {path: _excited(place, place.stat().st_mtime_ns) for path, place in places.items()} if axis is not None else {}
+    mine = [path for path in places if not excited.get(path) or axis in excited[path]]
     return mine or run_words(state)
 
 
-def _excites(state: FolderState, item: Item, *axes: str) -> bool:
-    """Whether a run moves the fin of one of some planes; of one that cannot be read the command itself says so."""
+@cache
+def _excited(place: Path, _written_ns: int) -> frozenset[Axis]:
+    """Return the planes whose fin moves in a run, none of one that cannot be read: the command itself says so."""
     from fieldsid.logs import load_run
     from fieldsid.logs.segments import is_excited
 
     try:
-        run = load_run(state.place(item))
+        run = load_run(place)
     except FieldsidError:
-        return False
-    return any(is_excited(run, axis) for axis in axes)
+        return frozenset()
+    return frozenset(axis for axis in Axis if is_excited(run, axis))
 
 
 def left_out(parsed: Parsed, state: FolderState) -> list[str]:

@@ -10,11 +10,12 @@ from pathlib import Path
 from fieldsid.cli.trial.filled import filled, left_out, wants
 from fieldsid.cli.trial.parsed import parse
 from fieldsid.trial_folder.journal import is_trial
+from fieldsid.trial_folder.make import MAPPING
 from fieldsid.trial_folder.state import FolderState, state_of
 
 READ = ("--mapping", "--validate", "--measured", "--plan", "--vehicle")
 """Options whose file a trial folder may give, as it may give that of `-o`."""
-DEFAULT = ("--mapping", "mapping.yaml")
+DEFAULT = ("--mapping", MAPPING)
 """What every reading takes in a trial folder, without its being filled in."""
 
 
