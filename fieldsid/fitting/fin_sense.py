@@ -38,7 +38,7 @@ def fin_sense(problem: Problem, solution: Solution) -> dict[str, float]:
 def _t_value(record: Record, *, stiff: bool) -> float:
     if any(closed_loop_note(record)):
         return float("nan")
-    block, target = integrated_windows(record, stiff=stiff)
+    block, target = integrated_windows(record, record.commanded, stiff=stiff)
     used = block if stiff else np.delete(block, 1, axis=1)
     size = np.linalg.norm(used, axis=0)
     if target.size <= used.shape[1] + 1 or not np.all(np.isfinite(size)) or not np.all(size > 0.0):

@@ -1,15 +1,25 @@
-"""Start values without simulation (equation error): the equation of motion integrated over short windows, by least squares."""
+"""Start values without simulation (equation error): the equation of motion integrated over short windows, by least squares.
+
+A hidden cross state is the measured rate through a first-order lag, so at each damping of a grid its moment is one more column:
+    x' = -d f x - k f^2 p,  x(0) = -(k/d) f p(0)     =>     x = -k f^2 [p through 1/(s + d f), from its steady state at p(0)]
+(effects/_cross_state.py). Without it the hull's damping is that of both modes, far from either where the cross flow is strong.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
+from fieldsid.dynamics.assemble import fin_path
 from fieldsid.fitting.problem.parameters import ParameterLayout, group_name
+from fieldsid.fitting.regression.state_variable_filter import filtered
 from fieldsid.models.axis import NAMES
+from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import BoolArray, FloatArray
+from fieldsid.rounding import nine_digits
 
 INTEGRATION_WINDOW_S = 0.6
 FALLBACK_DAMPING, FALLBACK_STIFFNESS = 0.3, 0.0
@@ -17,18 +27,28 @@ FALLBACK_DAMPING, FALLBACK_STIFFNESS = 0.3, 0.0
 MAX_GROWTH = 1e6
 """Largest growth of a start within a record: no sensor resolves a start to a millionth, so a free run that grows more
 diverges."""
+CROSS_STATE, CROSS_DAMPINGS = ("cross_damping", "cross_rate"), 13
+"""The numbers of a cross state whose moment is the state itself, and the points of the grid of its damping: bounds a factor of a
+hundred apart, by a half each."""
 
 
-def equation_error_start(records: Sequence[Record], layout: ParameterLayout) -> FloatArray:
-    """Return the layout's start vector with the base parameters from windowed equation error."""
-    x = np.array([s.start for s in layout.parameters])
+def equation_error_start(
+    records: Sequence[Record], layout: ParameterLayout, values: Mapping[str, float] = MappingProxyType({})
+) -> FloatArray:
+    """Return a start vector with the base parameters from windowed equation error, the fin moved as the actuators then move it.
+
+    What is not of the base has the value given for its name, otherwise the layout's start.
+    """
+    x = np.array([values.get(s.name, s.start) for s in layout.parameters])
     names, groups = NAMES[layout.axis], layout.groups
     columns = [s.name for s in layout.parameters[: layout.shared]]
     base = [names.damping, *([] if names.stiffness is None else [names.stiffness])]
     base += [*dict.fromkeys(group_name(names.authority, groups, i) for i in range(len(groups.speeds))), names.trim]
     rows, targets = [], []
     for run, record in enumerate(records):
-        block, target = integrated_windows(record, stiff=names.stiffness is not None)
+        own = [i for i, s in enumerate(layout.parameters) if s.run in (-1, run)]
+        path = fin_path(record, layout.effects, {layout.every[i]: float(x[i]) for i in own})
+        block, target = integrated_windows(record, path, stiff=names.stiffness is not None)
         full = np.zeros((len(target), len(base)))
         share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
         full[:, 0] = block[:, 0] * share
@@ -47,10 +67,48 @@ def equation_error_start(records: Sequence[Record], layout: ParameterLayout) -> 
         return x
     longest = max(float(r.time[-1] - r.time[0]) for r in records)
     solution = _stable(matrix, target, longest, stiff=names.stiffness is not None)
-    for name, value in zip(base, solution, strict=True):
+    found = dict(zip(base, solution.tolist(), strict=True)) | _with_cross_state(records, layout, matrix, target, base)
+    for name, value in found.items():
         slot = layout.parameters[columns.index(name)]
         x[columns.index(name)] = float(np.clip(value, slot.low, slot.high))
     return x
+
+
+def _with_cross_state(
+    records: Sequence[Record], layout: ParameterLayout, matrix: FloatArray, target: FloatArray, base: Sequence[str]
+) -> dict[str, float]:
+    """Return the base parameters and the cross state that fit the windows (m,) best together; none where the layout has no such.
+
+    Hull and cross flow may each be unstable alone, so neither's damping is held.
+    """
+    columns = [s.name for s in layout.parameters[: layout.shared]]
+    if not {*CROSS_STATE} <= {*columns} or "strip_munk" in columns:
+        return {}
+    slot = layout.parameters[columns.index(CROSS_STATE[0])]
+    best, least = dict[str, float](), np.inf
+    for damping in np.geomspace(slot.low, slot.high, CROSS_DAMPINGS):
+        column = [_cross_windows(r, layout, run, float(damping)) for run, r in enumerate(records)]
+        full = np.column_stack([matrix, np.concatenate(column)])
+        solution = _solved(full, target)
+        left = nine_digits(float(np.sum((target - full @ solution) ** 2)))
+        if left < least:
+            least = left
+            best = dict(zip((*base, CROSS_STATE[1]), solution.tolist(), strict=True)) | {CROSS_STATE[0]: float(damping)}
+    return best
+
+
+def _cross_windows(record: Record, layout: ParameterLayout, run: int, damping: float) -> FloatArray:
+    """Return the column (m,) of a unit cross rate over the windows of a run."""
+    groups = layout.groups
+    share = _share(groups.run_speeds[run], groups.speeds[groups.reference])
+    rate, ok = _rate(record)
+    h, pace = record.steps, damping * share
+    lagged = filtered(h, rate[:-1], rate[1:], pace)[:, 0] + rate[0] / pace * np.exp(-pace * (record.time - record.time[0]))
+    sums = _integral(0.5 * (lagged[:-1] + lagged[1:]) * h)
+    count = _window(record)
+    if len(record) <= count + 2:
+        return np.zeros(0)
+    return np.asarray(-(share**2) * (sums[count:] - sums[:-count])[_whole(ok, count)])
 
 
 def _stable(matrix: FloatArray, target: FloatArray, length: float, *, stiff: bool) -> FloatArray:
@@ -87,18 +145,18 @@ def _share(speed: float, reference: float) -> float:
     return float(speed / reference) if ok else 1.0
 
 
-def integrated_windows(record: Record, *, stiff: bool) -> tuple[FloatArray, FloatArray]:
-    """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of one run; no angle where not `stiff`."""
+def integrated_windows(record: Record, path: FinPath, *, stiff: bool) -> tuple[FloatArray, FloatArray]:
+    """Return columns (m, 4) [-int p, -int y, int delta, W] and targets (m,) of a run and its fin; no angle where not `stiff`."""
     h = record.steps
     rate, ok = _rate(record)
     angle = (
         np.interp(record.time, record.time[record.angle_ok], record.angle[record.angle_ok]) if record.angle_ok.any() else 0 * rate
     )
-    count = max(2, round(INTEGRATION_WINDOW_S / float(np.median(h))))
+    count = _window(record)
     if len(record) <= count + 2:
         return np.zeros((0, 4)), np.zeros(0)
     sums = [_integral(0.5 * (v[:-1] + v[1:]) * h) for v in (rate, angle)]
-    fin = _integral(record.commanded.mean * h)
+    fin = _integral(path.mean * h)
     time = record.time - record.time[0]
     span = slice(count, None), slice(None, -count)
     parts = [s[span[0]] - s[span[1]] for s in (*sums, fin, time)]
@@ -107,6 +165,11 @@ def integrated_windows(record: Record, *, stiff: bool) -> tuple[FloatArray, Floa
     good = _whole(ok, count)
     block = np.column_stack([-parts[0], -parts[1] if stiff else 0 * parts[1], parts[2], parts[3]])
     return block[good], target[good]
+
+
+def _window(record: Record) -> int:
+    """Return the samples of a window."""
+    return max(2, round(INTEGRATION_WINDOW_S / float(np.median(record.steps))))
 
 
 def _rate(record: Record) -> tuple[FloatArray, BoolArray]:

@@ -6,19 +6,23 @@ from collections.abc import Sequence
 
 from fieldsid.fitting.covariance.reml import MAX_NOISE_SAMPLES, linearise_runs, select_noise, whitened_products
 from fieldsid.fitting.initial.effect_screen import (
+    Linearisation,
     backtrack,
     carry_parameters,
     equivalent_solution,
     linearise_at,
+    scan_points,
     screen_points,
 )
 from fieldsid.fitting.initial.equation_error import equation_error_start
-from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
 from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, white_weights
 from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.noise.whiten import noise_vector
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.rounding import nine_digits
 
 MAX_BUILD_ITERATIONS = 40
 MAX_SCAN_POINTS = 3
@@ -44,7 +48,10 @@ def forward_build(problem: Problem, floor: Noise) -> FloatArray:
             :MAX_SCAN_POINTS
         ]
         effect, current = points[0].effect, points[0].problem
-        x = _best(current, [_refined(current, backtrack(linearisation, p).start, linearisation.noise) for p in points])
+        starts = [backtrack(linearisation, p).start for p in points]
+        if effect.fin is not None:
+            starts.append(_by_equation_error(linearisation, current, effect))
+        x = _best(current, [_refined(current, start, linearisation.noise) for start in starts])
         twin = equivalent_solution(current, x, effect)
         if twin is not None:
             x = _best(current, [x, _refined(current, twin, linearisation.noise)])
@@ -54,6 +61,16 @@ def forward_build(problem: Problem, floor: Noise) -> FloatArray:
         [carry_parameters(layout, (current.layout, x)), _refined(problem, equation_error_start(problem.records, layout), floor)],
     )
     return plausible(problem, x, floor)
+
+
+def _by_equation_error(linearisation: Linearisation, problem: Problem, effect: Effect) -> FloatArray:
+    """Return the start of least cost that equation error has at an actuator's scan points, the other effects as they are.
+
+    Where a model without the actuator fits next to nothing its parameters are no start: no first-order step leads from there.
+    """
+    known = dict(zip(linearisation.problem.layout.names, linearisation.x.tolist(), strict=False))
+    starts = (equation_error_start(problem.records, problem.layout, known | v) for v in scan_points(linearisation, effect))
+    return min(starts, key=lambda x: nine_digits(cost_of(problem, x, linearisation.noise)))
 
 
 def plausible(problem: Problem, x: FloatArray, floor: Noise) -> FloatArray:

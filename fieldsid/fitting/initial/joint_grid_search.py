@@ -25,7 +25,9 @@ def joint_grid_search(square: FloatArray, low: FloatArray, high: FloatArray) -> 
     step that each run alone would take at each point, with the parent's shared parameters projected out of it, step and grid
     points alternate; at last with the parent's shared parameters common to all runs, because an event at a run's start that
     persists is to that run alone equivalent to another trim. The least cost of all these ends counts: runs that had the event all
-    along and runs that never had it change places at little cost.
+    along and runs that never had it change places at little cost. From each end one run's grid point after another goes to where
+    the total cost is least with a step that goes along: a step that one run alone would take, its other parameters its own, may
+    lie far from the common one, and what alternates with a step that is held ends where that lies.
     """
     alone, runs = _schur_complement(square, 1 + low.size), np.arange(square.shape[0])
     starts = _distinct(_first_least(_costs(alone, step)) for step in _single_run_steps(alone, low, high))
@@ -36,7 +38,35 @@ def joint_grid_search(square: FloatArray, low: FloatArray, high: FloatArray) -> 
         step = _bounded_step(square[runs, chosen].sum(axis=0), low, high)
         return nine_digits(float(_costs(square, step)[runs, chosen].sum()))
 
-    return min(ends, key=cost)
+    return min((_descend_run_by_run(square, end, low, high) for end in ends), key=cost)
+
+
+def _descend_run_by_run(
+    square: FloatArray, chosen: npt.NDArray[np.intp], low: FloatArray, high: FloatArray
+) -> npt.NDArray[np.intp]:  # fmt: skip
+    """Return the grid points (R,) from which no run's own leads to a lower total cost, the step taken anew at each."""
+    runs, chosen = np.arange(square.shape[0]), chosen.copy()
+    for _ in range(MAX_GRID_ITERATIONS):
+        before = chosen.copy()
+        for run in runs:
+            others = square[runs, chosen].sum(axis=0) - square[run, chosen[run]]
+            least = _first_least(_least_costs(others + square[run], low, high)[None])[0]
+            chosen[run] = least
+        if (chosen == before).all():
+            break
+    return chosen
+
+
+def _least_costs(square: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the costs (G,) of products (G, 1 + K, 1 + K) after their own steps, their first numbers within their bounds (k,)."""
+    gram, right = square[:, 1:, 1:], square[:, 1:, 0]
+    size = np.sqrt(np.einsum("gii->gi", gram))
+    size[size == 0.0] = 1.0
+    ridge = SINGULAR_EIGENVALUE_SHARE * np.eye(right.shape[1])
+    steps = np.linalg.solve(gram / size[:, None] / size[..., None] + ridge, (right / size)[..., None])[..., 0] / size
+    steps[:, : low.size] = np.clip(steps[:, : low.size], low, high)
+    rows = np.concatenate([np.ones((len(steps), 1)), -steps], axis=1)
+    return np.asarray(np.einsum("gi,gij,gj->g", rows, square, rows))
 
 
 def _distinct(points: Iterable[npt.NDArray[np.intp]]) -> list[npt.NDArray[np.intp]]:

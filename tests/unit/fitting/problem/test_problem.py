@@ -10,6 +10,7 @@ from short_way import compare_with_the_general_core
 from truth.paper import PITCH, YAW, YawRow, paper_run
 
 from fieldsid.diagnosis.evidence.scored_model import bare_model
+from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.optimise import chunked
 from fieldsid.fitting.optimise.levenberg_marquardt import GaussianPrior, cost_of, levenberg_marquardt, normal_equations
@@ -40,7 +41,8 @@ def problem_of(records, effects=()):
 
 def moved_start(problem):
     """A start off every symmetric point: base parameters near the truth, effects a little from zero."""
-    x = equation_error_start(problem.records, problem.layout)
+    base = problem.with_effects(()).layout
+    x = carry_parameters(problem.layout, (base, equation_error_start(problem.records, base)))
     for i, slot in enumerate(problem.layout.parameters):
         if x[i] in (slot.low, 0.0):
             x[i] = min(slot.low + 0.05, 0.5 * slot.high) if slot.low >= 0 else 0.02
