@@ -9,7 +9,6 @@ a delayed, a limited, a freed fin is exactly between two held commands, or strai
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from fieldsid.models.fin_path import FinPath
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 
-Map = Callable[[FloatArray], FloatArray]
 Part = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], object]
 """(steps, start, end, out): fills out (k, 4) with a line's start and end, and where the fin itself begins and ends."""
 STRAIGHT_RAD = 1e-6
@@ -33,14 +31,14 @@ def through(path: FinPath, steps: FloatArray, part: Part) -> FinPath:
     if path.first is None or path.last is None:
         out = np.empty((steps.size, 4))
         part(steps, path.start, path.end, out)
-        return FinPath(*(out[:, i].copy() for i in range(4)))
+        return FinPath(*np.ascontiguousarray(out.T))
     pieces = np.empty((3 * steps.size, 4))
     count = split(steps, path.start, path.end, path.first, path.last, pieces)
-    lengths, start, end = (pieces[:count, i].copy() for i in range(3))
+    lengths, start, end, _ = np.ascontiguousarray(pieces[:count].T)
     out, joined = np.empty((count, 4)), np.empty((steps.size, 4))
     part(lengths, start, end, out)
     join(pieces[:count], out, joined)
-    return FinPath(*(joined[:, i].copy() for i in range(4)))
+    return FinPath(*np.ascontiguousarray(joined.T))
 
 
 @jit
@@ -116,58 +114,3 @@ def line_of_two_pieces(bend: float, first: float, middle: float, last: float) ->
     """
     excess = middle - (first + (last - first) * bend)
     return first + excess * (1.0 - bend), last + excess * bend
-
-
-def bend(x: FloatArray, blend: float) -> FloatArray:
-    """Return max(x, 0), its corner rounded over about `blend` to either side: (x + sqrt(x^2 + blend^2)) / 2."""
-    if blend == 0.0:
-        return np.maximum(x, 0.0)
-    return np.asarray(0.5 * (x + np.hypot(x, blend)))
-
-
-def area_of_bend(x: FloatArray, blend: float) -> FloatArray:
-    """Return an antiderivative of `bend`."""
-    if blend == 0.0:
-        return np.asarray(0.5 * x * np.maximum(x, 0.0))
-    return np.asarray(0.25 * (x * x + x * np.hypot(x, blend) + blend**2 * np.arcsinh(x / blend)))
-
-
-@dataclass(frozen=True, slots=True)
-class Beyond:
-    """The part of an angle d beyond +/-edge, sign(d) max(|d| - edge, 0), its corners rounded over `blend`; zero at zero."""
-
-    edge: float
-    blend: float
-
-    def value(self, d: FloatArray) -> FloatArray:
-        """Return the part beyond, (n,) rad."""
-        at_zero = bend(np.array(-self.edge), self.blend)
-        return np.asarray(np.sign(d) * (bend(np.abs(d) - self.edge, self.blend) - at_zero))
-
-    def area(self, d: FloatArray) -> FloatArray:
-        """Return its integral from zero, (n,) rad^2."""
-        zero, size = np.array(-self.edge), np.abs(d)
-        return np.asarray(
-            area_of_bend(size - self.edge, self.blend) - area_of_bend(zero, self.blend) - bend(zero, self.blend) * size
-        )
-
-
-def through_map(path: FinPath, steps: FloatArray, value: Map, area: Map) -> FinPath:
-    """Return a path seen through a static map d -> value(d), with area(d) the integral of value from 0 to d.
-
-    The mean over a piece is (area(end) - area(start)) / (end - start), exact across kinks. Arrays (n-1,) rad and s.
-    """
-    if path.first is None and (np.abs(path.end - path.start) <= STRAIGHT_RAD).all():
-        held = value(path.mean)
-        return FinPath(held, held)
-
-    def mapped(_lengths: FloatArray, start: FloatArray, end: FloatArray, out: FloatArray) -> None:
-        change = end - start
-        moves = np.abs(change) > STRAIGHT_RAD
-        safe = np.where(moves, change, 1.0)
-        mean = np.where(moves, (area(end) - area(start)) / safe, value(0.5 * (start + end)))
-        out[:, 2], out[:, 3] = value(start), value(end)
-        half = 0.5 * (out[:, 3] - out[:, 2])
-        out[:, 0], out[:, 1] = mean - half, mean + half
-
-    return through(path, steps, mapped)

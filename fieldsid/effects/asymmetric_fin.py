@@ -7,9 +7,7 @@ Source: Bertram 2012, Practical Ship Hydrodynamics, chapter 6.
 
 from __future__ import annotations
 
-import numpy as np
-
-from fieldsid.effects._paths import through_map
+from fieldsid.effects._static_map import StaticMap
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
 from fieldsid.models.fin_path import FinPath
@@ -21,12 +19,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     more, bend = values["asymmetry"], values.get("lift_bend", 0.0)
     if more == 0.0 and bend == 0.0:
         return path
-    return through_map(
-        path,
-        record.steps,
-        lambda d: d + more * np.abs(d) + bend * d * d,
-        lambda d: 0.5 * d * d * (1.0 + more * np.sign(d)) + bend / 3.0 * d * d * d,
-    )
+    return StaticMap(proportional=1.0, one_sided=more, square=bend).through(path, record.steps)
 
 
 EFFECT = Effect(

@@ -9,10 +9,9 @@ with Actuator and Sensor Nonlinearities.
 
 from __future__ import annotations
 
-import numpy as np
-
 from fieldsid.effects._fin_reach import shares_of_reach
-from fieldsid.effects._paths import Beyond, through, through_map
+from fieldsid.effects._paths import through
+from fieldsid.effects._static_map import StaticMap
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
 from fieldsid.models.fin_path import FinPath
@@ -71,15 +70,8 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
         return through(path, record.steps, lambda _steps, start, end, out: held_on(start, end, width, lost, let_go, out))
     if "off_middle" in values:
         path = path.moved(-values["off_middle"] * width)
-    beyond = Beyond(width, values.get("deadband_blend", 0.0))
-
-    def value(d: FloatArray) -> FloatArray:
-        return beyond.value(d) + kept * width * np.sign(d) * (np.abs(d) > width)
-
-    def area(d: FloatArray) -> FloatArray:
-        return beyond.area(d) + kept * width * np.maximum(np.abs(d) - width, 0.0)
-
-    return through_map(path, record.steps, value, area)
+    zone = StaticMap(beyond=1.0, edge=width, blend=values.get("deadband_blend", 0.0), jump=kept * width)
+    return zone.through(path, record.steps)
 
 
 WIDTH = Coefficient("width", "rad", 0.0, 0.2, 0.03, step=5e-4, says="half width of the dead zone")

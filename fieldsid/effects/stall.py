@@ -8,10 +8,8 @@ report 933 (lift of low-aspect-ratio control surfaces).
 
 from __future__ import annotations
 
-import numpy as np
-
 from fieldsid.effects._fin_reach import shares_of_reach
-from fieldsid.effects._paths import Beyond, through_map
+from fieldsid.effects._static_map import StaticMap
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Values, Variant
 from fieldsid.models.fin_path import FinPath
@@ -20,14 +18,15 @@ from fieldsid.models.record import Record
 
 def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     """Return the path of the effective angle, (n-1,) rad."""
-    angle, lost, blend = values["stall_angle"], 1.0 - values["slope_after"], values.get("stall_blend", 0.0)
-    beyond, drop = Beyond(angle, blend), values.get("stall_drop", 0.0) * angle
-    return through_map(
-        path,
-        record.steps,
-        lambda d: d - lost * beyond.value(d) - drop * np.sign(d) * (np.abs(d) > angle),
-        lambda d: 0.5 * d * d - lost * beyond.area(d) - drop * np.maximum(np.abs(d) - angle, 0.0),
+    angle = values["stall_angle"]
+    bend = StaticMap(
+        proportional=1.0,
+        beyond=values["slope_after"] - 1.0,
+        edge=angle,
+        blend=values.get("stall_blend", 0.0),
+        jump=-values.get("stall_drop", 0.0) * angle,
     )
+    return bend.through(path, record.steps)
 
 
 ANGLE = Coefficient("stall_angle", "rad", 0.03, 0.6, 0.2, step=5e-4, says="angle where the lift falls off")

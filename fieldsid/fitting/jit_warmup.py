@@ -101,6 +101,7 @@ def _effects() -> None:
     for own in (*((e,) for e in effects), at_fin, *((with_variant(e, f),) for e in at_fin for f in e.variants)):
         more = problem.with_effects(own)
         more.linearise(more.start(), 0)
+        equation_error_start(more.records, more.layout)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,6 @@ import pytest
 from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measured, with_moments
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.effects import all_effects, pick_effect
-from fieldsid.effects._paths import Beyond
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Motion, as_fitted, with_variant
 from fieldsid.models.fin_path import FinPath
@@ -75,14 +74,6 @@ def test_a_form_is_the_textbooks_at_its_neutral_numbers_and_not_elsewhere(name, 
     np.testing.assert_allclose(shown(shaped, values, log), shown(effect, effect.starts(), log), atol=1e-6)
     other = effect.starts() | {c.name: GENTLE.get(c.name, c.low + 0.45 * (c.high - c.low)) for c in form.coefficients}
     assert np.abs(shown(shaped, other, log) - shown(effect, effect.starts(), log)).max() > 1e-4
-
-
-@pytest.mark.parametrize("blend", [0.0, 0.02, 0.1])
-def test_the_area_of_a_rounded_edge_is_the_integral_of_its_value(blend):
-    beyond, d = Beyond(0.12, blend), np.linspace(-0.5, 0.5, 2001)
-    slope = np.gradient(beyond.area(d), d)
-    np.testing.assert_allclose(slope[1:-1], beyond.value(d)[1:-1], atol=2e-4)
-    assert beyond.area(np.zeros(1))[0] == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize(("lag", "share"), [(0.3, 0.5), (0.3, 0.25), (0.3, 0.1), (0.08, 0.5), (1.0, 2.0)])
