@@ -163,7 +163,8 @@ def _sources(named: Any, folder: Path) -> tuple[Source, ...]:
 
 def _found(named: str, folder: Path) -> Path | None:
     """Return where a file is that was named from the folder, from the one above it, or from where the program runs."""
-    places = (folder / named, folder.parent / named, Path(named))
+    # the folder above the working folder, "." as a rule, is none of its path
+    places = (folder / named, folder.resolve().parent / named, Path(named))
     return next((p.resolve() for p in places if p.exists()), None)
 
 

@@ -6,6 +6,7 @@ import json
 import shlex
 from dataclasses import replace
 from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -235,6 +236,18 @@ def test_a_run_that_is_gone_is_said_and_makes_nothing_stale(run_cli, folder):
     (folder / "runs" / "pulses_1.4.parquet").unlink()
     (model,) = (f for f in run_cli("status", "--json").json["files"] if f["kind"] == "model")
     assert (model["missing"], model["stale"]) == (["runs/pulses_1.4.parquet"], None)
+
+
+def test_inputs_named_from_the_folder_above_are_found_from_inside_and_from_above(run_cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for speed in (1.0, 1.4):
+        trial.flown(tmp_path / "day" / "runs", speed=speed, name=f"pulses_{speed}")
+    assert (
+        run_cli("identify", "--axis", "yaw", "--no-figures", *(f"day/{run}" for run in BOTH_RUNS), "-o", "day/models").code == 0
+    )
+    for place, folder in ((tmp_path, Path("day")), (tmp_path / "day", Path())):
+        monkeypatch.chdir(place)
+        assert all(item.missing == () for item in state_of(folder).items)
 
 
 def test_a_line_that_a_power_cut_left_is_told_and_the_next_one_stands_by_itself(run_cli, folder):
