@@ -9,6 +9,7 @@ from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, Stretch, places, stretches
 from fieldsid.comparison.metrics import Metrics, metrics
 from fieldsid.comparison.residuals import Companion, companions
+from fieldsid.comparison.sufficient import is_noise
 from fieldsid.display import Brief, Plotted
 from fieldsid.dynamics.free_run import base_at
 from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit, goodness_of_fit
@@ -19,9 +20,6 @@ from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import record_of
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.rounding import MANY
-
-DOWN_TO_NOISE = 1.15
-"""Rms over the noise up to which a channel has nothing left to show: the noise is itself an estimate."""
 
 
 def left_in_words(over_floor: float, fit: float, digits: int = 1) -> str:
@@ -51,7 +49,7 @@ class Channel(Brief):
     @property
     def fails(self) -> bool:
         """Whether more is left than the sensor's noise."""
-        return self.over_floor > DOWN_TO_NOISE
+        return not is_noise(self.over_floor)
 
     @property
     def badness(self) -> tuple[float, float]:

@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from fieldsid.comparison.sufficient import over_noise
 from fieldsid.planning.design.leg import error_in_words
 from fieldsid.rounding import number
 
 Result = Mapping[str, Any]
-
-
-def over_noise(fit: Result, floor: Result) -> float:
-    """Return the worse channel's error over its noise."""
-    pairs = ((fit["angle_rms_rad"], floor["angle_rad"]), (fit["rate_rms_rad_s"], floor["rate_rad_s"]))
-    return max(float(rms) / float(noise) for rms, noise in pairs if rms and noise)
 
 
 def relative(parameter: Result) -> float:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Formatter
 
+from fieldsid.comparison.sufficient import is_noise, over_noise
 from fieldsid.demo import briefs
 from fieldsid.demo.trial import CHECK_SPEEDS, PLANNED_SPEED
 from fieldsid.demo.vehicle import LIMITS
@@ -22,7 +23,6 @@ from fieldsid.rounding import number, with_error
 from fieldsid.turning.known_radius import turn_words
 
 Result = briefs.Result
-NEAR_NOISE = 1.15
 CHECKED = " ".join(f"--validate {{runs}}/check_{speed:.1f}.parquet" for speed in CHECK_SPEEDS)
 """The runs that judge; the option stands before each, as a shell gives only the first of a pattern's files to an option."""
 
@@ -110,14 +110,14 @@ def _identified(result: Result) -> str:
         f"{number(f['speed_m_s'], 2)} m/s: {with_error(f['parameters'][name]['value'], f['parameters'][name]['std_error'])}"
         for f in fits
     )
-    return f"{name} over speed is {parts} 1/s. " + _verdict(max(briefs.over_noise(f, f["noise_floor"]) for f in fits))
+    return f"{name} over speed is {parts} 1/s. " + _verdict(max(over_noise(f, f["noise_floor"]) for f in fits))
 
 
 def _joined(result: Result) -> str:
     fit = result["fits"][0]
     return (
         f"One model for {len(fit['runs'])} speeds: damping shared, authority by speed. "
-        + _verdict(briefs.over_noise(fit, fit["noise_floor"]))
+        + _verdict(over_noise(fit, fit["noise_floor"]))
         + " Its judge are runs it has not seen."
     )
 
@@ -182,7 +182,7 @@ def _held(result: Result) -> str:
 
 
 def _refitted(result: Result) -> str:
-    left = max(briefs.over_noise(f, f["noise_floor"]) for f in result["fits"])
+    left = max(over_noise(f, f["noise_floor"]) for f in result["fits"])
     name = next(iter(result["fits"][0]["parameters"]))
     said = {
         f["run"]: f"{100 * briefs.relative(f['parameters'][name]):.1f} %" for f in result["fits"] if f["run"].startswith("learn")
@@ -247,7 +247,7 @@ def _reported(result: Result) -> str:
 
 
 def _verdict(ratio: float) -> str:
-    if ratio <= NEAR_NOISE:
+    if is_noise(ratio):
         return f"What is left is {ratio:.2f} x the sensors' noise: nothing more to explain."
     return f"What is left is {ratio:.1f} x the sensors' noise: the model's form, not its numbers, lacks something."
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from math import exp
 
+from fieldsid.comparison import sufficient
+
 # ----- prior odds
 
 ALTERNATIVE_LOG_ODDS = 6.0
@@ -40,8 +42,8 @@ EQUAL_ERROR_RATIO = 1.03
 
 EXPLAINED_ERROR_RATIO = 1.02
 """Error over the floor up to which the error counts as noise."""
-SUFFICIENT_ERROR_RATIO = 1.15
-"""Error over the floor below which the model is sufficient."""
+SUFFICIENT_ERROR_RATIO = sufficient.SUFFICIENT_ERROR_RATIO
+"""Error over the floor below which the model is sufficient: the limit of every other room too."""
 MISSING_ERROR_RATIO = 1.5
 """Error over the floor above which something is missing, even where no effect in its textbook variant gains evidence; above which
 a fit may be at a local minimum; and which the right effect rarely leaves."""

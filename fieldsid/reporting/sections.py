@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid._version import __version__
-from fieldsid.comparison.compare import DOWN_TO_NOISE, Channel, Comparison, left_in_words
+from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.reporting import figures
 from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
@@ -55,7 +55,7 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
         over = exp(sum(log(c.leading.over_floor) for c in judged) / len(judged))
         on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
         worst = max(judged, key=lambda c: c.leading.badness)
-        good = worst.leading.over_floor <= DOWN_TO_NOISE
+        good = not worst.leading.fails
         tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
         most = f", {worst.leading.over_floor:.2f} x on {worst.run}" if len(judged) > 1 and not good else ""
         says = f"error {over:.2f} x the noise on {on}{most}{tail}" if over < MANY else _without_noise(judged, on)

@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from fieldsid.artifacts import sha256_of
+from fieldsid.comparison.sufficient import is_noise
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.rounding import MANY
@@ -22,8 +24,6 @@ DONE = (0, 1)
 """Exit codes of a command that gave a result."""
 
 REPORT = "sysid report"
-MORE_THAN_NOISE = 1.15
-"""The error over the noise floor above which something is missing, as in `diagnosis/thresholds.py`: here without its imports."""
 PORT = 14550
 """The UDP port that a ground station usually listens on."""
 TAKES_ALL_RUNS = ("identify", "diagnose")
@@ -134,8 +134,8 @@ def _model(state: FolderState) -> tuple[str, str] | None:
 
 def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     """Return how to ask what an extended model still lacks, by its own record, where no diagnosis asked since it was made."""
-    left = _left_by(best)
-    if not left > MORE_THAN_NOISE:
+    left = left_by(best.body or {})
+    if is_noise(left):
         return None
     place = state.place(best)
     now = sha256_of(place)
@@ -149,9 +149,9 @@ def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
     )
 
 
-def _left_by(model: Item) -> float:
+def left_by(model: Mapping[str, Any]) -> float:
     """Return the error over the noise floor that an extended model leaves, the larger of fitted and unseen runs; else NaN."""
-    record = ((model.body or {}).get("info") or {}).get("extension") or {}
+    record = (model.get("info") or {}).get("extension") or {}
     over = [_over(errors, record.get("noise_floor") or {}) for errors in (record.get("after") or {}).values()]
     return max((o for o in over if isfinite(o)), default=float("nan"))
 

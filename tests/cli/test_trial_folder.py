@@ -418,6 +418,19 @@ def test_status_goes_on_from_an_extended_model_as_extend_itself_does(run_cli, fo
     assert run_cli("status", "--json").json["next"]["command"] == next_
 
 
+def test_compare_asks_as_status_does_what_is_left_of_a_model_that_leaves_more_where_it_was_extended(run_cli, folder):
+    assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
+    trial.flown(folder / "runs", speed=1.2, name="pulses_1.2")
+    model = "models/joint_yaw+servo_lag.yaml"
+    for left, next_ in ((1.75, "sysid diagnose"), (1.05, "sysid turn-radius")):
+        extended(folder, left)
+        whole = yaml.safe_load((folder / model).read_text())
+        (folder / model).write_text(yaml.safe_dump(whole | {"effects": []}))
+        answer = run_cli("compare", model, "runs/pulses_1.2.parquet", "--no-figures")
+        assert "nothing is left but the noise" in answer.out
+        assert f"next: {next_}" in answer.out
+
+
 def test_gains_of_a_model_that_was_extended_since_are_designed_again_verified_again_and_reported_again(run_cli, folder):
     assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
     diagnosis(folder, ("pulses_1.0", "pulses_1.4"), effects=())

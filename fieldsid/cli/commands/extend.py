@@ -20,6 +20,7 @@ from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, Output
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
 from fieldsid.cli.voice import shown_in
+from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
 
 if TYPE_CHECKING:
@@ -133,10 +134,8 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
 
 def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
     """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
-    from fieldsid.diagnosis.thresholds import SUFFICIENT_ERROR_RATIO
-
     fitted, unseen = found.gain.left(kept=body["kept"])
-    more = any(error > SUFFICIENT_ERROR_RATIO for error in (fitted, unseen))
+    more = not all(is_noise(error) for error in (fitted, unseen))
     if more:
         reading = ("--mapping", mapping) if mapping is not None else ()
         judged = repeated("--validate", validate)

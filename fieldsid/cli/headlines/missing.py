@@ -9,8 +9,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, is_noise, named, times, used
+from fieldsid.cli.headlines.words import Body, counted, named, times, used
 from fieldsid.cli.voice import shown_in
+from fieldsid.comparison.sufficient import is_noise
 from fieldsid.rounding import MANY, number, probability
 
 MODELS = "models"

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, is_noise, named, over_noise, used
+from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, named, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
+from fieldsid.comparison.sufficient import is_noise, over_noise
 from fieldsid.rounding import MANY, number
 
 
@@ -89,10 +90,13 @@ def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Head
 
 
 def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:
-    """Return what to do with a model that does or does not follow its runs."""
+    """Return what to do with a model that does or does not follow its runs; one may leave more on those it was extended on."""
+    from fieldsid.artifacts import read_yaml
     from fieldsid.models.model import load_model
+    from fieldsid.trial_folder.next_step import left_by
 
-    if not fails or _searched(Path(model)):
+    more = fails or not is_noise(left_by(read_yaml(Path(model))))
+    if not more or _searched(Path(model)):
         return used(axis, model)
     fitted = [p for p in inputs if is_there(p)]
     unseen = [p for p in runs if p.resolve() not in {f.resolve() for f in fitted}]

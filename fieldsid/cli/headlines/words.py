@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any
 
 from fieldsid.cli.headlines.typed import pasted
@@ -26,22 +25,9 @@ def named(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def over_noise(errors: Body, floor: Body) -> float:
-    """Return the worse channel's free-run error over its noise; NaN where neither was measured."""
-    pairs = ((errors["angle_rms_rad"], floor["angle_rad"]), (errors["rate_rms_rad_s"], floor["rate_rad_s"]))
-    return max((float(e) / float(f) for e, f in pairs if e and f and isfinite(e) and isfinite(f)), default=float("nan"))
-
-
 def times(over: float) -> str:
     """Return an error over the noise floor; far above it decimals say nothing."""
     return f"{over:.2f}" if over < MANY else number(over, 3)
-
-
-def is_noise(over: float) -> bool:
-    """Whether an error over the noise floor is the noise alone, by the rule of every verdict."""
-    from fieldsid.diagnosis.thresholds import SUFFICIENT_ERROR_RATIO
-
-    return not over > SUFFICIENT_ERROR_RATIO
 
 
 def used(axis: str, model: str) -> str:
