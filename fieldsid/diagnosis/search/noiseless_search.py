@@ -28,13 +28,13 @@ from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAX_FREE_RUN_ERROR_RATIO, MIN_BASE_ERROR_SHARE
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, carry_parameters, linearise_at, screen_effect
-from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.initial.equation_error import equation_error_starts
 from fieldsid.models.effect import Effect
 
 MAX_EFFECTS_TRIED, BEAM_WIDTH, MAX_EFFECTS = 8, 2, 3
 """Effects followed from each model, in the order of their screen: that of a slow cross state says little before the fit."""
 FIRST_ITERATIONS, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE = 25, 60, 1e-7
-"""Iterations from each of two starts, those of the better one, and the share of its sum of squares that an iteration must gain:
+"""Iterations from each start, those of the better one, and the share of its sum of squares that an iteration must gain:
 convergence is slow, and the sets are in their order long before its end. With 200 in place of 60 a tanker's towing-tank runs took
 half as long again, and of four choices of judged runs two named the same and two a stall or an event for the damping."""
 
@@ -199,7 +199,7 @@ def _charge(search: Search, fitted: FittedProblem) -> float:
 
 
 def _forward_candidates(search: Search, current: FittedProblem) -> list[FreeRunFit]:
-    """Return the fits with one effect more, for the effects of lowest predicted cost, from two starts each."""
+    """Return the fits with one effect more, for the effects of lowest predicted cost, each from every start there is."""
     linearisation = linearise_at(current.problem, current.x, current.weights)
     left = [e for e in search.catalogue if e.name not in current.names]
     screened_points = sorted(search.parallel.map(partial(screen_effect, linearisation), left), key=lambda p: p.predicted_cost)
@@ -208,7 +208,7 @@ def _forward_candidates(search: Search, current: FittedProblem) -> list[FreeRunF
         search.report("+".join((*current.names, screened.effect.name)))
         problem = screened.problem
         # the base may be biased: the equation-error start and declared start values know nothing of it
-        starts = (backtrack(linearisation, screened).start, equation_error_start(problem.records, problem.layout))
+        starts = (backtrack(linearisation, screened).start, *equation_error_starts(problem.records, problem.layout))
         begun = (fit_output_error(problem, x, current.weights, FIRST_ITERATIONS, COST_TOLERANCE) for x in starts)
         better = min(begun, key=lambda t: t.weights.angle * t.weights.rate)
         return _evaluate(search, fit_output_error(problem, better.x, better.weights, MAX_FREE_RUN_ITERATIONS, COST_TOLERANCE))

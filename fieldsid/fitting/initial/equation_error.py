@@ -8,6 +8,7 @@ A hidden cross state is the measured rate through a first-order lag, so at each 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -32,6 +33,16 @@ CROSS_STATE, CROSS_DAMPINGS = ("cross_damping", "cross_rate"), 13
 hundred apart, by a half each."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Windows:
+    """The windows of all runs: columns (m, k) of the base parameters named, targets (m,), and the parameters' declared start."""
+
+    matrix: FloatArray
+    target: FloatArray
+    names: tuple[str, ...]
+    declared: FloatArray
+
+
 def equation_error_start(
     records: Sequence[Record], layout: ParameterLayout, values: Mapping[str, float] = MappingProxyType({})
 ) -> FloatArray:
@@ -39,9 +50,24 @@ def equation_error_start(
 
     What is not of the base has the value given for its name, otherwise the layout's start.
     """
+    windows = _windows_of(records, layout, values)
+    return windows.declared if _unusable(windows) else _plain(records, layout, windows)
+
+
+def equation_error_starts(records: Sequence[Record], layout: ParameterLayout) -> tuple[FloatArray, ...]:
+    """Return the start vectors that equation error has: without a cross state's moment, and with it where the layout has one.
+
+    Noise in the rate and whatever else is missing bend the second more than the first, and it may lie far from any hull.
+    """
+    windows = _windows_of(records, layout, {})
+    if _unusable(windows):
+        return (windows.declared,)
+    return (_plain(records, layout, windows), *_with_cross_state(records, layout, windows))
+
+
+def _windows_of(records: Sequence[Record], layout: ParameterLayout, values: Mapping[str, float]) -> _Windows:
     x = np.array([values.get(s.name, s.start) for s in layout.parameters])
     names, groups = NAMES[layout.axis], layout.groups
-    columns = [s.name for s in layout.parameters[: layout.shared]]
     base = [names.damping, *([] if names.stiffness is None else [names.stiffness])]
     base += [*dict.fromkeys(group_name(names.authority, groups, i) for i in range(len(groups.speeds))), names.trim]
     rows, targets = [], []
@@ -59,42 +85,50 @@ def equation_error_start(
         full[:, -1] = block[:, 3] * (share**2 if groups.trim_of_fin else 1.0)
         rows.append(full)
         targets.append(target)
-    matrix, target = np.concatenate(rows), np.concatenate(targets)
+    return _Windows(np.concatenate(rows), np.concatenate(targets), tuple(base), x)
+
+
+def _unusable(windows: _Windows) -> bool:
+    """Return whether there is no least squares: too few windows, or numbers whose squares no float holds, garbage in a log."""
     with np.errstate(over="ignore", invalid="ignore"):
-        length = float(np.linalg.norm(matrix) + np.linalg.norm(target))
-    # of numbers whose squares no float holds, garbage in a log, there is no least squares
-    if len(target) < len(base) or not np.isfinite(length):
-        return x
+        length = float(np.linalg.norm(windows.matrix) + np.linalg.norm(windows.target))
+    return len(windows.target) < len(windows.names) or not np.isfinite(length)
+
+
+def _plain(records: Sequence[Record], layout: ParameterLayout, windows: _Windows) -> FloatArray:
     longest = max(float(r.time[-1] - r.time[0]) for r in records)
-    solution = _stable(matrix, target, longest, stiff=names.stiffness is not None)
-    found = dict(zip(base, solution.tolist(), strict=True)) | _with_cross_state(records, layout, matrix, target, base)
+    solution = _stable(windows.matrix, windows.target, longest, stiff=NAMES[layout.axis].stiffness is not None)
+    return _placed(layout, windows, dict(zip(windows.names, solution.tolist(), strict=True)))
+
+
+def _placed(layout: ParameterLayout, windows: _Windows, found: Mapping[str, float]) -> FloatArray:
+    """Return the declared start with the numbers found, within their bounds."""
+    x, columns = windows.declared.copy(), [s.name for s in layout.parameters[: layout.shared]]
     for name, value in found.items():
         slot = layout.parameters[columns.index(name)]
         x[columns.index(name)] = float(np.clip(value, slot.low, slot.high))
     return x
 
 
-def _with_cross_state(
-    records: Sequence[Record], layout: ParameterLayout, matrix: FloatArray, target: FloatArray, base: Sequence[str]
-) -> dict[str, float]:
-    """Return the base parameters and the cross state that fit the windows (m,) best together; none where the layout has no such.
+def _with_cross_state(records: Sequence[Record], layout: ParameterLayout, windows: _Windows) -> list[FloatArray]:
+    """Return the start whose base parameters and cross state fit the windows best together; none where the layout has no such.
 
     Hull and cross flow may each be unstable alone, so neither's damping is held.
     """
     columns = [s.name for s in layout.parameters[: layout.shared]]
     if not {*CROSS_STATE} <= {*columns} or "strip_munk" in columns:
-        return {}
+        return []
     slot = layout.parameters[columns.index(CROSS_STATE[0])]
     best, least = dict[str, float](), np.inf
     for damping in np.geomspace(slot.low, slot.high, CROSS_DAMPINGS):
         column = [_cross_windows(r, layout, run, float(damping)) for run, r in enumerate(records)]
-        full = np.column_stack([matrix, np.concatenate(column)])
-        solution = _solved(full, target)
-        left = nine_digits(float(np.sum((target - full @ solution) ** 2)))
+        full = np.column_stack([windows.matrix, np.concatenate(column)])
+        solution = _solved(full, windows.target)
+        left = nine_digits(float(np.sum((windows.target - full @ solution) ** 2)))
         if left < least:
             least = left
-            best = dict(zip((*base, CROSS_STATE[1]), solution.tolist(), strict=True)) | {CROSS_STATE[0]: float(damping)}
-    return best
+            best = dict(zip((*windows.names, CROSS_STATE[1]), solution.tolist(), strict=True)) | {CROSS_STATE[0]: float(damping)}
+    return [_placed(layout, windows, best)]
 
 
 def _cross_windows(record: Record, layout: ParameterLayout, run: int, damping: float) -> FloatArray:

@@ -14,7 +14,7 @@ from fieldsid.fitting.initial.effect_screen import (
     scan_points,
     screen_points,
 )
-from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.initial.equation_error import equation_error_start, equation_error_starts
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
 from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, white_weights
 from fieldsid.fitting.problem.problem import Problem
@@ -56,10 +56,8 @@ def forward_build(problem: Problem, floor: Noise) -> FloatArray:
         if twin is not None:
             x = _best(current, [x, _refined(current, twin, linearisation.noise)])
         left.remove(effect)
-    x = _best(
-        problem,
-        [carry_parameters(layout, (current.layout, x)), _refined(problem, equation_error_start(problem.records, layout), floor)],
-    )
+    anew = (_refined(problem, start, floor) for start in equation_error_starts(problem.records, layout))
+    x = _best(problem, [carry_parameters(layout, (current.layout, x)), *anew])
     return plausible(problem, x, floor)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.effects import pick_effect
-from fieldsid.fitting.initial.equation_error import equation_error_start
+from fieldsid.fitting.initial.equation_error import equation_error_starts
 from fieldsid.fitting.problem.parameters import layout_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise
@@ -38,7 +38,7 @@ def flown(axis, effect, values, speed, seed, noise):
 def test_a_start_with_a_cross_state_is_near_the_hull_that_has_it(axis, effect, values):
     records = tuple(flown(axis, effect, values, speed, seed, 1e-3) for seed, speed in enumerate((0.9, 1.2, 1.6), 1))
     layout = layout_of(records, axis, (pick_effect(effect),))
-    start = dict(zip(layout.names, equation_error_start(records, layout), strict=False))
+    start = dict(zip(layout.names, equation_error_starts(records, layout)[-1], strict=False))
     for name in ("cross_damping", "cross_rate", NAMES[axis].damping, NAMES[axis].authority):
         assert start[name] == pytest.approx(values[name], rel=0.5), name
 
@@ -52,6 +52,6 @@ def test_what_a_cross_state_starts_from_is_what_a_steady_turn_has_built_up():
         angle_ok=whole.angle_ok[cut], rate_ok=whole.rate_ok[cut],
     )  # fmt: skip
     layout = layout_of((late,), axis, (pick_effect(effect),))
-    start = dict(zip(layout.names, equation_error_start((late,), layout), strict=False))
+    start = dict(zip(layout.names, equation_error_starts((late,), layout)[-1], strict=False))
     assert start["cross_damping"] == pytest.approx(values["cross_damping"], rel=0.5)
     assert start["cross_rate"] == pytest.approx(values["cross_rate"], rel=0.5)
