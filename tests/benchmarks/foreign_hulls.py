@@ -113,7 +113,8 @@ def flight(hull, speed, command, what):
     states, _ = fly(h, speed, told, np.full(command.size, OPEN), settings, SAMPLE_S, water(time_s, what, moment))
     heading, rate = states[:, 3].copy(), states[:, 2].copy()
     if what.name == "compass_deviation":
-        heading += what.strength * np.sin(heading - what.phase)
+        # what it is at the start belongs to the start: no log shows it
+        heading += what.strength * (np.sin(heading - what.phase) - np.sin(heading[0] - what.phase))
     if what.name == "gyro_bias":
         rate += what.side * what.strength
     return np.stack([heading, rate, states[:, 0], states[:, 1]])

@@ -146,7 +146,9 @@ def prefer_smaller_equivalent(ml_fit: LikelihoodFit, effect: Effect) -> Likeliho
     other = equivalent_solution(problem, ml_fit.fitted.x, effect)
     if other is None:
         return ml_fit
-    twin = fit_maximum_likelihood(problem, other, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)
+    # on its way it is left where it cannot reach the other: no penalty is larger
+    most = ml_fit.log_likelihood - ALTERNATIVE_LOG_ODDS * len(ml_fit.fitted.effects)
+    twin = fit_maximum_likelihood(problem, other, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind, rival=most)
     own, others = (j.log_likelihood - exchange_penalty(j) for j in (ml_fit, twin))
     return twin if others > own else ml_fit
 

@@ -16,12 +16,13 @@ Names = frozenset[str]
 class Progress:
     """What was done under one set of assumptions, by set of effects.
 
-    The spec that stands for it, whether it was expanded, and the log evidence at which variants of its effects were tried; and
-    the specs that were fitted without each of their effects.
+    The spec that stands for it; whether it was expanded, and from its other solutions too; the log evidence at which variants of
+    its effects were tried; and the specs that were fitted without each of their effects.
     """
 
     standing: dict[Names, ModelSpec] = field(default_factory=dict)
     expanded: set[Names] = field(default_factory=set)
+    expanded_from_others: set[Names] = field(default_factory=set)
     evidence_at_variants: dict[tuple[Names, Names], float] = field(default_factory=dict)
     thinned: set[ModelSpec] = field(default_factory=set)
 

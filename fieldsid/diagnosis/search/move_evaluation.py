@@ -66,16 +66,28 @@ class MoveEvaluation(SearchState):
             if only_validation_shows(parent, self.floor):
                 untried = [e for e in left if frozenset((*key, e.name)) not in self.tried]
                 self._evaluate_moves(parent, by_effect(moves_of_all_runs(parent, untried, self.parallel)), every=True)
-            for other in self._other_solutions(parent):
-                self._fit_from_other(parent, other, left)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
             self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
-            if self.budget.remaining():
-                self._refit_from_best_child(key)
-            self._prefer_output_error(key)
-            if self.budget.remaining():
-                self._try_laws_and_variants(key, self._leading(key))
+            self._refine_children(key)
         return self._children(key)
+
+    def step_from_other_solutions(self, parent: ScoredModel) -> None:
+        """Fit an expanded model with each effect that its other solutions lack, from those solutions."""
+        key = frozenset(parent.names)
+        self.tried.progress.expanded_from_others.add(key)
+        others = self._other_solutions(parent)
+        for other in others:
+            self._fit_from_other(parent, other, [e for e in self.catalogue if e.name not in key])
+        if others:
+            self._refine_children(key)
+
+    def _refine_children(self, key: frozenset[str]) -> None:
+        """Fit a model again from its best child, its leading children by output error and under other laws and variants."""
+        if self.may_go_on():
+            self._refit_from_best_child(key)
+        self._prefer_output_error(key)
+        if self.may_go_on():
+            self._try_laws_and_variants(key, self._leading(key))
 
     def _other_solutions(self, parent: ScoredModel) -> list[ScoredModel]:
         """Return what the same effects are in the textbook's variants, and with the smaller of two equivalent coefficients.

@@ -9,7 +9,7 @@ from itertools import chain
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import leaves_error
+from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, leaves_error, lowers_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
@@ -55,7 +55,7 @@ class Search(MoveEvaluation):
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
             self.error_ratio(found) > MISSING_ERROR_RATIO
-            and self.budget.remaining()
+            and self.may_go_on()
             and (nothing or residuals_reject(found.likelihood_fit, self.parallel))
         ):
             untried = [e for e in self.catalogue if nothing and e.variants and self.root | {e.name} not in self.tried]
@@ -65,7 +65,7 @@ class Search(MoveEvaluation):
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
             found = self.best_admissible()
-        if self.error_ratio(found) > MISSING_ERROR_RATIO and self.budget.remaining():
+        if self.error_ratio(found) > MISSING_ERROR_RATIO and self.may_go_on():
             found = multistart(
                 found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
             )
@@ -75,15 +75,39 @@ class Search(MoveEvaluation):
         return self.best_admissible()
 
     def _expand(self) -> None:
-        """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise."""
+        """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise.
+
+        Those expanded are expanded from their other solutions where that has not led there.
+        """
         self.base()
-        while (leading := self._next_to_expand()) is not None:
-            self.forward_step(leading)
+        while True:
+            if (leading := self._next_to_expand()) is not None:
+                self._join_children(self.forward_step(leading), leading)
+            elif (leading := self._next_from_others()) is not None:
+                self.step_from_other_solutions(leading)
+            else:
+                return
             self._drop_each()
             self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
             if self._switch_noise_or_trim():
                 self.base()
+
+    def _join_children(self, children: Sequence[ScoredModel], parent: ScoredModel) -> None:
+        """Add to the best of a model's children what others have added, where that helps alone or with it.
+
+        Of several effects that are missing each may show beside the others only, and to expand one set after another costs many
+        times as much as a fit of what is at hand.
+        """
+        best = next(iter(children), parent)
+        if not (gains_any_evidence(parent, best) and leaves_error(best, self.floor)):
+            return
+        for other in [h for h in children[1:] if gains_any_evidence(parent, h) or lowers_error(parent, h)][:MAX_JOINED]:
+            more = [e for e in other.effects if e.name not in best.names]
+            joined = frozenset((*best.names, *(e.name for e in more)))
+            if self.may_go_on() and joined not in self.tried and len(joined) <= len(self.known) + MAX_EFFECTS:
+                self._join(best, other, more)
+                best = max(best, self.tried[joined], key=lambda h: h.log_evidence)
 
     def _join_leaders(self) -> None:
         """Fit the sets of clearly lower error with what the model of the highest evidence has besides, the small effects or all.
@@ -116,7 +140,7 @@ class Search(MoveEvaluation):
         """
         best = self._most_evident()
         for h in [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]:
-            if self.budget.remaining():
+            if self.may_go_on():
                 left = [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
                 moves = add_effect(h, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True)
                 self._evaluate_moves(h, by_effect(moves))
@@ -191,12 +215,21 @@ class Search(MoveEvaluation):
         """
         if self.root not in self.tried.progress.expanded:
             return self.base()
-        if not self.budget.remaining():
-            return None
+        return next((h for h in self._leading_models() if self._is_expandable(h)), None)
+
+    def _next_from_others(self) -> ScoredModel | None:
+        """Return the leading model to expand next from its other solutions, None where all that leave an error are."""
+        done = self.tried.progress
+        left = done.expanded - done.expanded_from_others
+        return next((h for h in self._leading_models() if frozenset(h.names) in left and leaves_error(h, self.floor)), None)
+
+    def _leading_models(self) -> list[ScoredModel]:
+        """Return the leading models, none where the budget is used up."""
+        if not self.may_go_on():
+            return []
         best = self._most_evident()
         front = self._front(best)
-        leading = [best, *front, *self._less(best)] if leaves_error(best, self.floor) else front
-        return next((h for h in leading if self._is_expandable(h)), None)
+        return [best, *front, *self._less(best)] if leaves_error(best, self.floor) else front
 
     def _is_expandable(self, h: ScoredModel) -> bool:
         """Whether a model is new, does not diverge, is below the largest size, and leaves an error above the noise floor."""
@@ -259,7 +292,7 @@ class Search(MoveEvaluation):
         that stands for coloured sensor noise lets the heading drift at no cost. The kind is asked of the most evident model, in
         whose residuals the least is missing. The best model is kept, fitted again.
         """
-        if not self.budget.remaining():
+        if not self.may_go_on():
             return False
         found = self.best_admissible()
         noise = partial(fit_other_noise, self._most_evident(), self.floor, self.tried.noise_kinds, self.parallel)

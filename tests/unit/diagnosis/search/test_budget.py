@@ -36,12 +36,16 @@ EFFECTS = all_effects(Axis.YAW)
 def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
     allowance = Budget(2, 10.0)
     allowance.evaluations.add(19)
-    assert allowance.remaining()
+    assert allowance.remaining(lambda: False)
     assert not allowance.is_exhausted
     allowance.evaluations.add()
-    assert not allowance.remaining()
+    assert allowance.remaining(lambda: True), "more where something is missing"
+    assert not allowance.is_exhausted
+    assert not allowance.remaining(lambda: False)
     assert allowance.is_exhausted
-    assert Budget(2, np.inf).remaining()
+    allowance.evaluations.add(20)
+    assert not allowance.remaining(lambda: True)
+    assert Budget(2, np.inf).remaining(lambda: False)
 
 
 def test_what_a_copy_has_worked_out_counts():

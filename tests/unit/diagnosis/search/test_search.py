@@ -125,6 +125,40 @@ def test_a_set_of_clearly_lower_error_is_fitted_with_all_that_the_most_evident_h
     assert both.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
 
 
+@pytest.mark.parametrize("ends", [False, True])
+def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(monkeypatch, ends):
+    made = search_for("servo_lag", "delay", "gyro_bias")
+    effects = all_effects(Axis.YAW)
+    base = made.base()
+    both = [effects[n] for n in ("servo_lag", "gyro_bias")]
+    made._evaluate_moves(base, by_effect(add_effect(base, both, None, made.parallel, anew=False, flown=True)))
+    children = [made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias")]
+    monkeypatch.setattr(search, "gains_any_evidence", lambda *_: True)
+    monkeypatch.setattr(search, "leaves_error", lambda *_: not ends)
+    made._join_children(children, base)
+    joined = frozenset(["servo_lag", "gyro_bias"])
+    assert (joined in made.tried) is not ends
+    if not ends:
+        assert made.tried[joined].model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
+
+
+def test_models_without_children_are_joined_with_nothing(base):
+    tried = len(base.tried)
+    base._join_children([], base.base())
+    assert len(base.tried) == tried
+
+
+def test_other_solutions_are_asked_once_all_leading_models_are_expanded(monkeypatch):
+    made, asked = search_for("servo_lag", "gyro_bias"), []
+    forward, others = Search.forward_step, Search.step_from_other_solutions
+    monkeypatch.setattr(Search, "forward_step", lambda self, h: (asked.append("all"), forward(self, h))[1])
+    monkeypatch.setattr(Search, "step_from_other_solutions", lambda self, h: (asked.append("others"), others(self, h))[1])
+    monkeypatch.setattr(search, "leaves_error", lambda *_: True)
+    made._expand()
+    assert asked.count("others") == len(made.tried.progress.expanded_from_others) > 0
+    assert asked[: asked.count("all")] == ["all"] * asked.count("all")
+
+
 def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(monkeypatch):
     made = search_for("servo_lag", "sway_coupling", "gyro_bias")
     effects, starts = all_effects(Axis.YAW), []
