@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -44,6 +45,9 @@ Whole = Annotated[bool, typer.Option("--whole", help="Use whole runs, not only t
 Bandwidth = Annotated[float, typer.Option("--lambda", metavar="RAD_S", min=0.01, help="Bandwidth of the state-variable filter.")]
 Forgetting = Annotated[float, typer.Option("--forgetting", min=0.5, max=1.0, help="Forgetting factor of svf_rls.")]
 
+MOST_DRAWN = 6
+"""Runs of one model that are drawn: two figures each, and nobody looks through sixty."""
+
 
 def command(
     context: typer.Context,
@@ -66,9 +70,9 @@ def command(
 ) -> Mapping[str, Any]:
     """Identify the yaw or pitch model of each run, or one model of all of them.
 
-    With `-o` each model is written to DIR/RUN_AXIS.yaml, with its figure. `auto` is output error, and prediction error
-    (pem) where a disturbance, and no missing effect, explains the residuals; it says why. Of several runs one that cannot be used
-    is skipped with its reason, and the exit code is 1.
+    With `-o` each model is written to DIR/RUN_AXIS.yaml, with figures, of many runs those of the ones it follows least. `auto` is
+    output error, and prediction error (pem) where a disturbance, and no missing effect, explains the residuals; it says why. Of
+    several runs one that cannot be used is skipped with its reason, and the exit code is 1.
 
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
@@ -105,7 +109,13 @@ def command(
     from fieldsid.cli.headlines.models import of_identify
 
     headline = of_identify(body, [files_of(group) for group in groups])
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, entries), headline=headline, notes=_warnings(entries))
+    result = emit(
+        body,
+        as_json=as_json,
+        render=lambda to: _render(to, entries, figures=figures),
+        headline=headline,
+        notes=_warnings(entries),
+    )
     skips.end(len(used))
     return result
 
@@ -137,12 +147,26 @@ def _draw(fit: Fit, folder: Path, stem: str, tasks: BackgroundTasks, *, force: b
     from fieldsid.figures.canvas import save
     from fieldsid.figures.identify import figure, history_figure, residual_figure
 
-    for i, shown in enumerate(fit.predictions):
-        name = stem if len(fit.predictions) == 1 else f"{stem}_{shown.record.name}"
+    for i in _drawn(fit):
+        name = stem if len(fit.predictions) == 1 else f"{stem}_{fit.predictions[i].record.name}"
         save(figure(fit, i), folder / f"{name}.png", force=force, tasks=tasks)
         save(residual_figure(fit, i), folder / f"{name}_residuals.png", force=force, tasks=tasks)
     if fit.history is not None:
         save(history_figure(fit, fit.history), folder / f"{stem}_over_time.png", force=force, tasks=tasks)
+
+
+def _drawn(fit: Fit) -> list[int]:
+    """Return the places of the runs that are drawn: all of a few, of many those that the model follows least."""
+    from fieldsid.comparison.sufficient import over_noise
+
+    floor = _noise_floor(fit)
+    over = [over_noise(_of_run(p), floor) for p in fit.predictions]
+    least = sorted(range(len(over)), key=lambda i: (isnan(over[i]), -over[i]))
+    return sorted(least[:MOST_DRAWN])
+
+
+def _noise_floor(fit: Fit) -> dict[str, float]:
+    return {"angle_rad": fit.floor.angle, "rate_rad_s": fit.floor.rate}
 
 
 def _stem(fit: Fit) -> str:
@@ -165,7 +189,7 @@ def _entry(fit: Fit, path: Path | None, logs: Sequence[Run]) -> dict[str, Any]:
         "effects": list(model.effects),
         "parameters": _parameters(fit),
         **_merit(m),
-        "noise_floor": {"angle_rad": fit.floor.angle, "rate_rad_s": fit.floor.rate},
+        "noise_floor": _noise_floor(fit),
         "warnings": [{"code": n.code, "message": n.message, "data": dict(n.data)} for n in notes],
         "whiteness_p": model.info.get("whiteness_p"),
         "runs": [_of_run(p) for p in fit.predictions],
@@ -224,7 +248,7 @@ def _label(entry: Mapping[str, Any]) -> str:
     return str(entry["run"]) if len(entry["runs"]) == 1 else f"{len(entry['runs'])} runs"
 
 
-def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
+def _render(to: Console, entries: Sequence[Mapping[str, Any]], *, figures: bool) -> None:
     from fieldsid.rounding import number
 
     rows = [
@@ -256,3 +280,5 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]]) -> None:
     for e in entries:
         if e["model"]:
             to.print(f"model: {e['model']}", soft_wrap=True)
+            if figures and len(e["runs"]) > MOST_DRAWN:
+                to.print(f"figures: of the {MOST_DRAWN} runs it follows least; `sysid compare {e['model']} RUN -o DIR` draws any")
