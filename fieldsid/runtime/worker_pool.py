@@ -41,19 +41,20 @@ PR_SET_PDEATHSIG = 1
 
 
 class Worker:
-    """A forked worker. Where its context is left with an error it is killed, else it may end by itself.
+    """A forked worker. Where its context is left with an error, or it ended without an answer, its end is waited for.
 
-    The system takes some milliseconds to clear a copy of this process away, in which this process works on: the end is asked for
-    when the next worker is forked, see `_ending`.
+    Otherwise it may end by itself. The system takes some milliseconds to clear a copy of this process away, in which this process
+    works on: the end is asked for when the next worker is forked, see `_ending`.
     """
 
     def __init__(self, process: int, source: int) -> None:
-        self.process, self._stream = process, os.fdopen(source, "rb")
+        self.process, self._stream, self._has_died = process, os.fdopen(source, "rb"), False
 
     def answer(self) -> bytes | None:
         """Wait for the worker's answer and return it; None where it ended without one."""
         answer = self._stream.read()
-        return answer.removesuffix(END_OF_ANSWER) if answer.endswith(END_OF_ANSWER) else None
+        self._has_died = not answer.endswith(END_OF_ANSWER)
+        return None if self._has_died else answer.removesuffix(END_OF_ANSWER)
 
     def is_running(self) -> bool:
         """Whether the worker has neither answered nor ended."""
@@ -69,7 +70,7 @@ class Worker:
         return self
 
     def __exit__(self, error: object, *_more: object) -> None:
-        if error is None:
+        if error is None and not self._has_died:
             self._stream.close()
             _ending.append(self.process)
         else:

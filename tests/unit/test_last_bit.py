@@ -141,7 +141,7 @@ def test_of_two_starts_that_are_alike_the_smaller_effect_is_kept(monkeypatch, re
         return np.where(x == lag, other, np.where(x == other, lag, x))
 
     monkeypatch.setattr(likelihood_fit, "equivalent_solution", exchanged)
-    monkeypatch.setattr(likelihood_fit, "fit_maximum_likelihood", lambda *_of: judged(other, 100.0 + gained))
+    monkeypatch.setattr(likelihood_fit, "fit_maximum_likelihood", lambda *_of, **_and: judged(other, 100.0 + gained))
     kept = likelihood_fit.prefer_smaller_equivalent(judged(lag, 100.0), effect).fitted.x[place]
     # beyond the prior odds against a servo slower than its hull the likelier one is
     assert kept == (min(lag, other) if abs(gained) < 6.0 else (other if gained > 0.0 else lag))

@@ -84,9 +84,21 @@ def in_time(is_so, seconds):
 
 
 @pytest.mark.forks
-def test_an_error_of_the_function_is_raised_and_leaves_no_process():
-    with pytest.raises(ZeroDivisionError):
-        parallel_map(lambda i: 1 // (i - 3), range(8))
+@pytest.mark.parametrize("which", ["worker", "parent"])
+def test_an_error_of_the_function_is_raised_and_leaves_no_process(which):
+    here = os.getpid()
+
+    def fails(item):
+        if (os.getpid() == here) is (which == "parent"):
+            return 1 // 0
+        time.sleep(0.05)
+        return item
+
+    if which == "parent":
+        with pytest.raises(ZeroDivisionError):
+            parallel_map(fails, range(8))
+    else:  # what the worker died of is done here, where it does not fail
+        assert parallel_map(fails, range(8)) == list(range(8))
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)
 
