@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -11,6 +12,7 @@ from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
 from fieldsid.maneuvers import Autopilot, Limits
+from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.planning.flight.operating_point import OperatingPoint
@@ -94,11 +96,12 @@ def respond(
     if moment is not None:
         clean[:, 2] += moment[:-1]
         clean[:, 3] += moment[1:]
+    idle = idle_records([scene], ready.time) if moving else {}
     for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
         drive = clean.copy() if moving else clean
         closed_loop(ready.steps, drive, ready.constants, ready.pieces, asked, off, ready.push, gains, bounds, command, out)
         if left:
-            off = fin_offset(scene, ready.time, command)
+            off = fin_offset(scene, idle, command)
     return Response(ready.time, command, out[:, 0], out[:, 1])
 
 
@@ -133,8 +136,14 @@ def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
     return np.column_stack([b * factor[:-1], b * factor[1:], np.full(n - 1, cross)])
 
 
-def fin_offset(scene: OperatingPoint, time: FloatArray, command: FloatArray) -> FloatArray:
+def idle_records(scenes: Sequence[OperatingPoint], time: FloatArray) -> dict[float, Record]:
+    """Return a record without a command at some times (n,) s for each speed of some scenes."""
+    none = np.zeros(time.size)
+    return {s.speed: command_record(s.axis, time, none, speed=s.speed) for s in {s.speed: s for s in scenes}.values()}
+
+
+def fin_offset(scene: OperatingPoint, idle: Mapping[float, Record], command: FloatArray) -> FloatArray:
     """Return the fin's angle less its command (n,) about trim at both ends of every interval, (n-1, 2)."""
     held = command[:-1] + scene.trim_fin
-    real = fin_path(command_record(scene.axis, time, command + scene.trim_fin, speed=scene.speed), scene.effects, scene.values)
+    real = fin_path(idle[scene.speed].with_fin(command + scene.trim_fin), scene.effects, scene.values)
     return np.column_stack([real.start - held, real.end - held])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from fieldsid.dynamics import integrate
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
 from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
+from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, prepared
+from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, idle_records, prepared
 from fieldsid.planning.flight.operating_point import OperatingPoint
 
 
@@ -108,15 +109,16 @@ def fly_operating_points(
     plant = plant_of(scenes, time.size, schedule.rate_hz, moments)
     moving = any(e.fin is not None for s in scenes for e in s.effects)
     off = plant.off
-    for _ in range(ACTUATOR_ROUNDS if moving else 1):
+    for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
         flight = fly(maneuver, parameters, plant.again(off), limits=limits, autopilot=autopilot, schedule=schedule)
-        if moving:
-            off = np.stack([_offset(s, time, flight.fin[:, i]) for i, s in enumerate(scenes)])
+        if left:
+            idle = idle_records(scenes, time[: flight.fin.shape[0]])
+            off = np.stack([_offset(s, idle, flight.fin[:, i], time.size) for i, s in enumerate(scenes)])
     return flight
 
 
-def _offset(scene: OperatingPoint, time: FloatArray, command: FloatArray) -> FloatArray:
-    """Return the fin's angle less its command over every interval, zero after the flight's end, (n-1, 2)."""
-    off = np.zeros((time.size - 1, 2))
-    off[: command.size - 1] = fin_offset(scene, time[: command.size], command)
+def _offset(scene: OperatingPoint, idle: Mapping[float, Record], command: FloatArray, count: int) -> FloatArray:
+    """Return the fin's angle less its command over every interval of `count` samples, zero after the flight's end, (n-1, 2)."""
+    off = np.zeros((count - 1, 2))
+    off[: command.size - 1] = fin_offset(scene, idle, command)
     return off

@@ -11,7 +11,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_model import disturbances, draws_of
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, closed_loop, fin_offset
+from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, closed_loop, fin_offset, idle_records
 from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
 from fieldsid.planning.flight.operating_point import OperatingPoint, operating_point
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant, fly_operating_points, plant_of
@@ -111,6 +111,7 @@ def _open_loop(crowd: Ensemble, asked: FloatArray, envelope: Envelope, autopilot
     moving = any(e.fin is not None for s in crowd.scenes for e in s.effects)
     off, steps, out = plant.off, np.diff(time), np.empty((time.size, 3))
     rounds = ACTUATOR_ROUNDS if moving else 1
+    idle = idle_records(crowd.scenes, time) if moving else {}
     for left in reversed(range(rounds)):
         for i in range(plant.size):
             closed_loop(
@@ -119,7 +120,7 @@ def _open_loop(crowd: Ensemble, asked: FloatArray, envelope: Envelope, autopilot
             )  # fmt: skip
             angle[i], rate[i] = out[:, 0], out[:, 1]
         if left:
-            off = np.stack([fin_offset(s, time, command[i]) for i, s in enumerate(crowd.scenes)])
+            off = np.stack([fin_offset(s, idle, command[i]) for i, s in enumerate(crowd.scenes)])
     return angle.T, rate.T
 
 
