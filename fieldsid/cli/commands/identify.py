@@ -281,4 +281,5 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]], *, figures: bool)
         if e["model"]:
             to.print(f"model: {e['model']}", soft_wrap=True)
             if figures and len(e["runs"]) > MOST_DRAWN:
-                to.print(f"figures: of the {MOST_DRAWN} runs it follows least; `sysid compare {e['model']} RUN -o DIR` draws any")
+                draws = f"`sysid compare {e['model']} RUN -o DIR` draws any"
+                to.print(f"figures: of the {MOST_DRAWN} runs it follows least; {draws}", soft_wrap=True)

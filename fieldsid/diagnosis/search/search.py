@@ -103,11 +103,8 @@ class Search(MoveEvaluation):
         if not (gains_any_evidence(parent, best) and leaves_error(best, self.floor)):
             return
         for other in [h for h in children[1:] if gains_any_evidence(parent, h) or lowers_error(parent, h)][:MAX_JOINED]:
-            more = [e for e in other.effects if e.name not in best.names]
-            joined = frozenset((*best.names, *(e.name for e in more)))
-            if self.may_go_on() and joined not in self.tried and len(joined) <= len(self.known) + MAX_EFFECTS:
-                self._join(best, other, more)
-                best = max(best, self.tried[joined], key=lambda h: h.log_evidence)
+            if self.may_go_on():
+                best = max(best, self._join(best, other, other.effects), key=lambda h: h.log_evidence)
 
     def _join_leaders(self) -> None:
         """Fit the sets of clearly lower error with what the model of the highest evidence has besides, the small effects or all.
@@ -119,18 +116,20 @@ class Search(MoveEvaluation):
         small = [e for e in best.effects if e.name not in self.core_of(best)]
         for h in self._front(best)[:MAX_JOINED]:
             for joined in (small, best.effects):
-                more = [e for e in joined if e.name not in h.names]
-                names = frozenset((*h.names, *(e.name for e in more)))
-                if more and names not in self.tried and len(names) <= len(self.known) + MAX_EFFECTS:
-                    self._join(h, best, more)
+                self._join(h, best, joined)
 
-    def _join(self, h: ScoredModel, other: ScoredModel, more: Sequence[Effect]) -> None:
-        """Fit a model with effects of another besides, at the parameters that they have there."""
+    def _join(self, h: ScoredModel, other: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
+        """Return a model with what it lacks of another's effects, fitted from their numbers there; itself if that is known."""
         fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
+        more = [e for e in effects if e.name not in h.names]
+        names = frozenset((*h.names, *(e.name for e in more)))
+        if names in self.tried or len(names) > len(self.known) + MAX_EFFECTS:
+            return h
         problem = fitted.problem.with_effects([*h.effects, *more])
         start = carry_parameters(problem.layout, fitted.vector, there.vector)
         ml_fit = fit_maximum_likelihood(problem, start, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
-        self.tried[frozenset(ml_fit.fitted.names)] = prefer_output_error(self._keep(ml_fit), self.floor)
+        self.tried[names] = prefer_output_error(self._keep(ml_fit), self.floor)
+        return self.tried[names]
 
     def _grow_rivals(self) -> None:
         """Add to the accepted sets that predict as well as the model of the highest evidence what may bring them above it.
@@ -207,12 +206,7 @@ class Search(MoveEvaluation):
         return [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
 
     def _next_to_expand(self) -> ScoredModel | None:
-        """Return the leading model to expand next, None where all are expanded.
-
-        Leading are the base, the model of the highest log evidence, the same without each of its effects (their expansions
-        exchange that effect), and every model of accepted effects with a clearly lower error: its evidence may be lower only
-        because it lacks a small effect that the best model has besides a wrong one.
-        """
+        """Return the base, then the leading model to expand next; None where all are expanded."""
         if self.root not in self.tried.progress.expanded:
             return self.base()
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
@@ -224,7 +218,12 @@ class Search(MoveEvaluation):
         return next((h for h in self._leading_models() if frozenset(h.names) in left and leaves_error(h, self.floor)), None)
 
     def _leading_models(self) -> list[ScoredModel]:
-        """Return the leading models, none where the budget is used up."""
+        """Return the leading models, none where the budget is used up.
+
+        They are the model of the highest log evidence, the same without each of its effects (their expansions exchange that
+        effect), and every model of accepted effects with a clearly lower error: its evidence may be lower only because it lacks a
+        small effect that the best model has besides a wrong one.
+        """
         if not self.may_go_on():
             return []
         best = self._most_evident()

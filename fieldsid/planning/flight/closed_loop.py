@@ -139,7 +139,7 @@ def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
 def idle_records(scenes: Sequence[OperatingPoint], time: FloatArray) -> dict[float, Record]:
     """Return a record without a command at some times (n,) s for each speed of some scenes."""
     none = np.zeros(time.size)
-    return {s.speed: command_record(s.axis, time, none, speed=s.speed) for s in {s.speed: s for s in scenes}.values()}
+    return {speed: command_record(scenes[0].axis, time, none, speed=speed) for speed in {s.speed for s in scenes}}
 
 
 def fin_offset(scene: OperatingPoint, idle: Mapping[float, Record], command: FloatArray) -> FloatArray:
