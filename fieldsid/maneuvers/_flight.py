@@ -44,7 +44,7 @@ class Limits:
     def apply(self, fin: FloatArray, last: FloatArray, step: float) -> FloatArray:
         """Return the fins (m,) moved into the limits, `last` being those of the sample before."""
         reach = self.fin_rate * step
-        return np.asarray(np.clip(np.clip(fin, last - reach, last + reach), -self.fin, self.fin))
+        return _within(_within(fin, last - reach, last + reach) if np.isfinite(reach) else fin, -self.fin, self.fin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,12 @@ class Autopilot:
     def command(self, angle: FloatArray, rate: FloatArray) -> FloatArray:
         """Return the fins (m,) for angles and rates (m,)."""
         short = np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
-        return np.asarray(np.clip(-(self.angle_gain * short + self.rate_gain * rate), -self.fin, self.fin))
+        return _within(-(self.angle_gain * short + self.rate_gain * rate), -self.fin, self.fin)
+
+
+def _within(values: FloatArray, low: FloatArray | float, high: FloatArray | float) -> FloatArray:
+    """Return values no lower and no higher than these: a third of what np.clip takes for a few of them, at every sample."""
+    return np.asarray(np.minimum(np.maximum(values, low), high))
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +113,7 @@ def fly(
     for i in range(count):
         time = i * step
         fin, free = asked.at(time, angle, rate)
-        wanted = np.where(free, autopilot.command(angle, rate), fin)
+        wanted = np.where(free, autopilot.command(angle, rate), fin) if free.any() else fin
         last = limits.apply(wanted, last, step)
         log.put(i, last, angle, rate, free)
         if asked.done is not None and i >= (end := min(count, round((asked.done + schedule.recover) * schedule.rate_hz) + 1)) - 1:
@@ -126,7 +131,7 @@ class _Log:
         self.free = np.zeros((count, size), dtype=bool)
 
     def put(self, i: int, fin: FloatArray, angle: FloatArray, rate: FloatArray, free: npt.NDArray[np.bool_]) -> None:
-        self.values[:, i] = fin, angle, rate
+        self.values[0, i], self.values[1, i], self.values[2, i] = fin, angle, rate
         self.free[i] = free
 
     def flight(self, end: int, step: float, excitation: tuple[float, float]) -> Flight:

@@ -13,10 +13,10 @@ def _memory(_: Parameters) -> tuple[float, ...]:
 
 
 def _rule(p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
-    turned = (np.abs(angle) >= p["turn"]) | (time >= p["duration"] - p["pull_out"])
-    began = np.minimum(memory, np.where(turned, time, np.inf)[:, None])
-    fin = np.where(time < began[:, 0], p["amplitude"] * side(p), 0.0)
-    return np.where(time >= began[:, 0] + p["pull_out"], np.nan, fin), began
+    limit = p["turn"] if time < p["duration"] - p["pull_out"] else 0.0
+    began = np.minimum(memory[:, 0], np.where(np.abs(angle) >= limit, time, np.inf))
+    fin = np.where(time < began, p["amplitude"] * side(p), 0.0)
+    return np.where(time >= began + p["pull_out"], np.nan, fin), began[:, None]
 
 
 MANEUVER = Maneuver(

@@ -56,7 +56,8 @@ class OperatingPointPlant:
     def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
         """Hold the fins (m,) about trim for `step` s; return angles and rates (m,)."""
         i = min(self.at, self.drive.shape[1] - 1)
-        start, end = self.trim + fin + self.off[:, i, 0], self.trim + fin + self.off[:, i, 1]
+        angle = self.trim + fin
+        start, end = angle + self.off[:, i, 0], angle + self.off[:, i, 1]
         advance_all(step, self.drive[:, i], self.constants, self.pieces, self.push[:, i], start, end, self.state)
         self.at += 1
         return self.state[:, 0].copy(), self.state[:, 1].copy()
@@ -113,7 +114,9 @@ def fly_operating_points(
         flight = fly(maneuver, parameters, plant.again(off), limits=limits, autopilot=autopilot, schedule=schedule)
         if left:
             idle = idle_records(scenes, time[: flight.fin.shape[0]])
-            off = np.stack([_offset(s, idle, flight.fin[:, i], time.size) for i, s in enumerate(scenes)])
+            before, off = off, np.stack([_offset(s, idle, flight.fin[:, i], time.size) for i, s in enumerate(scenes)])
+            if np.array_equal(off, before):  # the next flight would be the same
+                break
     return flight
 
 
