@@ -61,6 +61,11 @@ def is_excited(run: Run, axis: str) -> bool:
     return signal is not None and bool(_away(*_seen(run, signal))[0].any())
 
 
+def may_show(run: Run, axis: str) -> bool:
+    """Whether a run may show something of an axis: unless it excites the other one alone."""
+    return is_excited(run, axis) or not any(is_excited(run, other) for other in _FINS)
+
+
 def _fin_of(run: Run, axis: str) -> str | None:
     """Return the signal of an axis' fin, the command where both are there; None where there is none."""
     return next((s for s in reversed(_FINS[axis]) if run.has(s)), None)

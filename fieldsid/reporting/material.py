@@ -12,6 +12,7 @@ from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, UsageError
 from fieldsid.extension import Generation, history_of
 from fieldsid.logs import Run, load_run
+from fieldsid.logs.segments import may_show
 from fieldsid.models.model import Model, load_model
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
 from fieldsid.trial_folder.next_step import chosen_models, next_step, single_models
@@ -133,8 +134,8 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
 
 def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown:
     model = load_model(path)
-    found = []
-    for run in runs:
+    mine, found = [run for run in runs if may_show(run, model.axis)], []
+    for run in mine:
         try:
             found.append(compare_one(model, run))
         except FieldsidError as error:

@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 import pytest
 from cli import trial
 
+from fieldsid.models.axis import Axis
 from fieldsid.reporting.pdf import browser
 
 VOID = {"meta", "link", "br", "hr", "input", "img"}
@@ -133,6 +134,14 @@ def test_a_run_that_cannot_be_used_is_said_and_the_rest_stands(run_cli, made, tm
     assert answer.code == 0
     assert "broken" in answer.err
     assert "Not in this report" in (copy / "report.html").read_text()
+
+
+def test_a_run_that_excites_the_other_plane_alone_says_nothing_for_a_model(run_cli, made, tmp_path):
+    copy = shutil.copytree(made, tmp_path / "copy")
+    trial.flown(copy / "runs", Axis.PITCH, name="stairs")
+    body = run_cli("report", copy, "--force", "--json").json
+    assert body["runs"] == ["pulses_1.0", "pulses_1.4", "stairs", "zigzag"]
+    assert "on 1 run it was not fitted to" in body["verdicts"][0]["says"]
 
 
 @pytest.mark.parametrize(

@@ -42,22 +42,20 @@ def _runs(parsed: Parsed, state: FolderState) -> list[str]:
 def _of_plane(parsed: Parsed, state: FolderState) -> list[str]:
     axis = parsed.values.get("axis")
     places = {i.path: state.place(i) for i in state.of_kind(RUN)}
-    excited = {path: _excited(place, place.stat().st_mtime_ns) for path, place in places.items()} if axis is not None else {}
-    mine = [path for path in places if not excited.get(path) or axis in excited[path]]
+    mine = [path for path, place in places.items() if axis is None or _may_show(place, place.stat().st_mtime_ns, axis)]
     return mine or run_words(state)
 
 
 @cache
-def _excited(place: Path, _written_ns: int) -> frozenset[Axis]:
-    """Return the planes whose fin moves in a run, none of one that cannot be read: the command itself says so."""
+def _may_show(place: Path, _written_ns: int, axis: Axis) -> bool:
+    """Whether a run may show something of an axis, also one that cannot be read: the command itself says so."""
     from fieldsid.logs import load_run
-    from fieldsid.logs.segments import is_excited
+    from fieldsid.logs.segments import may_show
 
     try:
-        run = load_run(place)
+        return may_show(load_run(place), axis)
     except FieldsidError:
-        return frozenset()
-    return frozenset(axis for axis in Axis if is_excited(run, axis))
+        return True
 
 
 def left_out(parsed: Parsed, state: FolderState) -> list[str]:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from fieldsid.errors import DataError
 from fieldsid.logs import Run, segment
+from fieldsid.logs.segments import may_show
 
 TIME = 0.05 * np.arange(1200)
 
@@ -62,6 +63,13 @@ def test_no_fin_and_a_constant_fin_are_errors_that_say_what_was_found():
     with pytest.raises(DataError, match="never leaves its trim") as error:
         segment(run(np.full(TIME.size, 0.1)), "yaw")
     assert "5.73" in error.value.found
+
+
+def test_a_run_that_excites_one_axis_alone_may_show_nothing_of_the_other():
+    still = np.full(TIME.size, 0.1)
+    assert not may_show(run(still, elevator_rad=pulses()), "yaw")
+    for fins in ((pulses(), still), (still, still), (pulses(), pulses())):
+        assert may_show(run(fins[0], elevator_rad=fins[1]), "yaw")
 
 
 def test_a_segment_cuts_its_run():
