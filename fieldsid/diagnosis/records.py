@@ -55,6 +55,11 @@ class Pair(Brief):
     train: Errors
     validation: Errors
 
+    @property
+    def runs(self) -> tuple[Errors, ...]:
+        """The errors of each run that was measured."""
+        return tuple(run for side in (self.train, self.validation) for run in side.runs if isfinite(run.mean))
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Candidate(Displayed):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import compared_errors, validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import common_own_moment, compared_errors, validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors
@@ -47,19 +47,20 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     Errors are over the noise floor that is reported, with the sensors' coloured noise where they have it. Without an effect,
     `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is `disturbed` where
     the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the training runs
-    better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one than
-    it leaves: a lag of a sample may be there, and is not what is missing. A moment of the water alone is named where
-    what is left beside it follows nothing that was measured: that of a hull's roll swings as a wave's does.
+    better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one, that
+    of all runs, than it leaves: a lag of a sample may be there, and is not what is missing. A moment of the water alone is named
+    where what is left beside it follows nothing that was measured: that of a hull's roll swings as a wave's does.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
-    error = now.over(floor)
+    fitted = _fitted_errors(search.base(), found)
+    error = max(now.over(floor), fitted[1].over(floor))
     if frozenset(found.names) == search.root:
         if max(found.selection_errors.over(floor), found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
     visible = error > SUFFICIENT_ERROR_RATIO
-    share = _share(was, now, floor)
+    share = _share([was, fitted[0]], [now, fitted[1]], floor)
     minor = error > MISSING_ERROR_RATIO and share < MAIN_EXPLAINED_SHARE and not search.is_noiseless
     if visible and (minor or not now.mean < was.mean):
         return _unnamed(found, left, floor)
@@ -78,6 +79,12 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     return Verdict("effect", added_effects(search, found))
 
 
+def _fitted_errors(base: ScoredModel, found: ScoredModel) -> tuple[Errors, Errors]:
+    """Return the errors of two models on the training runs, with moments of the runs' own of the same size."""
+    std = common_own_moment(base, found)
+    return base.train_under(std), found.train_under(std)
+
+
 def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
     """Return the verdict where no effect lowers the error that models are selected by: `disturbed`, or `unexplained`."""
     worst = max(found.selection_errors.over(floor), found.train.over(floor))
@@ -87,14 +94,14 @@ def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
 
 
 def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
-    """Return the effects that a model adds to the base, in order of the validation error without each of them, largest first.
+    """Return the effects that a model adds to the base, in order of the error of all runs without each of them, largest first.
 
     An effect whose removal was not tried comes first.
     """
 
     def lack(name: str) -> float:
         without = search.tried.get(frozenset(h.names) - {name})
-        return without.selection_errors.mean if without is not None else float("inf")
+        return without.error_of_all_runs(search.floor) if without is not None else float("inf")
 
     return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -lack(n)))
 
@@ -115,13 +122,15 @@ def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
 
 def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:
     """Return the share (0..1) that a model removes of the base's excess squared error over a noise floor."""
-    return _share(search.base().selection_errors, h.selection_errors, floor or search.floor)
+    return _share([search.base().selection_errors], [h.selection_errors], floor or search.floor)
 
 
-def _share(before: Errors, now: Errors, floor: Noise) -> float:
-    base, left = before.over(floor), now.over(floor)
-    excess = base**2 - 1.0
-    return float(np.clip((base**2 - left**2) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
+def _share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:
+    """Return the share (0..1) by which the excess squared error over a noise floor falls, that of all runs together."""
+    runs = [len(errors.runs) for errors in before]
+    base, left = (float(np.average([errors.over(floor) ** 2 for errors in side], weights=runs)) for side in (before, now))
+    excess = base - 1.0
+    return float(np.clip((base - left) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
 
 
 def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:

@@ -174,6 +174,10 @@ class ScoredModel:
         """
         return self.unseen_under(self.own_moment)
 
+    def error_of_all_runs(self, floor: Noise) -> float:
+        """Return the root mean square over training and validation runs of the error over a noise floor."""
+        return float(np.sqrt(np.mean([run.over(floor) ** 2 for run in self.errors.runs])))
+
     def evaluate_errors(self, *, fitted: bool = False) -> ScoredModel:
         """Return itself with the selection errors computed, so that the process that fitted it computes them too.
 

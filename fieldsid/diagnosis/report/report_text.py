@@ -47,7 +47,12 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "disturbed":
-        return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
+        minor = [n for n in found.names if n not in search.known]
+        if not minor:
+            return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
+        leaves = "leaves" if len(minor) == 1 else "leave"
+        beside = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
+        return f"what is left, {base}, is for the most part {_disturbance(noise)}; {beside}"
     if verdict.word == "unexplained":
         worse = validation_error_ratio(search.base(), search.floor)
         return (

@@ -49,7 +49,7 @@ class Search(MoveEvaluation):
             self._fit_in_series(self._all_in_series())
         self._exchange_for_variants()
         self._exchange_for_lookalikes()
-        self._drop_each()
+        self._drop_each(self._most_evident())
         self.share_own_moments()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
@@ -71,8 +71,11 @@ class Search(MoveEvaluation):
             )
             self.tried[frozenset(found.names)] = found
         self._lift_under_other_trim_law()
-        self.share_own_moments()
-        return self.best_admissible()
+        while True:
+            self.share_own_moments()
+            found = self.best_admissible()
+            if not self._drop_each(found):
+                return found
 
     def _expand(self) -> None:
         """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise.
@@ -87,7 +90,7 @@ class Search(MoveEvaluation):
                 self.step_from_other_solutions(leading)
             else:
                 return
-            self._drop_each()
+            self._drop_each(self._most_evident())
             self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
             if self._switch_noise_or_trim():
@@ -270,19 +273,20 @@ class Search(MoveEvaluation):
         for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
             self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
 
-    def _drop_each(self) -> None:
-        """Fit the model of the highest log evidence without each of its effects: later ones may have made earlier ones idle.
+    def _drop_each(self, h: ScoredModel) -> bool:
+        """Fit a model without each of its effects, unless that was done: later ones may have made earlier ones idle.
 
         The others stay in their variants. The set without it may have been tried in other variants only, or have ended at a
-        worse optimum than the one that the larger model has found.
+        worse optimum than the one that the larger model has found. Returns whether anything was fitted.
         """
-        best = self._most_evident()
-        spec = ModelSpec.of(best)
-        if len(best.names) > len(self.known) + 1 and spec not in self.tried.progress.thinned:
-            self.tried.progress.thinned.add(spec)
-            effects = [e for e in best.effects if e.name not in self.known]
-            less = self.parallel.map(lambda gone: self._drop_effect(best, gone).evaluate_errors(fitted=True), effects)
-            self.tried.update({frozenset(h.names): h for h in less})
+        spec = ModelSpec.of(h)
+        if len(h.names) <= len(self.known) + 1 or spec in self.tried.progress.thinned:
+            return False
+        self.tried.progress.thinned.add(spec)
+        effects = [e for e in h.effects if e.name not in self.known]
+        less = self.parallel.map(lambda gone: self._drop_effect(h, gone).evaluate_errors(fitted=True), effects)
+        self.tried.update({frozenset(w.names): w for w in less})
+        return True
 
     def _switch_noise_or_trim(self) -> bool:
         """Start again under another kind of noise (once each), or under the other trim law, where that fits better.

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from fieldsid.diagnosis import verdict
+from fieldsid.diagnosis.records import Errors
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
 
 FLOOR = Noise(angle=0.005, rate=0.005)
 
 
-def errors(ratio):
-    return SimpleNamespace(mean=ratio, over=lambda _floor: ratio)
+def errors(ratio, runs=1):
+    one = Errors(FLOOR.angle * ratio, FLOOR.rate * ratio)
+    return replace(one, each=(one,) * runs)
 
 
-def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None, named=("servo_lag",), signals=1.0):
+def judged(
+    monkeypatch, before, after, p, *, noiseless=False, settled=None, named=("servo_lag",), signals=1.0, fitted=None, runs=1
+):  # fmt: skip
+    """The word for errors over the floor before and after on one unseen run; `fitted` are those on `runs` training runs."""
     monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
     monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
     monkeypatch.setattr(verdict, "added_effects", lambda *_of: named)
     base = SimpleNamespace(
         names=(),
         selection_errors=errors(before),
-        train=errors(before),
+        train_under=lambda _std: errors((fitted or (before, after))[0], runs),
         own_moment=0.0,
         log_evidence=0.0,
         unseen_under=lambda _std: (errors(before), errors(before)),
@@ -33,7 +39,8 @@ def judged(monkeypatch, before, after, p, *, noiseless=False, settled=None, name
         names=named,
         effects=[effect_named(n) for n in named],
         selection_errors=errors(after),
-        train=errors(after),
+        train=errors((fitted or (before, after))[1], runs),
+        train_under=lambda _std: errors((fitted or (before, after))[1], runs),
         validation=(),
         validation_errors=errors(after),
         own_moment=0.0,
@@ -61,7 +68,17 @@ def test_without_noise_no_floor_says_what_is_large(monkeypatch):
 
 @pytest.mark.parametrize(("settled", "word"), [(1.1, "effect"), (12.0, "unexplained")])
 def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, word):
-    assert judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled) == word
+    assert judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled, fitted=(1.0, 1.0)) == word
+
+
+@pytest.mark.parametrize(("runs", "word"), [(1, "effect"), (2, "disturbed")])
+def test_an_effect_must_explain_most_of_what_all_runs_show_and_not_of_the_unseen_ones_alone(monkeypatch, runs, word):
+    """One unseen run follows a small compass error; a moment in no catalogue stays in every run."""
+    assert judged(monkeypatch, 3.0, 1.56, 0.6, fitted=(2.15, 2.11), runs=runs) == word
+
+
+def test_a_large_error_on_fitted_runs_is_one_that_is_left(monkeypatch):
+    assert judged(monkeypatch, 2.0, 1.1, 1e-9, fitted=(3.5, 3.3), runs=2) == "unexplained"
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,7 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None, own_moment=0
         log_evidence=gain,
         selection_errors=errors[0],
         train=errors[1],
+        error_of_all_runs=lambda floor: float(np.hypot(errors[0].over(floor), errors[1].over(floor)) / 2**0.5),
         unseen_errors=(errors[0], errors[2]),
         own_moment=own_moment,
         train_under=lambda std: grown(errors[1], std),
@@ -129,16 +130,17 @@ def test_what_is_left_may_be_left_on_either_runs(over, train, more):
     assert leaves_error(hypothesis(over=over, train=train), FLOOR) == more
 
 
-def test_the_effect_whose_lack_costs_most_on_unseen_runs_is_named_first():
+@pytest.mark.parametrize(("over", "train"), [(3.0, 1.0), (1.2, 3.0)])
+def test_the_effect_whose_lack_costs_most_on_all_runs_is_named_first(over, train):
     both = hypothesis("speed_varying", "current", gain=90.0, over=1.0)
-    likely, useful = hypothesis("speed_varying", gain=60.0, over=3.0), hypothesis("current", gain=50.0, over=1.3)
-    search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, likely, useful)})
+    likely, useful = hypothesis("speed_varying", gain=60.0, over=over, train=train), hypothesis("current", gain=50.0, over=1.3)
+    search = SimpleNamespace(known=(), floor=FLOOR, tried={frozenset(h.names): h for h in (both, likely, useful)})
     assert added_effects(search, both) == ("current", "speed_varying")
 
 
 def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
     both, alone = hypothesis("speed_varying", "stall", gain=90.0, over=1.0), hypothesis("stall", gain=80.0, over=1.2)
-    search = SimpleNamespace(known=(), tried={frozenset(h.names): h for h in (both, alone)})
+    search = SimpleNamespace(known=(), floor=FLOOR, tried={frozenset(h.names): h for h in (both, alone)})
     assert added_effects(search, both) == ("stall", "speed_varying")
 
 

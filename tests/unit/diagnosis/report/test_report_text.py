@@ -116,3 +116,14 @@ def test_where_the_fitted_runs_leave_the_numbers_open_the_headline_says_both_err
         "the error on the fitted runs goes from 3.00 to 1.00 x the noise floor, that on unseen runs from 7.00 to 9.00 x with "
         "their numbers, to 1.10 x with those that all runs together leave"
     )
+
+
+def test_a_disturbance_beside_small_effects_does_not_say_that_none_is_there():
+    base, small = _made(train=(2.0,), unseen=(1.93,), score=0.0), _made("servo_lag", train=(2.0,), unseen=(1.75,), score=9.0)
+    noise = Noise(0.004, 0.002, disturbance=0.0065, disturbance_time=2.3)
+    alone, beside = (headline(_search(base), Verdict("disturbed", ()), h, SimpleNamespace(), FLOOR, noise) for h in (base, small))
+    assert alone.startswith(
+        "no effect of the catalogue is missing: what is left, 1.93 x the noise floor, is a disturbance moment"
+    )
+    assert beside.startswith("what is left, 1.93 x the noise floor, is for the most part a disturbance moment of 0.0065 rad/s^2")
+    assert beside.endswith("; servo_lag may be there besides, and leaves 1.75 x the noise floor")
