@@ -45,6 +45,8 @@ settings.load_profile("steady")
 
 MOST_WORKERS = 4
 """Largest number of processes that share the whole suite: each holds half a GiB and makes what files share again."""
+SHARE = "FIELDSID_TEST_SHARE"
+"""Names in the environment which part of the tests to run, as 1/2: other processors share them."""
 FORKS = pytest.StashKey[list[str]]()
 """The files of the tests that fork, which a worker of the suite leaves to a process of their own."""
 
@@ -78,6 +80,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         left_out = [item for item in items if item.path.name == "test_forks.py"]
         for item in forking if not can_fork() else ():
             item.add_marker(pytest.mark.skip(reason="needs Linux, a second core and no other threads"))
+    if share := os.environ.get(SHARE):
+        which, of = (int(number) for number in share.split("/"))
+        left_out += [item for i, item in enumerate(items) if i % of != which - 1]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
