@@ -164,9 +164,8 @@ def test_an_unseen_run_is_flown_at_its_own_speed_and_that_is_said() -> None:
 
 
 @pytest.mark.forks
-@pytest.mark.parametrize("kind", ["single", "pair"])
-def test_a_second_core_changes_no_digit(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    case = visible_case(kind, 40)
+def test_a_second_core_changes_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = visible_case("pair", 40)
     shared = diagnosed(case)
     monkeypatch.setattr(worker_pool, "can_fork", lambda: False)
     assert body_of(diagnosed(case)) == body_of(shared)
