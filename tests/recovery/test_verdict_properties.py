@@ -72,7 +72,7 @@ def test_sufficient_is_said_only_within_fifteen_percent_of_the_noise(kind, index
 
 @pytest.mark.parametrize(("kind", "index"), CASES)
 def test_the_same_flight_told_otherwise_gets_the_same_verdict(kind, index):
-    """The runs in another order, thrust in another unit and, of a yaw, port for starboard: all at once, as each takes a search."""
+    """The runs in another order, thrust in another unit and, of a yaw, port for starboard: at once, as each takes a search."""
     c, d = case(kind, index), found(kind, index)
 
     def told_otherwise(logs: list[Log]) -> list[Log]:

@@ -24,7 +24,6 @@ from fieldsid.diagnosis.thresholds import (
     MAX_ERROR_RATIO,
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
-    SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
@@ -45,12 +44,9 @@ class Search(MoveEvaluation):
         self._expand()
         self._join_leaders()
         self._grow_rivals()
-        if self._leaves_visible_error(self.best_admissible()):
+        if self.leaves_visible_error():
             self._fit_in_series(self._all_in_series())
-        self._exchange_for_variants()
-        self._exchange_for_lookalikes()
-        self._drop_each(self._most_evident())
-        self.share_own_moments()
+        self._exchange_leaders()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -106,7 +102,7 @@ class Search(MoveEvaluation):
         if not (gains_any_evidence(parent, best) and leaves_error(best, self.floor)):
             return
         for other in [h for h in children[1:] if gains_any_evidence(parent, h) or lowers_error(parent, h)][:MAX_JOINED]:
-            if self.may_go_on():
+            if self.may_go_on(leading=True):
                 best = max(best, self._join(best, other, other.effects), key=lambda h: h.log_evidence)
 
     def _join_leaders(self) -> None:
@@ -153,12 +149,23 @@ class Search(MoveEvaluation):
         alike = all(mine.mean < MISSING_ERROR_RATIO * other.mean for mine, other in pairs)
         return alike and len(self.known) < len(h.names) <= len(best.names) and self.admissible(h)
 
-    def _exchange_for_variants(self) -> None:
-        """Try the model of the highest evidence without each effect, the others of the same stage in their other variants.
+    def _exchange_leaders(self) -> None:
+        """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn."""
+        exchanged = set[ModelSpec]()
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged:
+            exchanged.add(spec)
+            self._exchange_for_variants(best)
+            self._exchange_for_lookalikes(self._most_evident())
+            self._drop_each(self._most_evident())
+            self.share_own_moments()
+            self._expand()
+
+    def _exchange_for_variants(self, best: ScoredModel) -> None:
+        """Try a model without each effect, the others of the same stage in their other variants.
 
         An effect may stand for such a variant: a dead time for the inertia of a servo.
         """
-        best, asked = self._most_evident(), list[VariantRequest]()
+        asked = list[VariantRequest]()
         for gone in best.effects:
             without = self.tried.get(frozenset(best.names) - {gone.name})
             alike = {e.name for e in best.effects if e is not gone and e.stage is gone.stage and e.variants}
@@ -166,20 +173,13 @@ class Search(MoveEvaluation):
                 asked.append(VariantRequest(without, alike))
         self._try_variants(asked)
 
-    def _exchange_for_lookalikes(self) -> None:
-        """Try the model of the highest evidence with each effect exchanged for what it may be mistaken for, from its numbers.
+    def _exchange_for_lookalikes(self, best: ScoredModel) -> None:
+        """Try a model with each effect exchanged for what it may be mistaken for, from its numbers.
 
         The screens are of first order: where one stands for a lag of a sample, the lag itself may have passed none, or ended at a
         worse optimum beside the others. And an effect in another variant may stand for its textbook's and one of those. What
-        comes so near that a variant could lead is tried in its variants. What leads after it is exchanged in its turn.
+        comes so near that a variant could lead is tried in its variants.
         """
-        exchanged = set[ModelSpec]()
-        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged:
-            exchanged.add(spec)
-            self._exchange_each(best)
-
-    def _exchange_each(self, best: ScoredModel) -> None:
-        """Try a model with each effect exchanged for what it may be mistaken for."""
         for stands in (e for e in best.effects if e.name not in self.known):
             others = [e for e in best.effects if e is not stands]
             alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
@@ -209,8 +209,15 @@ class Search(MoveEvaluation):
         return [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
 
     def _next_to_expand(self) -> ScoredModel | None:
-        """Return the base, then the leading model to expand next; None where all are expanded."""
-        if self.root not in self.tried.progress.expanded:
+        """Return the leading model to expand next, the one of the highest log evidence first; None where all are expanded.
+
+        The base is expanded under every kind of noise and trim law: after the model that leads, which the one before has found,
+        and where the budget is used up only where there is no other.
+        """
+        best = self._most_evident()
+        if self._is_expandable(best) and self.may_go_on(leading=True):
+            return best
+        if self.root not in self.tried.progress.expanded and (len(self.tried) == 1 or self.may_go_on()):
             return self.base()
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
 
@@ -237,10 +244,6 @@ class Search(MoveEvaluation):
         """Whether a model is new, does not diverge, is below the largest size, and leaves an error above the noise floor."""
         is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
-
-    def _leaves_visible_error(self, h: ScoredModel) -> bool:
-        """Whether a model leaves more than a sufficient one may, on fitted or on unseen runs."""
-        return max(h.selection_errors.over(self.floor), h.train.over(self.floor)) > SUFFICIENT_ERROR_RATIO
 
     def _all_in_series(self) -> list[tuple[Effect, Effect]]:
         """Return every actuator with every hidden state that it is mistaken for, one in the variant that stands for it."""
@@ -295,7 +298,7 @@ class Search(MoveEvaluation):
         that stands for coloured sensor noise lets the heading drift at no cost. The kind is asked of the most evident model, in
         whose residuals the least is missing. The best model is kept, fitted again.
         """
-        if not self.may_go_on():
+        if not self.may_go_on(leading=True):
             return False
         found = self.best_admissible()
         noise = partial(fit_other_noise, self._most_evident(), self.floor, self.tried.noise_kinds, self.parallel)

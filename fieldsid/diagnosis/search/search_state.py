@@ -24,7 +24,7 @@ from fieldsid.diagnosis.search.speed_law_search import (
     speed_laws,
 )
 from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
-from fieldsid.diagnosis.thresholds import EXPLAINED_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import EXPLAINED_ERROR_RATIO, RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.models.axis import Axis
@@ -113,9 +113,14 @@ class SearchState:
             self._try_variants([VariantRequest(self.tried[self.root])])
         return self.tried[self.root]
 
-    def may_go_on(self) -> bool:
-        """Whether evaluations are left."""
-        return self.budget.remaining(lambda: self.error_ratio(self.best_admissible()) > MISSING_ERROR_RATIO)
+    def may_go_on(self, *, leading: bool = False) -> bool:
+        """Whether evaluations are left; with the model that leads the search goes on also while an error is visible."""
+        return (leading and self.leaves_visible_error()) or self.budget.remaining()
+
+    def leaves_visible_error(self) -> bool:
+        """Whether the best accepted set leaves more than a sufficient model may, on fitted or on unseen runs."""
+        best = self.best_admissible()
+        return max(best.selection_errors.over(self.floor), best.train.over(self.floor)) > SUFFICIENT_ERROR_RATIO
 
     def update_noise_floor(self, fitted: FittedProblem) -> None:
         """Lower the noise floor to what the third differences of a fit's residuals show, unless the log is noiseless."""

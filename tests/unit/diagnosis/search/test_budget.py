@@ -36,16 +36,21 @@ EFFECTS = all_effects(Axis.YAW)
 def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
     allowance = Budget(2, 10.0)
     allowance.evaluations.add(19)
-    assert allowance.remaining(lambda: False)
+    assert allowance.remaining()
     assert not allowance.is_exhausted
     allowance.evaluations.add()
-    assert allowance.remaining(lambda: True), "more where something is missing"
-    assert not allowance.is_exhausted
-    assert not allowance.remaining(lambda: False)
+    assert not allowance.remaining()
     assert allowance.is_exhausted
-    allowance.evaluations.add(20)
-    assert not allowance.remaining(lambda: True)
-    assert Budget(2, np.inf).remaining(lambda: False)
+    assert Budget(2, np.inf).remaining()
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_beyond_it_only_what_leads_is_expanded_and_only_while_an_error_is_visible(monkeypatch, visible):
+    made = a_search(thorough=False)
+    made.budget.most = 0.0
+    monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
+    assert made.may_go_on(leading=True) == visible
+    assert not made.may_go_on()
 
 
 def test_what_a_copy_has_worked_out_counts():

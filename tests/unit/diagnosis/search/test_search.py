@@ -84,7 +84,7 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
     monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
     made.budget.most = 0.0  # what is named last is asked for whatever was spent before
-    made._exchange_for_lookalikes()
+    made._exchange_for_lookalikes(parent)
     lagged = made.tried[frozenset(["gyro_bias", "servo_lag"])]
     assert lagged.log_evidence > parent.log_evidence
     assert lagged.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
