@@ -43,9 +43,7 @@ def _answered(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         return INTERRUPTED
-    except (BrokenPipeError, SystemExit) as end:
-        if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):  # typer makes an exit of it
-            raise
+    except BrokenPipeError:
         # The reader went away (`| head`): point stdout elsewhere so that the interpreter's last flush is quiet.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         code = DONE
@@ -83,7 +81,8 @@ def _end(codes: list[int]) -> None:
 def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     """Run one command in this process and return what it returns; session: what it shares with other commands.
 
-    Raises UsageError for an unknown command, KeyboardInterrupt, and whatever the command raises.
+    Raises UsageError for an unknown command, KeyboardInterrupt, BrokenPipeError where who reads the output has gone away, and
+    whatever the command raises.
     """
     from fieldsid.cli.programs import program_of
 
@@ -94,7 +93,12 @@ def run(arguments: Sequence[str], session: Session | None = None) -> Any:
     remember(arguments)
     if "--help" not in arguments:
         load_own_effects()
-    result = program(words, prog_name=name, standalone_mode=False, obj=session)
+    try:
+        result = program(words, prog_name=name, standalone_mode=False, obj=session)
+    except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # typer makes an exit of it
+            raise end.__context__ from None
+        raise
     if result == INTERRUPTED:  # typer makes a number of it
         raise KeyboardInterrupt
     return result

@@ -17,7 +17,7 @@ from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
 from fieldsid.logs.reader import Reader, ReadOptions, reader_of
-from fieldsid.logs.run import OF_LIMITS, Note, Run
+from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run
 
 MAPPING_FILE = "mapping.yaml"
 
@@ -89,12 +89,12 @@ def map_for(
     chosen = _loaded(mapping) if mapping is not None else reader.own_map(path, options)
     if chosen is None:
         file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file()), None)
-        if file is not None:
-            chosen = _loaded(file)
-            notes.append(Note("mapping", f"read with `{file}`", {"path": str(file)}))
+        chosen = None if file is None else _loaded(file)
     complete = chosen_map(None, chosen, channels)
     if complete is None:
         raise _unmapped(path, reader, options)
+    if complete.origin is not None:
+        notes.append(Note(READ_WITH, f"read with `{complete.origin}`", {"path": str(complete.origin)}))
     return complete, notes
 
 

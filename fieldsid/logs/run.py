@@ -64,6 +64,8 @@ class Note(Brief):
 
 SIMULATED = "simulated"
 """Code of the note of a run that a model made."""
+READ_WITH = "mapping"
+"""Code of the note that names the mapping file which a log was read with, under `path`."""
 OF_LIMITS = ("saturated", "fin_limit")
 """Codes of the notes that hang on the fin limits: a run keeps those of its import, and is judged by the limits of the day."""
 

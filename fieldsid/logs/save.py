@@ -12,7 +12,7 @@ from fieldsid._version import __version__
 from fieldsid.artifacts import plain, replacing, sha256_of
 from fieldsid.errors import UsageError
 from fieldsid.logs.mapping.canonical_names import TIME
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import READ_WITH, Run
 
 SCHEMA = "fieldsid/run/1"
 SUFFIXES = (".parquet", ".csv", ".csv.gz")
@@ -21,8 +21,9 @@ SUFFIXES = (".parquet", ".csv", ".csv.gz")
 def save_run(run: Run, path: Path, *, force: bool = False) -> Path:
     """Write a run to .parquet, .csv or .csv.gz and return the path.
 
-    Every number comes back exactly. Parquet also keeps the notes, the schema, the tool's version and the source's
-    sha256. Raises UsageError for another suffix, ArtifactError when the file exists or cannot be written.
+    Every number comes back exactly. Parquet also keeps the notes, the schema, the tool's version and the sha256 of
+    the log and of its mapping file. Raises UsageError for another suffix, ArtifactError when the file exists or cannot be
+    written.
     """
     if path.name.endswith(".parquet"):
         return _save_parquet(run, path, force=force)
@@ -44,8 +45,9 @@ def _save_parquet(run: Run, path: Path, *, force: bool) -> Path:
 
 
 def _head(run: Run) -> dict[str, object]:
-    source = run.source
-    inputs = [{"path": str(source), "sha256": sha256_of(source)}] if source is not None and source.exists() else []
+    mappings = (Path(n.data["path"]) for n in run.notes if n.code == READ_WITH)
+    read = [p for p in (run.source, *mappings) if p is not None and p.exists()]
+    inputs = [{"path": str(p), "sha256": sha256_of(p)} for p in read]
     notes = [{"code": n.code, "message": n.message, "data": plain(n.data)} for n in run.notes]
     return {
         "schema": SCHEMA,

@@ -52,7 +52,8 @@ def _again(state: FolderState) -> tuple[str, str] | None:
     stale = [i for i in state.items if i.stale]
     if not stale:
         return None
-    first = min(stale, key=lambda i: i.stale.endswith(" is stale"))
+    order = (RUN, MODEL)  # what the rest is made from
+    first = min(stale, key=lambda i: (i.stale.endswith(" is stale"), order.index(i.kind) if i.kind in order else len(order)))
     maker = made_by(state.entries, first.path)
     return f"{first.path}: {first.stale}", _made_again(state, maker) if maker is not None else _remake(state, first)
 
@@ -72,12 +73,16 @@ def _words(state: FolderState, entry: Entry) -> list[str]:
 
 def _remake(state: FolderState, item: Item) -> str:
     """Return how to make a file again that the journal does not know, as far as the file says how."""
-    sources = [s.named for s in item.sources]
     if item.kind == RUN:
-        return shlex.join(["sysid", "import", *sources, "-o", str(Path(item.path).parent), "--force"])
+        log, *mapping = (s.named for s in item.sources)
+        read = [log, *(word for name in mapping for word in ("--mapping", name))]
+        return shlex.join(["sysid", "import", *read, "-o", str(Path(item.path).parent), "--force"])
     if item.kind == MODEL:
         axis = str((item.body or {}).get("axis", "yaw"))
         return shlex.join(["sysid", "identify", *run_words(state), "--axis", axis, "-o", str(Path(item.path).parent), "--force"])
+    if item.kind == "diagnosis":
+        words = ["sysid", "diagnose", *run_words(state), "--axis", str((item.body or {}).get("axis", "yaw")), "-o", item.path]
+        return shlex.join([*words, "--force"])
     return shlex.join(["sysid", "history", item.path])
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
+import subprocess
+import sys
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -229,6 +231,44 @@ def test_a_changed_run_makes_its_model_stale_and_the_gains_made_of_that(run_cli,
     assert body["stale"] == ["gains.yaml"]
     assert run_cli(*shlex.split(body["next"]["command"])[1:]).code == 0
     assert run_cli("status", "--json").json["stale"] == []
+
+
+@pytest.mark.parametrize("kept", [True, False], ids=("by the journal", "without a journal"))
+def test_a_changed_mapping_makes_what_was_read_with_it_stale(run_cli, folder, kept):
+    for place in BOTH_RUNS:
+        (folder / place).unlink()
+    log = "logs/pulses.csv"
+    (folder / "logs").mkdir(exist_ok=True)
+    time = 0.1 * np.arange(300)
+    table = np.column_stack([time, np.sin(time), np.cos(time), 10.0 * np.sign(np.sin(time))])
+    np.savetxt(folder / log, table, delimiter=",", header="t,psi,r,helm", comments="")
+    mapping = "time: {column: t, unit: s}\nsignals:\n  yaw_rad: {column: psi}\n  rudder_rad: {column: helm, unit: deg}\n"
+    (folder / "mapping.yaml").write_text(f"schema: fieldsid/mapping/1\n{mapping}")
+    assert run_cli("import").code == 0
+    assert run_cli("identify", "--axis", "yaw", "--no-figures").code == 0
+    assert run_cli("status", "--json").json["stale"] == []
+    (folder / "mapping.yaml").write_text(f"schema: fieldsid/mapping/1\n{mapping}".replace("deg", "deg, sign: -1"))
+    if not kept:
+        (folder / "journal.jsonl").write_text("")
+    body = run_cli("status", "--json").json
+    assert {f["path"]: f["stale"] for f in body["files"]}["runs/pulses.parquet"] == "mapping.yaml has changed"
+    assert body["stale"] == ["models/pulses_yaw.yaml", "runs/pulses.parquet"]
+    again = body["next"]["command"]
+    assert again.startswith(f"sysid import {log} ")
+    assert ("--mapping mapping.yaml" in again) != kept
+    before = load_run(folder / "runs/pulses.parquet")["rudder_rad"]
+    assert run_cli(*shlex.split(again)[1:]).code == 0
+    assert load_run(folder / "runs/pulses.parquet")["rudder_rad"] == pytest.approx(-before)
+    assert run_cli("status", "--json").json["stale"] == ["models/pulses_yaw.yaml"]
+
+
+def test_a_command_whose_reader_goes_away_has_its_line_in_the_journal(folder):
+    command = f"{shlex.quote(sys.executable)} -m fieldsid effects new tow -o tow.yaml | head -c 0"
+    lines = len(journal(folder))
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "tow.yaml").is_file()
+    assert [entry["command"][1:3] for entry in journal(folder)[lines:]] == [["effects", "new"]]
 
 
 def test_a_run_that_is_gone_is_said_and_makes_nothing_stale(run_cli, folder):

@@ -73,6 +73,8 @@ def test_a_foreign_name_may_state_its_unit(name, signal, unit):
         ("r", "yaw_rate_rad_s"),
         ("Timestamp", "time_s"),
         ("propeller rpm", "propeller_rpm"),
+        ("dvl_u", "surge_m_s"),
+        ("DVL.v", "sway_m_s"),
     ],
 )
 def test_words_of_a_foreign_name_are_understood(name, signal):
