@@ -21,8 +21,8 @@ from fieldsid.artifacts import sha256_of
 from fieldsid.batch.task import Settings, Task
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import ChannelMap
-from fieldsid.logs.importing import QUIET, Importer
-from fieldsid.logs.run import Run
+from fieldsid.logs.importing import Importer
+from fieldsid.logs.run import EXPLAINING, Run
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.vehicle import Vehicle
@@ -128,7 +128,7 @@ def _about(task: Task, run: Run) -> Row:
         "samples": len(run),
         "duration_s": float(run.time[-1] - run.time[0]),
         "rate_hz": 1.0 / float(np.median(np.diff(run.time))),
-        "findings": ",".join(sorted({n.code for n in run.notes if n.code not in QUIET})),
+        "findings": ",".join(sorted({n.code for n in run.notes if n.code not in EXPLAINING})),
     }
 
 

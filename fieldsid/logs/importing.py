@@ -16,15 +16,13 @@ from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import WHOLE
 from fieldsid.logs.convert.conditioning import MAIN, ROUNDING, gap_limit, gaps_in
 from fieldsid.logs.load import load_run
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import EXPLAINING, Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
 from fieldsid.logs.several.run_names import names_apart, stem_of
 from fieldsid.logs.several.stretches import stretches_of
 from fieldsid.registry import near
 
 FORMATS = {"parquet": ".parquet", "csv": ".csv", "csv.gz": ".csv.gz"}
-QUIET = frozenset({"time_origin", "clock", "mapping", "ignored_columns"})
-"""Notes that explain rather than warn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +35,7 @@ class Imported:
     @property
     def warnings(self) -> tuple[Note, ...]:
         """The notes that the user should act on."""
-        return tuple(n for n in self.run.notes if n.code not in QUIET)
+        return tuple(n for n in self.run.notes if n.code not in EXPLAINING)
 
     def record(self) -> dict[str, Any]:
         """Return what was written as plain values."""

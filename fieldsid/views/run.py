@@ -27,8 +27,7 @@ def page(run: Run) -> Page:
     """Return the findings, the run's length and rate, and each signal's count and range."""
     import numpy as np
 
-    from fieldsid.logs.importing import QUIET
-    from fieldsid.logs.run import SIGNALS
+    from fieldsid.logs.run import EXPLAINING, SIGNALS
 
     rows = []
     for name, values in run.signals.items():
@@ -45,8 +44,8 @@ def page(run: Run) -> Page:
         ),
     )
     signals = Block("Signals", tuple(rows), ("", "unit", "measured", "least", "largest"), left=2)
-    quiet = tuple(n.message for n in run.notes if n.code in QUIET)
-    return Page(f"Run {cut(run.name, 60)}", warned(n for n in run.notes if n.code not in QUIET), (known, signals), quiet)
+    quiet = tuple(n.message for n in run.notes if n.code in EXPLAINING)
+    return Page(f"Run {cut(run.name, 60)}", warned(n for n in run.notes if n.code not in EXPLAINING), (known, signals), quiet)
 
 
 def frames(run: Run) -> Mapping[str, Callable[[], DataFrame]]:

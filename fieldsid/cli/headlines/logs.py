@@ -8,6 +8,7 @@ from pathlib import Path
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.logs.run import EXPLAINING
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.trial_folder.journal import is_trial
 from fieldsid.trial_folder.make import LOGS, MAPPING
@@ -60,7 +61,7 @@ def of_import(body: Body) -> Headline:
     axes = [a.value for a in Axis if any({NAMES[a].fin, NAMES[a].fin_measured} & set(r["signals"]) for r in runs)] or ["yaw"]
     files = [r["file"] for r in runs]
     joint = ("--joint",) if len(files) > 1 else ()
-    noted = sum(len(r["notes"]) for r in runs)
+    noted = sum(n["code"] not in EXPLAINING for r in runs for n in r["notes"])
     says = f"{counted(len(runs), 'run')}, {seconds:.0f} s, " + (counted(noted, "note") if noted else "nothing to note")
     return Headline(
         says,
