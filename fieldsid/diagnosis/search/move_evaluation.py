@@ -258,5 +258,5 @@ LEADING_CHILDREN = 3
 """Best children whose left-out moves are evaluated too, and which may take their output-error fit."""
 
 
-MAX_EFFECTS, TESTED_SUBSET_SIZE = 4, 2
-"""Largest number of added effects, and the size of a set whose subsets have all been tried before."""
+TESTED_SUBSET_SIZE = 2
+"""Size of a set of effects whose subsets have all been tried before."""

@@ -16,7 +16,7 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
 from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, add_effect, by_effect
 from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
-from fieldsid.diagnosis.search.move_evaluation import MAX_EFFECTS, MoveEvaluation
+from fieldsid.diagnosis.search.move_evaluation import MoveEvaluation
 from fieldsid.diagnosis.search.multistart import multistart
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import (
@@ -122,7 +122,7 @@ class Search(MoveEvaluation):
         fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
         more = [e for e in effects if e.name not in h.names]
         names = frozenset((*h.names, *(e.name for e in more)))
-        if names in self.tried or len(names) > len(self.known) + MAX_EFFECTS:
+        if names in self.tried:
             return h
         problem = fitted.problem.with_effects([*h.effects, *more])
         start = carry_parameters(problem.layout, fitted.vector, there.vector)
@@ -241,8 +241,11 @@ class Search(MoveEvaluation):
         return [best, *front, *self._less(best)] if leaves_error(best, self.floor) else front
 
     def _is_expandable(self, h: ScoredModel) -> bool:
-        """Whether a model is new, does not diverge, is below the largest size, and leaves an error above the noise floor."""
-        is_new = frozenset(h.names) not in self.tried.progress.expanded and len(h.names) < len(self.known) + MAX_EFFECTS
+        """Whether a model is new, does not diverge, and leaves an error above the noise floor.
+
+        Nothing else ends its growth: what an effect more must bring to lead is the prior against it.
+        """
+        is_new = frozenset(h.names) not in self.tried.progress.expanded
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
 
     def _all_in_series(self) -> list[tuple[Effect, Effect]]:
