@@ -209,16 +209,15 @@ class Search(MoveEvaluation):
         return [h for h in self.ranked() if h.selection_errors.mean < least and self.admissible(h)]
 
     def _next_to_expand(self) -> ScoredModel | None:
-        """Return the leading model to expand next, the one of the highest log evidence first; None where all are expanded.
+        """Return the base, then the leading model to expand next, the most evident first; None where all are expanded.
 
-        The base is expanded under every kind of noise and trim law: after the model that leads, which the one before has found,
-        and where the budget is used up only where there is no other.
+        The base is expanded under every kind of noise and trim law; where the budget is used up only where there is nothing else.
         """
+        if self.root not in self.tried.progress.expanded and (len(self.tried) == 1 or self.may_go_on()):
+            return self.base()
         best = self._most_evident()
         if self._is_expandable(best) and self.may_go_on(leading=True):
             return best
-        if self.root not in self.tried.progress.expanded and (len(self.tried) == 1 or self.may_go_on()):
-            return self.base()
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
 
     def _next_from_others(self) -> ScoredModel | None:
