@@ -9,7 +9,7 @@ import pytest
 from faults.damages import DAMAGES, good_log
 
 from fieldsid.artifacts import to_yaml
-from fieldsid.logs.importing import QUIET
+from fieldsid.logs.run import EXPLAINING
 
 LINE = re.compile(r"`(\w+): ([^`]+)`(?: at ((?:\w+ (?:or|and) )*\w+))?")
 OPTIONS = re.compile(r"`(--(?:from|to) [^`]+)`")
@@ -32,7 +32,7 @@ def imported(run_cli, folder, log, body, *options):
     (folder / "m.yaml").write_text(to_yaml(body))
     done = run_cli("import", log, "--mapping", folder / "m.yaml", "-o", folder / "runs", "--force", "--json", *options)
     assert done.code == 0, done.err
-    return [n for run in done.json["runs"] for n in run["notes"] if n["code"] not in QUIET]
+    return [n for run in done.json["runs"] for n in run["notes"] if n["code"] not in EXPLAINING]
 
 
 def with_line(body, key, value, signals):

@@ -19,7 +19,7 @@ import numpy as np
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs import load_run
-from fieldsid.logs.importing import QUIET
+from fieldsid.logs.run import EXPLAINING
 
 Signals = dict[str, np.ndarray]
 
@@ -224,7 +224,7 @@ def findings(log: Signals, folder: Path) -> set[str]:
         run = load_run(path)
     except FieldsidError as error:
         return {error.what}
-    return {note.code for note in run.notes} - QUIET
+    return {note.code for note in run.notes} - EXPLAINING
 
 
 def is_told(damage: Damage, found: set[str]) -> bool:
