@@ -73,16 +73,17 @@ def _words(state: FolderState, entry: Entry) -> list[str]:
 
 def _remake(state: FolderState, item: Item) -> str:
     """Return how to make a file again that the journal does not know, as far as the file says how."""
-    if item.kind == RUN:
-        log, *mapping = (s.named for s in item.sources)
-        read = [log, *(word for name in mapping for word in ("--mapping", name))]
+    axis = str((item.body or {}).get("axis", "yaw"))
+    named = [s.named for s in item.sources]
+    mappings = [name for name in named if name.endswith((".yaml", ".yml"))]
+    logs = [name for name in named if name not in mappings]
+    if item.kind == RUN and logs:  # of one that was piped in nothing says where it came from
+        read = [*logs, *(word for name in mappings for word in ("--mapping", name))]
         return shlex.join(["sysid", "import", *read, "-o", str(Path(item.path).parent), "--force"])
     if item.kind == MODEL:
-        axis = str((item.body or {}).get("axis", "yaw"))
         return shlex.join(["sysid", "identify", *run_words(state), "--axis", axis, "-o", str(Path(item.path).parent), "--force"])
     if item.kind == "diagnosis":
-        words = ["sysid", "diagnose", *run_words(state), "--axis", str((item.body or {}).get("axis", "yaw")), "-o", item.path]
-        return shlex.join([*words, "--force"])
+        return shlex.join(["sysid", "diagnose", *run_words(state), "--axis", axis, "-o", item.path, "--force"])
     return shlex.join(["sysid", "history", item.path])
 
 
