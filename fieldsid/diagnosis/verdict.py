@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import common_own_moment, compared_errors, validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import compared_errors, fitted_errors, validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors
@@ -53,7 +53,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
-    fitted = _fitted_errors(search.base(), found)
+    fitted = fitted_errors(search.base(), found)
     error = max(now.over(floor), fitted[1].over(floor))
     if frozenset(found.names) == search.root:
         if max(found.selection_errors.over(floor), found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:
@@ -77,12 +77,6 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     if rivals:
         return Verdict("undecided", added_effects(search, found), rivals)
     return Verdict("effect", added_effects(search, found))
-
-
-def _fitted_errors(base: ScoredModel, found: ScoredModel) -> tuple[Errors, Errors]:
-    """Return the errors of two models on the training runs, with moments of the runs' own of the same size."""
-    std = common_own_moment(base, found)
-    return base.train_under(std), found.train_under(std)
 
 
 def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:

@@ -40,7 +40,7 @@ def lowers_error(
     sufficient model has speaks against nothing: the run is too mild. See `compared_errors` for which validation error.
     """
     before, now = compared_errors(without, with_, floor)
-    was, left = (h.train_under(common_own_moment(without, with_)) for h in (without, with_))
+    was, left = fitted_errors(without, with_)
     unseen, fitted = now.mean / before.mean, left.mean / was.mean
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
     explains = floor is not None and _explains_most((before, was), (now, left), floor, least)
@@ -60,6 +60,12 @@ def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | Non
     first, *settled = zip(without.unseen_under(std), with_.unseen_under(std), strict=True)
     visible = [pair for pair in settled if floor is None or pair[0].over(floor) > SUFFICIENT_ERROR_RATIO]
     return min((first, *visible), key=lambda pair: pair[1].mean / pair[0].mean)
+
+
+def fitted_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:
+    """Return the errors of two models on the training runs, with moments of the runs' own as in `compared_errors`."""
+    std = common_own_moment(without, with_)
+    return without.train_under(std), with_.train_under(std)
 
 
 def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
