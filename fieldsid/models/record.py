@@ -115,6 +115,13 @@ class Record(Brief):
         object.__setattr__(other, "commanded", other.path_with_lead(other.command_lead))
         return other
 
+    def with_command_lead(self, early: FloatArray) -> Record:
+        """Return the record with its held commands given so much before their samples, (n,) s, and all else as it is."""
+        other = copy(self)
+        object.__setattr__(other, "command_lead", early)
+        object.__setattr__(other, "commanded", other.path_with_lead(early))
+        return other
+
     def at_speed(self, speed: float) -> Record:
         """Return the record that counts as flown at another speed, in m/s, and all else as it is; itself at its own."""
         if speed == self.speed or not np.isfinite(speed):

@@ -16,6 +16,7 @@ from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
 from fieldsid.noise.whiten import base_dynamics, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
+from fieldsid.numerics.secant_information import with_secants
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MIN_NOISE_SIGNAL_SHARE = 1e-4
@@ -81,17 +82,19 @@ def estimate_noise(
     slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, likelihood, evaluations or EvaluationCounter())
     x = np.clip(np.log([max(rough.get(n, getattr(start, n)), BELOW_ANY_BOUND) for n in names]), low, high)
     value, score, fisher = slope.at(x)
-    damping = MIN_DAMPING
+    damping, secants, curvature = MIN_DAMPING, list[tuple[FloatArray, FloatArray]](), fisher
     for _ in range(MAX_SCORING_ITERATIONS):
         # each within its own leap, the others making the best of that: one on its way to nothing would hold them all back
-        moved = bounded_step(fisher, score, damping, x, np.maximum(low, x - MAX_LOG_STEP), np.minimum(high, x + MAX_LOG_STEP))
+        moved = bounded_step(curvature, score, damping, x, np.maximum(low, x - MAX_LOG_STEP), np.minimum(high, x + MAX_LOG_STEP))
         if float(score @ moved) < MIN_SCORING_GAIN:
             break
         trial = x + moved
         new = slope.at(trial, value)
         if new[0] > value:
-            gained, expected, x = new[0] - value, float(score @ moved - 0.5 * moved @ fisher @ moved), trial
+            gained, expected, x = new[0] - value, float(score @ moved - 0.5 * moved @ curvature @ moved), trial
+            secants = [*secants, (moved, score - new[1])][-x.size :]
             value, score, fisher = new
+            curvature = with_secants(fisher, secants)
             damping = max(damping * _next_damping(gained / expected), MIN_DAMPING)
             if gained < MIN_SCORING_GAIN:
                 break

@@ -325,13 +325,9 @@ def training_runs(fitted: FittedProblem) -> tuple[FreeRun, ...]:
 def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     """Return the prior log odds and half the log of the effective sample size of each coefficient.
 
-    Shared coefficients and authorities beyond the first count once; nuisances once for every run they fit, with all its samples.
-
-    The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
+    Shared coefficients and authorities beyond the first count once; nuisances once for every run they fit, see `price_of_runs`.
     """
     layout, records = ml_fit.fitted.problem.layout, ml_fit.fitted.problem.records
-    own = sum(len(e.nuisance) for e in layout.effects)
-    hidden = sum(1 for e in layout.effects if e.extra_states)
     odds = ALTERNATIVE_LOG_ODDS
     total = sum(EVIDENCE_TEMPERATURE * odds + odds * e.is_formed + e.log_prior_penalty for e in layout.effects)
     beyond = {c.name for e in layout.effects for c in e.shared} | {
@@ -339,9 +335,17 @@ def bic_penalty(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> float:
     } - {NAMES[layout.axis].authority}
     sizes = ml_fit.information.sample_sizes
     total += 0.5 * float(np.log(sizes[[n in beyond for n in layout.names]]).sum())
-    for record in (*records, *validation):
-        total += 0.5 * own * np.log(max(measured_count([record]), 2)) + hidden
+    total += sum(price_of_runs(e, (*records, *validation)) for e in layout.effects)
     return float(total) + exchange_penalty(ml_fit)
+
+
+def price_of_runs(effect: Effect, records: Sequence[Record]) -> float:
+    """Return half the log of the sample size of each number that an effect has of each run's own: all the run's samples.
+
+    The start of a hidden state is soon forgotten and speaks on few samples: it costs 1, as Akaike has it.
+    """
+    hidden = 1.0 if effect.extra_states else 0.0
+    return sum(0.5 * len(effect.nuisance) * float(np.log(max(measured_count([r]), 2))) + hidden for r in records)
 
 
 def errors_of(runs: Sequence[FreeRun], own_moment: float) -> Errors:

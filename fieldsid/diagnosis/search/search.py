@@ -140,7 +140,8 @@ class Search(MoveEvaluation):
         for h in [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]:
             if self.may_go_on():
                 left = [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
-                moves = add_effect(h, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True)
+                behind = best.log_evidence - h.log_evidence - RIVAL_LOG_ODDS
+                moves = add_effect(h, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True, behind=max(behind, 0.0))
                 self._evaluate_moves(h, by_effect(moves))
 
     def _predicts_as_well(self, h: ScoredModel, best: ScoredModel) -> bool:

@@ -21,7 +21,7 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.maximum_likelihood import estimate_noise
+from fieldsid.noise.maximum_likelihood import MIN_SCORING_GAIN, estimate_noise
 from fieldsid.noise.whiten import whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gram_least_squares import gram_least_squares
@@ -38,7 +38,7 @@ MIN_TIMING_EVIDENCE_GAIN = 6.0
 MAX_TIMING_ITERATIONS = 4
 MAX_CORRELATION_LAG_S = 2.0
 MAX_ALTERNATIONS = 3
-"""Turns of noise and start, each at its best for the other."""
+"""Turns of noise and start, each at its best for the other, as long as that gains anything."""
 UNIFORM_VARIANCE_RATIO = 12.0
 """Square of an interval over the variance of what is spread evenly over it."""
 
@@ -65,7 +65,11 @@ def command_timing(problem: Problem, x: FloatArray, floor: Noise) -> Record | No
     times, own = run.best(slopes, each, together - 0.5 * most, np.minimum(together + 0.5 * most, most))
     if not _rough_gain(record, shift, own) > price:
         return None
-    return run.record_with(times) if run.likelihood(own) - run.likelihood(shift) > price else None
+    likelihood, noise = run.likelihood(own)
+    # under a noise of its own the shift is no less likely than under that of the times
+    if not likelihood - run.likelihood_under(noise, shift)[0] > price:
+        return None
+    return run.record_with(times) if likelihood - run.likelihood(shift)[0] > price else None
 
 
 def jumps_of(record: Record) -> npt.NDArray[np.intp]:
@@ -113,7 +117,7 @@ class _CommandTiming:
 
     def record_with(self, times: FloatArray) -> Record:
         """Return the record with its commands given so much before their samples."""
-        return replace(self.problem.records[0], command_lead=self.command_lead(times))
+        return self.problem.records[0].with_command_lead(self.command_lead(times))
 
     def command_lead(self, times: FloatArray) -> FloatArray:
         """Return by how much before its sample each command was given, (n,) s."""
@@ -169,20 +173,30 @@ class _CommandTiming:
             left = self._restarted(raw, weight)
         return times, left
 
-    def likelihood(self, residual: FloatArray) -> float:
-        """Return the log likelihood of a residual (2, n) at its best start, under noise and disturbance of its own."""
+    def likelihood(self, residual: FloatArray) -> tuple[float, Noise]:
+        """Return the log likelihood of a residual (2, n) at its best start, under noise and disturbance of its own, and that."""
         record, base = self.problem.records[0], self.problem.base_of(self.x, 0)
-        noise, best = self.floor, -np.inf
-        for _ in range(MAX_ALTERNATIONS):
+        noise, best = self.floor, (-np.inf, self.floor)
+        for count in range(MAX_ALTERNATIONS):
             noise, _ = estimate_noise(
-                [record], [(base.damping, base.stiffness)], [residual], "disturbance", noise, evaluations=self.problem.evaluations
-            )
-            white, logs = whiten(record, noise, base.damping, base.stiffness, np.concatenate([residual[None], self.starts]))
-            flat = white.reshape(white.shape[0], -1)
-            move = gram_least_squares(flat[1:], flat[0])
-            residual = residual - np.tensordot(move, self.starts, axes=1)
-            best = max(best, -0.5 * (logs + float(np.sum((flat[0] - move @ flat[1:]) ** 2))))
+                [record], [(base.damping, base.stiffness)], [residual], "disturbance", noise, reinitialise=count == 0,
+                evaluations=self.problem.evaluations,
+            )  # fmt: skip
+            value, residual = self.likelihood_under(noise, residual)
+            gained = value - best[0]
+            best = max(best, (value, noise), key=lambda found: found[0])
+            if gained < MIN_SCORING_GAIN:
+                break
         return best
+
+    def likelihood_under(self, noise: Noise, residual: FloatArray) -> tuple[float, FloatArray]:
+        """Return the log likelihood of a residual (2, n) at its best start under a noise, and the residual there."""
+        record, base = self.problem.records[0], self.problem.base_of(self.x, 0)
+        white, logs = whiten(record, noise, base.damping, base.stiffness, np.concatenate([residual[None], self.starts]))
+        flat = white.reshape(white.shape[0], -1)
+        move = gram_least_squares(flat[1:], flat[0])
+        value = -0.5 * (logs + float(np.sum((flat[0] - move @ flat[1:]) ** 2)))
+        return value, np.asarray(residual - np.tensordot(move, self.starts, axes=1))
 
     def _restarted(self, residual: FloatArray, weight: FloatArray) -> FloatArray:
         """Return a residual (2, n) with what a better start would take from it taken away."""
