@@ -27,7 +27,7 @@ DAMPING, STIFFNESS, CROSS_FACTOR, CROSS_INPUT = (
 )
 MOMENT, FLOW = ((integrate.DRIVES.index(f"{name}_start"), integrate.DRIVES.index(f"{name}_end")) for name in ("moment", "flow"))
 """The places of the core's drives."""
-NO_CORE = Core()
+NO_CORE, NO_TERMS = Core(), Terms()
 _CONSTANTS = attrgetter(*integrate.CONSTANTS)
 MAX_MOMENT_ITERATIONS = 30
 MOMENT_TOLERANCE = 1e-9
@@ -70,21 +70,7 @@ def fin_path(record: Record, effects: Sequence[Effect], values: Values, commande
 
 def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:
     """Return the product of all factors and the sum of all additions of the effects' signal-driven terms."""
-    damping_factor: FloatArray | None = None
-    authority_factor: FloatArray | None = None
-    moment: FloatArray | None = None
-    damping: FloatArray | None = None
-    cross_factor: FloatArray | None = None
-    for effect in effects:
-        if effect.terms is None:
-            continue
-        t = effect.terms(values, record)
-        damping_factor = _times(damping_factor, t.damping_factor)
-        authority_factor = _times(authority_factor, t.authority_factor)
-        moment = _plus(moment, t.moment)
-        damping = _plus(damping, t.damping)
-        cross_factor = _times(cross_factor, t.cross_factor)
-    return Terms(damping_factor, authority_factor, moment, damping, cross_factor)
+    return reduce(Terms.beside, (e.terms(values, record) for e in effects if e.terms is not None), NO_TERMS)
 
 
 def combined_core(effects: Sequence[Effect], values: Values, scale: float) -> Core:
@@ -229,15 +215,3 @@ def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray |
 def _largest(values: FloatArray | float) -> float:
     """Return the largest size of values, or of one."""
     return max(float(values.max()), -float(values.min())) if isinstance(values, np.ndarray) else abs(values)
-
-
-def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
-    if a is None or b is None:
-        return a if b is None else b
-    return a * b
-
-
-def _plus(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
-    if a is None or b is None:
-        return a if b is None else b
-    return a + b

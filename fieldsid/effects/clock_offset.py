@@ -14,6 +14,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values, Variant
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 
 def _then(values: Values, record: Record) -> FloatArray:
@@ -24,17 +25,29 @@ def _then(values: Values, record: Record) -> FloatArray:
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion `offset` seconds later; angle (n,) rad, rate (n,) rad/s."""
-    then = _then(values, record)
-    return Motion(np.interp(then, record.time, motion.angle), np.interp(then, record.time, motion.rate))
+    shown = sensor_jvp(np.stack([motion.angle, motion.rate])[None], motion, values, record)[0]
+    return Motion(shown[0], shown[1])
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as they are logged, `offset` seconds later."""
-    time = record.time
-    then = np.clip(_then(values, record), time[0], time[-1])
-    before = np.clip(np.searchsorted(time, then, side="right") - 1, 0, time.size - 2)
-    share = (then - time[before]) / (time[before + 1] - time[before])
-    return np.asarray(moves[:, :, before] * (1.0 - share) + moves[:, :, before + 1] * share)
+    out = np.empty_like(moves)
+    interpolate(record.time, _then(values, record), np.ascontiguousarray(moves), out)
+    return out
+
+
+@jit
+def interpolate(time: FloatArray, then: FloatArray, moves: FloatArray, out: FloatArray) -> None:
+    """Fill out (P, 2, n) with moves (P, 2, n) at other times (n,), both rising, held before the first and after the last."""
+    n, before = time.shape[0], 0
+    for i in range(n):
+        at = min(max(then[i], time[0]), time[n - 1])
+        while before < n - 2 and time[before + 1] <= at:
+            before += 1
+        share = (at - time[before]) / (time[before + 1] - time[before])
+        for j in range(moves.shape[0]):
+            for ch in range(2):
+                out[j, ch, i] = moves[j, ch, before] * (1.0 - share) + moves[j, ch, before + 1] * share
 
 
 EFFECT = Effect(

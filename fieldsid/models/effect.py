@@ -121,6 +121,33 @@ class Terms:
     damping: FloatArray | None = None
     cross_factor: FloatArray | None = None
 
+    @property
+    def has_factors(self) -> bool:
+        """Whether any part is a factor."""
+        return not (self.damping_factor is None and self.authority_factor is None and self.cross_factor is None)
+
+    def beside(self, other: Terms) -> Terms:
+        """Return the parts of two effects together: the products of the factors, the sums of the additions."""
+        return Terms(
+            _times(self.damping_factor, other.damping_factor),
+            _times(self.authority_factor, other.authority_factor),
+            _plus(self.moment, other.moment),
+            _plus(self.damping, other.damping),
+            _times(self.cross_factor, other.cross_factor),
+        )
+
+
+def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+    if a is None or b is None:
+        return a if b is None else b
+    return a * b
+
+
+def _plus(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+    if a is None or b is None:
+        return a if b is None else b
+    return a + b
+
 
 @dataclass(frozen=True, slots=True)
 class Core:

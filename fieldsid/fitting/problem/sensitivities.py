@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from fieldsid.dynamics.assemble import DAMPING as OF_DAMPING
 from fieldsid.dynamics.assemble import STIFFNESS as OF_STIFFNESS
 from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Core, Effect, Motion, Values, over_intervals
+from fieldsid.models.effect import Core, Effect, Motion, Terms, Values, over_intervals
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import over_reference
@@ -68,6 +68,8 @@ class Sensitivities:
     values: dict[str, float]
     start: FloatArray
     arrays: KernelInputs
+    others: dict[str, Terms] = field(default_factory=dict, init=False, repr=False)
+    """The terms of all effects but one, by its name, as far as they were asked for."""
 
     def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Return motion (n, 3) before the sensor, and a stack (1 + P, 2, n): room for a residual, and the sensitivities."""
@@ -248,31 +250,53 @@ class Sensitivities:
             return {MOMENT[0]: (1.0, slope[:-1]), MOMENT[1]: (1.0, slope[1:])}, None
         step = coefficient.step
         high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
-        (above, up), (below, down) = (self._drives_of_effect(owner, self.values | {name: value}) for value in (high, low))
+        ends = [self.values | {name: value} for value in (high, low)]
+        above, below = (self._drives_of_effect(owner, values) for values in ends)
         width = high - low
         changes = {place: value - below[place] for place, value in above.items()}
-        drives = {place: (1.0 / width, c) if isinstance(c, np.ndarray) else (c / width, None) for place, c in changes.items()}
-        return drives, None if owner.core is None else (up - down) / width
+        drives: dict[int, tuple[float, FloatArray | None]] = {
+            place: (1.0 / width, c) if isinstance(c, np.ndarray) else (c / width, None) for place, c in changes.items()
+        }
+        if owner.core is None:
+            return drives, None
+        # a core is the sum of the effects' own: what the others add, and the factors that they set, stay
+        up, down = (owner.core(values, self.scales[0]) for values in ends)
+        if up.cross_fin != down.cross_fin:
+            drives[CROSS_INPUT] = ((up.cross_fin - down.cross_fin) / width, self.arrays.fin.mean)
+        return drives, (constants_of(up) - constants_of(down)) / width
 
-    def _drives_of_effect(self, owner: Effect, values: Values) -> tuple[dict[int, FloatArray | float], FloatArray]:
-        """Return the drives that an effect changes, by their place, and the kernel's constants (18,), at these values."""
-        effects, record = self.layout.effects, self.record
-        fin = self.arrays.fin if owner.fin is None else fin_path(record, effects, values)
-        terms = self.arrays.terms if owner.terms is None else combined_terms(record, effects, values)
-        core = self.arrays.core if owner.core is None else self._core(values)
-        drives: dict[int, FloatArray | float] = {}
-        if owner.fin is not None or owner.terms is not None or owner.moment is not None:
+    def _drives_of_effect(self, owner: Effect, values: Values) -> dict[int, FloatArray | float]:
+        """Return what an effect changes of the drives outside of its core, by their place, at these values; up to a constant."""
+        record, drives = self.record, dict[int, FloatArray | float]()
+        own = None if owner.terms is None else owner.terms(values, record)
+        moves_fin = owner.fin is not None
+        if moves_fin or (own is not None and own.has_factors):
+            fin = fin_path(record, self.layout.effects, values) if moves_fin else self.arrays.fin
+            terms = self.arrays.terms if own is None else self._terms_beside(owner).beside(own)
             drives[MOMENT[0]], drives[MOMENT[1]] = moments_of(self.base, fin, terms)
-        if owner.terms is not None:
-            drives[OF_DAMPING], drives[CROSS_FACTOR] = damping_of(self.base, terms), cross_factor_of(terms)
-        if owner.fin is not None or owner.core is not None:
-            drives[CROSS_INPUT] = cross_input_of(fin, core)
+            if moves_fin:
+                drives[CROSS_INPUT] = cross_input_of(fin, self.arrays.core)
+            if own is not None:
+                drives[OF_DAMPING], drives[CROSS_FACTOR] = damping_of(self.base, terms), cross_factor_of(terms)
+        elif own is not None:
+            if own.moment is not None:
+                drives[MOMENT[0]], drives[MOMENT[1]] = own.moment[:-1], own.moment[1:]
+            if own.damping is not None:
+                drives[OF_DAMPING] = over_intervals(own.damping)
         if owner.moment is not None:
             path = integrate_record(record, self.arrays, self.start)
             moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)
-            drives[MOMENT[0]] = drives[MOMENT[0]] + moment[:-1]
-            drives[MOMENT[1]] = drives[MOMENT[1]] + moment[1:]
-        return drives, self.arrays.constants if owner.core is None else constants_of(core)
+            for place, side in zip(MOMENT, (moment[:-1], moment[1:]), strict=True):
+                drives[place] = side + drives[place] if place in drives else side
+        return drives
+
+    def _terms_beside(self, owner: Effect) -> Terms:
+        """Return the terms of all effects but one, computed once."""
+        if owner.name not in self.others:
+            self.others[owner.name] = combined_terms(
+                self.record, [e for e in self.layout.effects if e is not owner], self.values
+            )
+        return self.others[owner.name]
 
     def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
         """Return what the sensors show, and carry the sensitivities (P, 2, n) through them in place."""
@@ -298,10 +322,10 @@ class Sensitivities:
         """
         out = sens.copy()
         if all(e.sensor_jvp is not None for e in sensors):
-            for effect in sensors:
+            for place, effect in enumerate(sensors):
+                seen = measured(motion, self.record, sensors[:place], self.values)
                 if effect.sensor_jvp is not None:
-                    out = effect.sensor_jvp(out, motion, self.values, self.record)
-                motion = measured(motion, self.record, (effect,), self.values)
+                    out = effect.sensor_jvp(out, seen, self.values, self.record)
             return out
         for j, direction in enumerate(sens):
             size = float(np.max(np.abs(direction)))
