@@ -183,6 +183,83 @@ def _map_rates(row: int, stages: FloatArray, push: FloatArray, rows: FloatArray)
     rows[row, 4], rows[row, 5], rows[row, 6] = rising, by_a, by_k
 
 
+@inner
+def _of_constant(l: int, stages: FloatArray, stage: int, fast: float, floored: float) -> tuple[float, float]:
+    """Return the derivatives of p' and of -x' at a stage of a step by the constant at place l, the state as it is."""
+    ps, xs = stages[AT_P, stage], stages[AT_X, stage]
+    sin, cos = stages[SIN, stage], stages[COS, stage]
+    of_p, of_x = 0.0, 0.0
+    if l == 0:
+        of_p = -stages[DRAG, stage]
+    elif l == 1:
+        of_p = -stages[FLOW, stage]
+    elif l == 2:
+        of_p = stages[BY_LENGTH, stage]
+    elif l == 3:
+        of_p = sin
+    elif l == 4:
+        of_p = cos
+    elif l == 5:
+        of_p = stages[ARC, stage]
+    elif l == 6:
+        of_p = cos - 1.0
+    elif l == 7:
+        of_x = fast * xs
+    elif l == 8:
+        of_x = fast * fast * ps
+    elif l == 9:
+        of_x = xs * abs(xs) / floored
+    elif l == 10:
+        of_p = -stages[BY_POWER, stage]
+    elif l == 11:
+        of_p = 2.0 * sin * cos
+    elif l == 12:
+        of_p = 1.0 - 2.0 * sin * sin
+    elif l == 13:
+        of_p = -stages[BY_TURN, stage]
+    elif l == 14:
+        of_p = xs
+    elif l == 15:
+        of_p = -stages[STRIP_MOMENT, stage]
+    elif l == 16:
+        of_x = stages[STRIP_FORCE, stage]
+    else:
+        of_p, of_x = -stages[MOMENT_BY_FLOW, stage], stages[FORCE_BY_FLOW, stage]
+    return of_p, of_x
+
+
+@inner
+def _map_constants(
+    moved: IntArray, stages: FloatArray, push: FloatArray, pull: FloatArray, fast: float, floored: float, by: FloatArray
+) -> None:
+    """Fill by (3, K) with what a step makes of the state per unit of each of the K constants that any parameter moves.
+
+    Where there is no cross state no constant moves it, and the third rows of push and pull are nil.
+    """
+    for k in range(moved.shape[0]):
+        to_y, to_p, to_x = 0.0, 0.0, 0.0
+        for stage in range(4):
+            e, z = _of_constant(moved[k], stages, stage, fast, floored)
+            to_y += push[0, stage] * e - pull[0, stage] * z
+            to_p += push[1, stage] * e - pull[1, stage] * z
+            to_x += push[2, stage] * e - pull[2, stage] * z
+        by[0, k], by[1, k], by[2, k] = to_y, to_p, to_x
+
+
+@inner
+def _moved_constants(d_c: FloatArray) -> IntArray:
+    """Return the places of the constants that any parameter moves; d_c (P, 18)."""
+    places, count = np.zeros(d_c.shape[1], dtype=np.intp), 0
+    for l in range(d_c.shape[1]):
+        size = 0.0
+        for j in range(d_c.shape[0]):
+            size += abs(d_c[j, l])
+        if size != 0.0:
+            places[count] = l
+            count += 1
+    return places[:count]
+
+
 @jit
 def nonlinear_sensitivities(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, columns: FloatArray, place: IntArray,
@@ -210,6 +287,8 @@ def nonlinear_sensitivities(
             crossing or crosses_limit_by(d_c[j]) or s[j, 2] != 0.0 or factor[j, 5] != 0.0,
         )
     bent = crossing or turning or flowing or raised or stripped or c[0] != 0.0
+    moved = _moved_constants(d_c)
+    by_constant = np.zeros((3, moved.shape[0]))
     last_h, last_a, last_k = -1.0, 0.0, 0.0
     y, p, x = start[0], start[1], start[2]
     out[0, 0], out[0, 1], out[0, 2] = y, p, x
@@ -283,6 +362,7 @@ def nonlinear_sensitivities(
                     _map_row(row, h, stages, rows, push, pull)
                 _map_rates(row, stages, push, rows)
             last_h, last_a, last_k = h, a, k
+            _map_constants(moved, stages, push, pull, fast, floored, by_constant)
             for j in range(count):
                 # written out: each call that hands over arrays would cost as much as what it does
                 sy, sp, sx = s[j, 0], s[j, 1], s[j, 2]
@@ -312,27 +392,11 @@ def nonlinear_sensitivities(
                     to_p += rows[1, 7] * d_q + rows[1, 8] * d_fast
                     to_x += rows[2, 7] * d_q + rows[2, 8] * d_fast
                 if has_c[j] > 0.0:
-                    for l in range(4):
-                        ps, xs = stages[AT_P, l], stages[AT_X, l]
-                        e = d_c[j, 14] * xs - d_c[j, 0] * stages[DRAG, l] - d_c[j, 10] * stages[BY_POWER, l]
-                        if flowing:
-                            e += d_c[j, 2] * stages[BY_LENGTH, l] - d_c[j, 1] * stages[FLOW, l]
-                        if turning:
-                            sin, cos = stages[SIN, l], stages[COS, l]
-                            e += d_c[j, 3] * sin + d_c[j, 4] * cos + d_c[j, 5] * stages[ARC, l] + d_c[j, 6] * (cos - 1.0)
-                            e += 2.0 * d_c[j, 11] * sin * cos + d_c[j, 12] * (1.0 - 2.0 * sin * sin)
-                            e -= d_c[j, 13] * stages[BY_TURN, l]
-                        if stripped:
-                            e -= d_c[j, 15] * stages[STRIP_MOMENT, l] + d_c[j, 17] * stages[MOMENT_BY_FLOW, l]
-                        to_y += push[0, l] * e
-                        to_p += push[1, l] * e
-                        if crossing:
-                            z = d_c[j, 7] * fast * xs + d_c[j, 8] * fast * fast * ps + d_c[j, 9] / floored * xs * abs(xs)
-                            if stripped:
-                                z += d_c[j, 16] * stages[STRIP_FORCE, l] + d_c[j, 17] * stages[FORCE_BY_FLOW, l]
-                            to_y -= pull[0, l] * z
-                            to_p -= pull[1, l] * z
-                            to_x += push[2, l] * e - pull[2, l] * z
+                    for l in range(moved.shape[0]):
+                        size = d_c[j, moved[l]]
+                        to_y += size * by_constant[0, l]
+                        to_p += size * by_constant[1, l]
+                        to_x += size * by_constant[2, l]
                 # a start's influence dies out; below the normal numbers it would only cost time, eightfold
                 s[j, 0] = to_y if abs(to_y) > SMALLEST_WEIGHT else 0.0
                 s[j, 1] = to_p if abs(to_p) > SMALLEST_WEIGHT else 0.0

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -175,9 +176,8 @@ class Core:
 
     def plus(self, other: Core) -> Core:
         """Return the sum of two sets of coefficients; the factors of FACTORS are taken from whichever sets them."""
-        total = {f: getattr(self, f) + getattr(other, f) for f in CORE_FIELDS if f not in FACTORS}
-        factors = {f: getattr(other if getattr(other, f) != 1.0 else self, f) for f in FACTORS}
-        return replace(self, **total, **factors)
+        pairs = zip(CORE_FIELDS, _VALUES(self), _VALUES(other), strict=True)
+        return Core(*((b if b != 1.0 else a) if name in FACTORS else a + b for name, a, b in pairs))
 
     def steady_cross_state(self, rate: float) -> float:
         """Return the cross state that a steady rate leads to at the run's own speed, zero where there is none.
@@ -202,6 +202,7 @@ def power_drag(rate: FloatArray, beyond: FloatArray | float) -> FloatArray:
 
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)
+_VALUES = attrgetter(*CORE_FIELDS)
 FACTORS = ("length", "cross_share")
 """The coefficients of a core that are one where no effect sets them."""
 

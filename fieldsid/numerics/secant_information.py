@@ -14,8 +14,8 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 
 CURVATURE_SHARES = (0.01, 0.8)
-"""Curvature over a step, in that of the matrix it corrects, between which a secant counts: below, the matrix would become singular;
-above, the expected information is as good."""
+"""Curvature over a step, in that of the matrix it corrects, between which a secant counts: below, the matrix would become
+singular; above, the expected information is as good."""
 MAX_STEP = 0.5
 """Longest step whose secant says what the curvature is at its end, where parameters are logarithms."""
 
@@ -23,7 +23,8 @@ MAX_STEP = 0.5
 def with_secants(information: FloatArray, secants: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
     """Return an information matrix (P, P) that meets the last of some secants, and the earlier ones as far as that lets it.
 
-    Each is a step (P,) of logarithms and the fall (P,) of the score over it, the oldest first. The matrix stays positive definite.
+    Each is a step (P,) of logarithms and the fall (P,) of the score over it, the oldest first. The matrix stays positive
+    definite.
     """
     out, (least, most) = information, CURVATURE_SHARES
     for step, fall in secants:

@@ -67,8 +67,8 @@ def add_effect(
     """Return the moves worth evaluating: the `most` best of two screens, by output-error cost and by whitened cost.
 
     All starts of every effect where `most` is None. `anew`: time shifts are tried too, because a base model that lacks one has
-    biased parameters (see `_iterate_time_shift`). `flown`: the output-error screen was done before, and is left out. `behind`: the
-    log evidence that the parent lacks to be of interest itself. A parent that diverges has no moves: nothing is linearised there.
+    biased parameters (see `_iterate_time_shift`). `flown`: the output-error screen was done before, and is left out. `behind`:
+    the log evidence that the parent lacks to be of interest itself. A parent that diverges has no moves: nothing is linearised.
     """
     if not np.isfinite(parent.likelihood_fit.log_likelihood):
         return []

@@ -293,9 +293,7 @@ class Sensitivities:
     def _terms_beside(self, owner: Effect) -> Terms:
         """Return the terms of all effects but one, computed once."""
         if owner.name not in self.others:
-            self.others[owner.name] = combined_terms(
-                self.record, [e for e in self.layout.effects if e is not owner], self.values
-            )
+            self.others[owner.name] = combined_terms(self.record, [e for e in self.layout.effects if e is not owner], self.values)
         return self.others[owner.name]
 
     def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
