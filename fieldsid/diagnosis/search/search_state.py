@@ -14,7 +14,7 @@ from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.archive import Archive
-from fieldsid.diagnosis.search.budget import MAX_EVALUATIONS_PER_RUN, Budget
+from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.model_spec import Assumptions
 from fieldsid.diagnosis.search.speed_law_search import (
     TrimLawSearch,
@@ -76,7 +76,7 @@ class SearchState:
         """Compare models down to the sensors' noise until the error of the base model is known."""
         both = (*self.records, *self.validation)
         self.resolution_floor = self.floor = white_noise_floor(both)
-        self.budget = Budget(len(both), np.inf if self.thorough else MAX_EVALUATIONS_PER_RUN)
+        self.budget = Budget(len(both), np.inf) if self.thorough else Budget(len(both))
         self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations)
 
     @property
@@ -115,7 +115,7 @@ class SearchState:
 
     def may_go_on(self, *, leading: bool = False) -> bool:
         """Whether evaluations are left; with the model that leads the search goes on also while an error is visible."""
-        return (leading and self.leaves_visible_error()) or self.budget.remaining()
+        return (leading and self.leaves_visible_error()) or self.budget.remaining(self.leaves_visible_error)
 
     def leaves_visible_error(self) -> bool:
         """Whether the best accepted set leaves more than a sufficient model may, on fitted or on unseen runs."""

@@ -11,7 +11,7 @@ import pytest
 
 from fieldsid.diagnosis.diagnose import body_of, diagnose
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search import move_evaluation, search, search_state
+from fieldsid.diagnosis.search import search_state
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
@@ -22,11 +22,9 @@ from fieldsid.models.record import record_of
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 
-def patch(monkeypatch, name, value):
-    """Replace a name in every file of the search that uses it."""
-    for part in (search, move_evaluation, search_state):
-        if hasattr(part, name):
-            monkeypatch.setattr(part, name, value)
+def allow_nothing(monkeypatch):
+    """Leave a search that is not thorough no evaluations."""
+    monkeypatch.setattr(search_state, "Budget", lambda runs, most=0.0: Budget(runs, most, 0.0))
 
 
 RUNS, UNSEEN = hidden_lag.runs()
@@ -34,20 +32,23 @@ EFFECTS = all_effects(Axis.YAW)
 
 
 def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
-    allowance = Budget(2, 10.0)
+    allowance = Budget(2, 10.0, 15.0)
     allowance.evaluations.add(19)
-    assert allowance.remaining()
-    assert not allowance.is_exhausted
+    assert allowance.remaining(lambda: False)
     allowance.evaluations.add()
-    assert not allowance.remaining()
+    assert allowance.remaining(lambda: True)
+    assert not allowance.is_exhausted
+    assert not allowance.remaining(lambda: False)
     assert allowance.is_exhausted
-    assert Budget(2, np.inf).remaining()
+    allowance.evaluations.add(10)
+    assert not allowance.remaining(lambda: True)
+    assert Budget(2, np.inf).remaining(lambda: False)
 
 
 @pytest.mark.parametrize("visible", [True, False])
 def test_beyond_it_only_what_leads_is_expanded_and_only_while_an_error_is_visible(monkeypatch, visible):
     made = a_search(thorough=False)
-    made.budget.most = 0.0
+    made.budget.most = made.budget.where_visible = 0.0
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
     assert made.may_go_on(leading=True) == visible
     assert not made.may_go_on()
@@ -78,7 +79,7 @@ def a_search(*, thorough: bool) -> Search:
 
 
 def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch):
-    patch(monkeypatch, "MAX_EVALUATIONS_PER_RUN", 0)
+    allow_nothing(monkeypatch)
     short, thorough = a_search(thorough=False), a_search(thorough=True)
     assert short.tried.progress.expanded == {short.root}
     assert short.budget.is_exhausted
@@ -88,7 +89,7 @@ def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch
 
 @pytest.mark.parametrize("thorough", [False, True])
 def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, thorough):
-    patch(monkeypatch, "MAX_EVALUATIONS_PER_RUN", 0)
+    allow_nothing(monkeypatch)
     without_lag = [e for name, e in EFFECTS.items() if name in ("quadratic_damping", "stall")]
     monkeypatch.setattr(
         import_module("fieldsid.diagnosis.diagnose"), "applicable_effects", lambda _all, _records: (tuple(without_lag), {})

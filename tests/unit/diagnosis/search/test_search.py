@@ -83,7 +83,7 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
         parent = made.tried[frozenset((*parent.names, name))]
     monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
-    made.budget.most = 0.0  # what is named last is asked for whatever was spent before
+    made.budget.most = made.budget.where_visible = 0.0  # what is named last is asked for whatever was spent before
     made._exchange_for_lookalikes(parent)
     lagged = made.tried[frozenset(["gyro_bias", "servo_lag"])]
     assert lagged.log_evidence > parent.log_evidence
@@ -101,6 +101,9 @@ def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(
     monkeypatch.setattr(search, "MISSING_ERROR_RATIO", 20.0)  # a dead time leaves more than that of so slow a servo
     assert made._predicts_as_well(made.tried[frozenset(["delay"])], best)
     assert not made._predicts_as_well(base, best)
+    made._grow_rivals()
+    assert frozenset(["delay", "servo_lag"]) not in made.tried  # it lacks far more evidence than a small effect could bring
+    monkeypatch.setattr(search, "RIVAL_LOG_ODDS", best.log_evidence - made.tried[frozenset(["delay"])].log_evidence)
     made._grow_rivals()
     assert frozenset(["delay", "servo_lag"]) in made.tried
 
