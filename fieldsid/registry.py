@@ -163,9 +163,9 @@ def define(package: str, text: str, file: str) -> Any:
     return import_module(package).define(text, file)
 
 
-def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
-    """Return a sentence naming what a mistyped word may have meant."""
-    close = difflib.get_close_matches(word, list(known), n=3, cutoff=0.5)
+def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...], *, least: float = 0.5) -> str:
+    """Return a sentence naming what a mistyped word may have meant: what is at least so much alike, of 1."""
+    close = difflib.get_close_matches(word, list(known), n=3, cutoff=least)
     if not close:
         return f"choose one of: {', '.join(sorted(known))}"
     return "did you mean " + " or ".join(f"`{c}`" for c in close) + "?"

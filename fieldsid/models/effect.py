@@ -129,25 +129,17 @@ class Terms:
 
     def beside(self, other: Terms) -> Terms:
         """Return the parts of two effects together: the products of the factors, the sums of the additions."""
-        return Terms(
-            _times(self.damping_factor, other.damping_factor),
-            _times(self.authority_factor, other.authority_factor),
-            _plus(self.moment, other.moment),
-            _plus(self.damping, other.damping),
-            _times(self.cross_factor, other.cross_factor),
-        )
+        return Terms(*(_joined(getattr(self, part), getattr(other, part), how) for part, how in TERM_PARTS.items()))
 
 
-def _times(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
+TERM_PARTS = dict(zip(Terms.__dataclass_fields__, (np.multiply, np.multiply, np.add, np.add, np.multiply), strict=True))
+"""How the parts of two effects go together, each by its name."""
+
+
+def _joined(a: FloatArray | None, b: FloatArray | None, how: np.ufunc) -> FloatArray | None:
     if a is None or b is None:
         return a if b is None else b
-    return a * b
-
-
-def _plus(a: FloatArray | None, b: FloatArray | None) -> FloatArray | None:
-    if a is None or b is None:
-        return a if b is None else b
-    return a + b
+    return np.asarray(how(a, b))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,11 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.fisher_scoring import information, innovations_of
 from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
+from fieldsid.noise.secant_information import with_secants
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
 from fieldsid.noise.whiten import base_dynamics, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
-from fieldsid.numerics.secant_information import with_secants
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MIN_NOISE_SIGNAL_SHARE = 1e-4

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.dynamics.nonlinear_kernel import crossflow, crossforce, power_drag
+from fieldsid.dynamics.drag_laws import crossflow, crossforce, power_drag
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.numerics.secant_information import with_secants
+from fieldsid.noise.secant_information import with_secants
 
 EXPECTED = np.array([[4.0, 1.0], [1.0, 3.0]])
 STEP = np.array([0.1, -0.2])
