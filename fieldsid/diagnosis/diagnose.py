@@ -14,7 +14,6 @@ from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
@@ -153,7 +152,7 @@ def _diagnosis(end: _SearchResult, skipped: Mapping[str, str], notes: tuple[Note
             *notes,
             *diverged,
             *flown,
-            *([SEARCH_ENDED] if work.budget.is_exhausted and leaves_error(found, work.floor) else []),
+            *([SEARCH_ENDED] if work.budget.is_exhausted and work.leaves_visible_error() else []),
         ),
         noiseless=work.is_noiseless,
     )
