@@ -152,7 +152,7 @@ def _diagnosis(end: _SearchResult, skipped: Mapping[str, str], notes: tuple[Note
             *notes,
             *diverged,
             *flown,
-            *([SEARCH_ENDED] if work.budget.is_exhausted and work.leaves_visible_error() else []),
+            *([SEARCH_ENDED] if work.budget.is_exhausted and work.leaves_unexplained() else []),
         ),
         noiseless=work.is_noiseless,
     )

@@ -24,7 +24,12 @@ from fieldsid.diagnosis.search.speed_law_search import (
     speed_laws,
 )
 from fieldsid.diagnosis.search.variant_search import FormSearch, VariantRequest
-from fieldsid.diagnosis.thresholds import EXPLAINED_ERROR_RATIO, RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import (
+    EXPLAINED_ERROR_RATIO,
+    MIN_EXPLAINED_SHARE,
+    RIVAL_LOG_ODDS,
+    SUFFICIENT_ERROR_RATIO,
+)
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.models.axis import Axis
@@ -115,12 +120,19 @@ class SearchState:
 
     def may_go_on(self, *, leading: bool = False) -> bool:
         """Whether evaluations are left; with the model that leads the search goes on also while an error is visible."""
-        return (leading and self.leaves_visible_error()) or self.budget.remaining(self.leaves_visible_error)
+        return (leading and self.leaves_visible_error()) or self.budget.remaining(self.leaves_unexplained)
 
     def leaves_visible_error(self) -> bool:
         """Whether the best accepted set leaves more than a sufficient model may, on fitted or on unseen runs."""
         best = self.best_admissible()
         return max(best.selection_errors.over(self.floor), best.train.over(self.floor)) > SUFFICIENT_ERROR_RATIO
+
+    def leaves_unexplained(self) -> bool:
+        """Whether the best accepted set leaves a visible error, or explains less of one than stands whatever is left."""
+        if self.leaves_visible_error():
+            return True
+        base, left = (h.error_of_all_runs(self.floor) ** 2 for h in (self.base(), self.best_admissible()))
+        return base > SUFFICIENT_ERROR_RATIO**2 and base - left < MIN_EXPLAINED_SHARE * (base - 1.0)
 
     def update_noise_floor(self, fitted: FittedProblem) -> None:
         """Lower the noise floor to what the third differences of a fit's residuals show, unless the log is noiseless."""

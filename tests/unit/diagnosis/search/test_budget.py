@@ -48,7 +48,7 @@ def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
 @pytest.mark.parametrize("visible", [True, False])
 def test_beyond_it_only_what_leads_is_expanded_and_only_while_an_error_is_visible(monkeypatch, visible):
     made = a_search(thorough=False)
-    made.budget.most = made.budget.where_visible = 0.0
+    made.budget.most = made.budget.where_unexplained = 0.0
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
     assert made.may_go_on(leading=True) == visible
     assert not made.may_go_on()

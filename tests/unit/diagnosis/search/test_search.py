@@ -83,7 +83,7 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
         parent = made.tried[frozenset((*parent.names, name))]
     monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
-    made.budget.most = made.budget.where_visible = 0.0  # what is named last is asked for whatever was spent before
+    made.budget.most = made.budget.where_unexplained = 0.0  # what is named last is asked for whatever was spent before
     made._exchange_for_lookalikes(parent)
     lagged = made.tried[frozenset(["gyro_bias", "servo_lag"])]
     assert lagged.log_evidence > parent.log_evidence
