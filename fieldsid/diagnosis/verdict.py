@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
-from fieldsid.diagnosis.evidence.acceptance import compared_errors, fitted_errors, validation_error_ratio
+from fieldsid.diagnosis.evidence.acceptance import (
+    compared_errors,
+    excess_share,
+    fitted_errors,
+    validation_error_ratio,
+    worst_error,
+)
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import (
@@ -56,11 +61,11 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     fitted = fitted_errors(search.base(), found)
     error = max(now.over(floor), fitted[1].over(floor))
     if frozenset(found.names) == search.root:
-        if max(found.selection_errors.over(floor), found.train.over(floor)) <= SUFFICIENT_ERROR_RATIO:
+        if worst_error(found, floor) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
     visible = error > SUFFICIENT_ERROR_RATIO
-    share = _share([was, fitted[0]], [now, fitted[1]], floor)
+    share = excess_share([was, fitted[0]], [now, fitted[1]], floor)
     minor = error > MISSING_ERROR_RATIO and share < MAIN_EXPLAINED_SHARE and not search.is_noiseless
     if visible and (minor or not now.mean < was.mean):
         return _unnamed(found, left, floor)
@@ -81,7 +86,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
 
 def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
     """Return the verdict where no effect lowers the error that models are selected by: `disturbed`, or `unexplained`."""
-    worst = max(found.selection_errors.over(floor), found.train.over(floor))
+    worst = worst_error(found, floor)
     p = 3.0 * left.dependence if worst < GUSTY_ERROR_RATIO else left.p
     odd = p < MIN_P_VALUE or worst > FAR_ERROR_RATIO or validation_error_ratio(found, floor) > MAX_VALIDATION_ERROR_RATIO
     return Verdict("unexplained" if odd else "disturbed", ())
@@ -116,15 +121,7 @@ def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
 
 def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:
     """Return the share (0..1) that a model removes of the base's excess squared error over a noise floor."""
-    return _share([search.base().selection_errors], [h.selection_errors], floor or search.floor)
-
-
-def _share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:
-    """Return the share (0..1) by which the excess squared error over a noise floor falls, that of all runs together."""
-    runs = [len(errors.runs) for errors in before]
-    base, left = (float(np.average([errors.over(floor) ** 2 for errors in side], weights=runs)) for side in (before, now))
-    excess = base - 1.0
-    return float(np.clip((base - left) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
+    return excess_share([search.base().selection_errors], [h.selection_errors], floor or search.floor)
 
 
 def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:

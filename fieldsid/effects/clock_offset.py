@@ -25,29 +25,35 @@ def _then(values: Values, record: Record) -> FloatArray:
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion `offset` seconds later; angle (n,) rad, rate (n,) rad/s."""
-    shown = sensor_jvp(np.stack([motion.angle, motion.rate])[None], motion, values, record)[0]
-    return Motion(shown[0], shown[1])
+    angle, rate = _late(np.stack([motion.angle, motion.rate])[None], values, record)[0]
+    return Motion(angle, rate)
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as they are logged, `offset` seconds later."""
-    out = np.empty_like(moves)
-    interpolate(record.time, _then(values, record), np.ascontiguousarray(moves), out)
+    return _late(moves, values, record)
+
+
+def _late(series: FloatArray, values: Values, record: Record) -> FloatArray:
+    """Return series (P, 2, n) as they are logged."""
+    out = np.empty_like(series)
+    interpolate(record.time, _then(values, record), np.ascontiguousarray(series), out)
     return out
 
 
 @jit
-def interpolate(time: FloatArray, then: FloatArray, moves: FloatArray, out: FloatArray) -> None:
-    """Fill out (P, 2, n) with moves (P, 2, n) at other times (n,), both rising, held before the first and after the last."""
+def interpolate(time: FloatArray, then: FloatArray, series: FloatArray, out: FloatArray) -> None:
+    """Fill out (P, 2, n) with series (P, 2, n) at other times (n,), both rising, held before the first and after the last."""
     n, before = time.shape[0], 0
     for i in range(n):
         at = min(max(then[i], time[0]), time[n - 1])
         while before < n - 2 and time[before + 1] <= at:
             before += 1
-        share = (at - time[before]) / (time[before + 1] - time[before])
-        for j in range(moves.shape[0]):
+        after = min(before + 1, n - 1)
+        share = (at - time[before]) / (time[after] - time[before]) if after > before else 0.0
+        for j in range(series.shape[0]):
             for ch in range(2):
-                out[j, ch, i] = moves[j, ch, before] * (1.0 - share) + moves[j, ch, before + 1] * share
+                out[j, ch, i] = series[j, ch, before] * (1.0 - share) + series[j, ch, after] * share
 
 
 EFFECT = Effect(

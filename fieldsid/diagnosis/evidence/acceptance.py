@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.thresholds import (
@@ -84,6 +86,14 @@ def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise
     return better and leaves and was - left > MAIN_EXPLAINED_SHARE * was
 
 
+def excess_share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:
+    """Return the share (0..1) by which the excess squared error over a noise floor falls, that of all runs together."""
+    runs = [len(errors.runs) for errors in before]
+    base, left = (float(np.average([errors.over(floor) ** 2 for errors in side], weights=runs)) for side in (before, now))
+    excess = base - 1.0
+    return float(np.clip((base - left) / excess, 0.0, 1.0)) if excess > 1e-6 else 0.0
+
+
 def keeps_error(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition does not raise the validation error, at the training runs' parameters or at those of all runs."""
     return _keeps(*compared_errors(without, with_))
@@ -99,9 +109,14 @@ def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     return bool(gain > with_.trial_penalty - without.trial_penalty)
 
 
+def worst_error(h: ScoredModel, floor: Noise) -> float:
+    """Return the error over a noise floor on the validation or on the training runs, whichever is larger."""
+    return max(h.selection_errors.over(floor), h.train.over(floor))
+
+
 def leaves_error(h: ScoredModel, floor: Noise) -> bool:
     """Whether the error of a model exceeds the noise floor, from whatever cause."""
-    return max(h.selection_errors.over(floor), h.train.over(floor)) > EXPLAINED_ERROR_RATIO
+    return worst_error(h, floor) > EXPLAINED_ERROR_RATIO
 
 
 def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

@@ -84,13 +84,17 @@ def add_effect(
     steps: list[_PendingMove] = []
     for i, (linearisation, plain) in enumerate(grounds):
         screened_points = sorted(points[i * len(left) : (i + 1) * len(left)], key=lambda points: points[0].predicted_cost)
-
-        def is_worth(p: list[ScreenResult], cost: float = linearisation.cost, *, plain: bool = plain) -> bool:
-            least = MIN_OUTPUT_ERROR_COST_SHARE * cost if plain else _least_cost_fall(parent, p[0].effect, behind)
-            return cost - p[0].predicted_cost > least
-
-        likely = screened_points[: most + plain * EXTRA_ITERATED_EFFECTS] if most is not None else screened_points
-        kept = [p for p in likely if most is None or is_worth(p)]
+        cost = linearisation.cost
+        kept = (
+            screened_points
+            if most is None
+            else [
+                p
+                for p in screened_points[: most + plain * EXTRA_ITERATED_EFFECTS]
+                if cost - p[0].predicted_cost
+                > (MIN_OUTPUT_ERROR_COST_SHARE * cost if plain else _least_cost_fall(parent, p[0].effect, behind))
+            ]
+        )
         follows = plain and most is not None
         steps += [
             _PendingMove(linearisation, plain, follows, partial(iterate_points if follows else _backtracked, linearisation, p))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
-from fieldsid.diagnosis.evidence.acceptance import is_accepted, leaves_error, lowers_error
+from fieldsid.diagnosis.evidence.acceptance import excess_share, is_accepted, leaves_error, lowers_error, worst_error
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem, LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
@@ -124,15 +124,16 @@ class SearchState:
 
     def leaves_visible_error(self) -> bool:
         """Whether the best accepted set leaves more than a sufficient model may, on fitted or on unseen runs."""
-        best = self.best_admissible()
-        return max(best.selection_errors.over(self.floor), best.train.over(self.floor)) > SUFFICIENT_ERROR_RATIO
+        return worst_error(self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def leaves_unexplained(self) -> bool:
         """Whether the best accepted set leaves a visible error, or explains less of one than stands whatever is left."""
-        if self.leaves_visible_error():
+        base, best = self.base(), self.best_admissible()
+        if worst_error(best, self.floor) > SUFFICIENT_ERROR_RATIO:
             return True
-        base, left = (h.error_of_all_runs(self.floor) ** 2 for h in (self.base(), self.best_admissible()))
-        return base > SUFFICIENT_ERROR_RATIO**2 and base - left < MIN_EXPLAINED_SHARE * (base - 1.0)
+        was, left = ((h.selection_errors, h.train) for h in (base, best))
+        is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
+        return is_visible and excess_share(was, left, self.floor) < MIN_EXPLAINED_SHARE
 
     def update_noise_floor(self, fitted: FittedProblem) -> None:
         """Lower the noise floor to what the third differences of a fit's residuals show, unless the log is noiseless."""
@@ -212,8 +213,7 @@ class SearchState:
 
     def _least_to_explain(self, floor: Noise) -> float:
         """Return the error over a floor that is one to explain: a visible one, and any where the base leaves a visible one."""
-        base = self.base()
-        visible = max(base.selection_errors.over(floor), base.train.over(floor)) > SUFFICIENT_ERROR_RATIO
+        visible = worst_error(self.base(), floor) > SUFFICIENT_ERROR_RATIO
         return EXPLAINED_ERROR_RATIO if visible else SUFFICIENT_ERROR_RATIO
 
     def _without_each(self, h: ScoredModel) -> list[tuple[str, ScoredModel]]:

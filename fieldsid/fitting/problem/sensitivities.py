@@ -320,10 +320,10 @@ class Sensitivities:
         """
         out = sens.copy()
         if all(e.sensor_jvp is not None for e in sensors):
-            for place, effect in enumerate(sensors):
-                seen = measured(motion, self.record, sensors[:place], self.values)
+            for before, effect in zip(([], *([e] for e in sensors)), sensors, strict=False):
+                motion = measured(motion, self.record, before, self.values)
                 if effect.sensor_jvp is not None:
-                    out = effect.sensor_jvp(out, seen, self.values, self.record)
+                    out = effect.sensor_jvp(out, motion, self.values, self.record)
             return out
         for j, direction in enumerate(sens):
             size = float(np.max(np.abs(direction)))
