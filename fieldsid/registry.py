@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import pkgutil
+import re
 import sys
 import traceback
 from collections import Counter
@@ -16,6 +17,11 @@ from types import MappingProxyType
 from typing import Any
 
 from fieldsid.errors import FieldsidError, UsageError
+
+MIN_LIKENESS = 0.5
+"""Likeness, of 1, from which on a known name may be the one meant: one that a mistype of half its letters leaves."""
+SUGGESTED = 3
+"""Names that a hint offers at most."""
 
 _added: dict[str, dict[str, Any]] = {}
 _refused: dict[str, dict[str, FieldsidError]] = {}
@@ -163,12 +169,22 @@ def define(package: str, text: str, file: str) -> Any:
     return import_module(package).define(text, file)
 
 
-def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...], *, least: float = 0.5) -> str:
-    """Return a sentence naming what a mistyped word may have meant: what is at least so much alike, of 1."""
-    close = difflib.get_close_matches(word, list(known), n=3, cutoff=least)
+def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
+    """Return a sentence naming what a mistyped word may have meant."""
+    alike = {k: _likeness(word, k) for k in known}
+    close = sorted((k for k in alike if alike[k] >= MIN_LIKENESS), key=lambda k: (-alike[k], k))[:SUGGESTED]
     if not close:
         return f"choose one of: {', '.join(sorted(known))}"
     return "did you mean " + " or ".join(f"`{c}`" for c in close) + "?"
+
+
+def _likeness(word: str, other: str) -> float:
+    """Return how alike two names are, of 1, by what they do not end in alike: a unit that both have says nothing of either."""
+    ours, theirs = (re.split(r"[^A-Za-z0-9]+", name) for name in (word, other))
+    while min(len(ours), len(theirs)) > 1 and ours[-1] == theirs[-1]:
+        ours.pop()
+        theirs.pop()
+    return difflib.SequenceMatcher(None, "_".join(ours), "_".join(theirs)).ratio()
 
 
 def _named(item: Any, attribute: str, name: str) -> Any:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fieldsid.errors import FieldsidError
-from fieldsid.registry import members, pick
+from fieldsid.registry import members, near, pick
 
 PACKAGE = Path(__file__).resolve().parents[2] / "fieldsid"
 
@@ -59,3 +59,17 @@ def test_a_folder_of_helpers_beside_the_members_is_none_itself(tmp_path, monkeyp
     (folder / "one.py").write_text("from types import SimpleNamespace\nTHING = SimpleNamespace(name='one')\n")
     monkeypatch.syspath_prepend(tmp_path)
     assert set(members("with_helpers", "THING")) == {"one"}
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "hint"),
+    [
+        ("roll_deg", ("t", "hdg_deg", "fin_deg"), "choose one of: fin_deg, hdg_deg, t"),
+        ("roll rate [deg/s]", ("t", "yaw rate [deg/s]"), "choose one of: t, yaw rate [deg/s]"),
+        ("yw_rate_deg_s", ("roll_rate_deg_s", "yaw_rate_deg_s"), "did you mean `yaw_rate_deg_s`?"),
+        ("aa", ("t", "a"), "did you mean `a`?"),
+        ("rate", ("t", "yaw_rate"), "did you mean `yaw_rate`?"),
+    ],
+)
+def test_names_that_share_no_more_than_their_unit_are_not_offered_for_each_other(word, known, hint):
+    assert near(word, known) == hint

@@ -28,8 +28,6 @@ FEW_WORDS = 0.05
 """Share of words among the first cells of a column, and among all, up to which it is one of numbers."""
 SHOWN = 100
 """Names of columns that a message tells."""
-MIN_NAME_LIKENESS = 0.7
-"""Likeness, of 1, from which on another column's name may be the one meant: two that share no more than their unit have 0.5."""
 SAMPLED = 100_000
 """Rows of a table that are looked at for what its numbers say."""
 
@@ -69,7 +67,7 @@ class Columns:
         raise MappingError(
             f"`{self.path}` has no column `{column}` for `{signal}`",
             found=self.shown(),
-            hint=near(column, self.names, least=MIN_NAME_LIKENESS) if self.names else f"use an index from 0 to {self.width - 1}",
+            hint=near(column, self.names) if self.names else f"use an index from 0 to {self.width - 1}",
         )
 
     def shown(self) -> str:
