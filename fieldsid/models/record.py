@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
+from fieldsid.logs.doctor.angle_and_rate import contradiction
 from fieldsid.logs.doctor.holes import JITTER, hole_notes, unbroken, usual_step
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.run import Note, Run
@@ -188,7 +189,8 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     """Return the record of a run on an axis.
 
     fin: "auto" takes the measured fin where the log has one, "command" or "measured" insist. A run whose log hides a move of the
-    fin is cut there, see `logs/doctor/holes.py`. Raises DataError when the angle and the rate are both missing, or the fin is.
+    fin is cut there, see `logs/doctor/holes.py`. Raises DataError when the fin is missing, or the angle and the rate both are, or
+    those contradict each other.
     """
     names = NAMES[axis]
     column = _fin_column(run, axis, fin)
@@ -201,6 +203,12 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
             f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`",
             found=", ".join(k for k in run.signals if run.has(k)),
             hint="map one of them on import, where the log has it",
+        )
+    if said := contradiction(run, names.angle, names.rate):
+        raise DataError(
+            f"no model follows `{names.angle}` and `{names.rate}` of run {run.name!r} as they are",
+            found=said,
+            hint="correct it in the mapping and import the log again, or leave the wrong one out: one of the two is enough",
         )
     angle, angle_ok = _measured(run, names.angle)
     rate, rate_ok = _measured(run, names.rate)

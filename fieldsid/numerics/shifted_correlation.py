@@ -1,9 +1,11 @@
-"""The correlation of two signals at many shifts at once.
+"""The correlation of two signals: their slope, and at many shifts at once.
 
 Block by block through the Fourier transform: n log n operations for all shifts, and memory for one block.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +33,40 @@ def shifted_correlations(a: FloatArray, b: FloatArray, reach: int) -> FloatArray
     varies = (left_a > ROUNDING_SHARE * (a @ a)) & (left_b > ROUNDING_SHARE * (b @ b))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(varies, (_products(a, b, reach) - sum_a * sum_b / count) / np.sqrt(left_a * left_b), 0.0)
+
+
+def slope_of(a: FloatArray, b: FloatArray) -> tuple[float, float]:
+    """Return the slope of a (n,) on b (n,), and the size of their correlation; zeros when one of them does not move."""
+    a, b = _centred(a), _centred(b)
+    power = math.sqrt(float(a @ a) * float(b @ b))
+    if power == 0.0:
+        return 0.0, 0.0
+    correlation = float(a @ b) / power
+    # The geometric mean of both regressions, so that noise in either signal does not pull the slope one way.
+    return math.copysign(math.sqrt(float(a @ a) / float(b @ b)), correlation), abs(correlation)
+
+
+def lag_of(a: FloatArray, b: FloatArray, reach: int) -> tuple[float, float]:
+    """Return by how many samples a is late against b, up to reach, with the parts of one, and what the correlation gains by it.
+
+    a, b: (n,) without gaps, n > reach.
+    """
+    if reach < 1:
+        return 0.0, 0.0
+    size = np.abs(shifted_correlations(a, b, reach))
+    best = int(np.argmax(size))
+    gain = float(size[best] - size[reach])
+    shift = 0.0
+    if 0 < best < len(size) - 1:
+        left, middle, right = size[best - 1 : best + 2]
+        bend = left - 2 * middle + right
+        shift = float(0.5 * (left - right) / bend) if bend != 0.0 else 0.0
+    return best - reach + shift, gain
+
+
+def _centred(values: FloatArray) -> FloatArray:
+    """Return values less their mean, zero where all are alike: what the mean of those is off by is rounding."""
+    return np.zeros_like(values) if float(np.ptp(values)) == 0.0 else values - values.mean()
 
 
 def _sums(values: FloatArray, shifts: npt.NDArray[np.int64]) -> FloatArray:

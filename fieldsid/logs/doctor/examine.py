@@ -8,6 +8,7 @@ import numpy as np
 
 from fieldsid.logs.convert.conditioning import MAIN, likely_unit
 from fieldsid.logs.convert.times.time_column import FASTEST_S, SLOW_S
+from fieldsid.logs.doctor.angle_and_rate import angle_findings
 from fieldsid.logs.doctor.course_findings import course_findings
 from fieldsid.logs.doctor.fin_findings import fin_findings
 from fieldsid.logs.doctor.limit_findings import limit_findings
@@ -34,7 +35,14 @@ def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: St
         findings = [*_sampling(run, stated), *_fins(run, fin_max_rad or {})]
         for name in run.signals:
             findings += signal_findings(run, name, stated)
-        return (*findings, *pair_findings(run, stated), *course_findings(run), *fin_findings(run))
+        faulty = {str(n.data.get("signal")) for n in findings}
+        return (
+            *findings,
+            *angle_findings(run, stated, faulty),
+            *pair_findings(run, stated),
+            *course_findings(run),
+            *fin_findings(run),
+        )
 
 
 def _sampling(run: Run, stated: Stated) -> list[Note]:

@@ -5,11 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fieldsid.errors import DataError
 from fieldsid.logs import load_run, save_run
 from fieldsid.logs.doctor.examine import examine
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.run import Run
+from fieldsid.models.axis import Axis
+from fieldsid.models.record import record_of
 
 
 def healthy(seed=1, n=1200):
@@ -85,6 +88,60 @@ def test_a_fault_is_found_and_named(fault):
     run = healthy()
     expected, signals = FAULTS[fault](run)
     assert expected in codes(changed(run, **signals))
+
+
+SWAPS = {
+    "angle and fin": ("yaw_rad", "rudder_rad", "rudder_rad changes as yaw_rate_rad_s says, and yaw_rad does not"),
+    "rate and fin": ("yaw_rate_rad_s", "rudder_rad", "yaw_rad changes as rudder_rad says, and not as yaw_rate_rad_s"),
+    "angle and rate": ("yaw_rad", "yaw_rate_rad_s", "yaw_rate_rad_s changes as yaw_rad says, in place of the other way round"),
+    "two angles": ("yaw_rad", "pitch_rad", "yaw_rad changes as pitch_rate_rad_s says, and not as yaw_rate_rad_s"),
+    "two rates": ("yaw_rate_rad_s", "pitch_rate_rad_s", "yaw_rad changes as pitch_rate_rad_s says, and not as yaw_rate_rad_s"),
+}
+
+
+def swapped(run, one, other):
+    return changed(run, **{one: run[other], other: run[one]})
+
+
+@pytest.mark.parametrize("swap", SWAPS)
+def test_two_columns_that_are_swapped_are_named(swap):
+    one, other, said = SWAPS[swap]
+    note = next(n for n in examine(swapped(healthy(), one, other)) if n.code == "swapped")
+    assert note.message.startswith(said)
+    assert {one, other} & set(note.data["signals"])
+
+
+@pytest.mark.parametrize("signal", ["yaw_rad", "yaw_rate_rad_s"])
+def test_an_angle_and_a_rate_of_two_motions_are_told(signal):
+    run, rng = healthy(), np.random.default_rng(3)
+    wander = np.cumsum(np.convolve(rng.normal(size=len(run) + 39), np.full(40, 0.025), "valid")) * 0.05
+    codes_of = codes(changed(run, **{signal: wander}))
+    assert ("unrelated", "yaw_rad") in codes_of
+    assert not {code for code, _ in codes_of} & {"swapped", "rate_sign", "unit"}
+
+
+def test_a_heading_that_stands_still_in_its_last_digit_is_of_no_other_motion():
+    run, rng = healthy(), np.random.default_rng(4)
+    still = np.round(0.001 * np.cumsum(rng.normal(size=len(run))) / 0.0175) * 0.0175
+    assert "unrelated" not in {c for c, _ in codes(changed(run, yaw_rad=still, yaw_rate_rad_s=0.003 * rng.normal(size=len(run))))}
+
+
+@pytest.mark.parametrize("damage", [*SWAPS, "rate's sign", "rate in degrees", "angle in degrees"])
+def test_a_run_whose_angle_contradicts_its_rate_is_refused(damage):
+    run = healthy()
+    if damage in SWAPS:
+        run = swapped(run, *SWAPS[damage][:2])
+    elif damage == "rate's sign":
+        run = changed(run, yaw_rate_rad_s=-run["yaw_rate_rad_s"])
+    else:
+        wrong = "yaw_rate_rad_s" if damage.startswith("rate") else "yaw_rad"
+        run = changed(run, **{wrong: np.degrees(run[wrong])})
+    notes = examine(run)
+    with pytest.raises(DataError, match="no model follows `yaw_rad` and `yaw_rate_rad_s`") as caught:
+        record_of(Run(run.name, run.time, run.signals, notes=notes), Axis.YAW)
+    assert caught.value.found in {n.message for n in notes}
+    alone = {k: v for k, v in run.signals.items() if k != "yaw_rate_rad_s"}
+    assert record_of(Run(run.name, run.time, alone, notes=notes), Axis.YAW).angle_ok.all()
 
 
 def test_a_finding_carries_its_number_its_limit_and_what_to_change():
