@@ -18,8 +18,8 @@ from typing import Any
 
 from fieldsid.errors import FieldsidError, UsageError
 
-MIN_LIKENESS = 0.5
-"""Likeness, of 1, from which on a known name may be the one meant: one that a mistype of half its letters leaves."""
+MIN_LIKENESS, MIN_OWN_LIKENESS = 0.5, 1.0 / 3.0
+"""Likeness, of 1, from which on a known name may be the one meant, that of the whole and that of what both do not end in."""
 SUGGESTED = 3
 """Names that a hint offers at most."""
 
@@ -171,15 +171,15 @@ def define(package: str, text: str, file: str) -> Any:
 
 def near(word: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
     """Return a sentence naming what a mistyped word may have meant."""
-    alike = {k: _likeness(word, k) for k in known}
-    close = sorted((k for k in alike if alike[k] >= MIN_LIKENESS), key=lambda k: (-alike[k], k))[:SUGGESTED]
+    close = difflib.get_close_matches(word, list(known), n=SUGGESTED, cutoff=MIN_LIKENESS)
+    close = [name for name in close if _own_likeness(word, name) >= MIN_OWN_LIKENESS]
     if not close:
         return f"choose one of: {', '.join(sorted(known))}"
     return "did you mean " + " or ".join(f"`{c}`" for c in close) + "?"
 
 
-def _likeness(word: str, other: str) -> float:
-    """Return how alike two names are, of 1, by what they do not end in alike: a unit that both have says nothing of either."""
+def _own_likeness(word: str, other: str) -> float:
+    """Return how alike, of 1, two names are before the words that both end in: a unit that both have says nothing of either."""
     ours, theirs = (re.split(r"[^A-Za-z0-9]+", name) for name in (word, other))
     while min(len(ours), len(theirs)) > 1 and ours[-1] == theirs[-1]:
         ours.pop()

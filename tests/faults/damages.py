@@ -186,6 +186,10 @@ DAMAGES = (
     Damage("pitch nose down, with its rate", lambda log, random: [scaled(n, -1.0)(log, random) for n in
            ("pitch_rad", "pitch_rate_rad_s")] and None, ("dive_sign",)),
     Damage("yaw and pitch rate swapped", swapped("yaw_rate_rad_s", "pitch_rate_rad_s"), ("swapped",)),
+    Damage("heading and fin swapped", swapped("yaw_rad", "rudder_rad"), ("swapped",)),
+    Damage("rate and fin swapped", swapped("yaw_rate_rad_s", "rudder_rad"), ("swapped",)),
+    Damage("heading and rate swapped", swapped("yaw_rad", "yaw_rate_rad_s"), ("swapped",)),
+    Damage("heading and pitch swapped", swapped("yaw_rad", "pitch_rad"), ("swapped",)),
     Damage("rate 0.3 s late", shifted("yaw_rate_rad_s", 0.3), ("clock_offset",)),
     Damage("fin 0.3 s late", shifted("rudder_rad", 0.3), ("fin_late",)),
     Damage("single spikes of heading", at_places("yaw_rad", 0.005, spike(0.5)), ("spikes",)),

@@ -1,4 +1,4 @@
-"""What the doctor finds of thirty kinds of damage; 200 good logs by name: `python tests/faults/damages.py`."""
+"""What the doctor finds of forty kinds of damage; 200 good logs by name: `python tests/faults/damages.py`."""
 
 from __future__ import annotations
 

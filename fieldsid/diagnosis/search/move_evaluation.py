@@ -13,6 +13,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
     is_accepted,
     leaves_error,
     only_validation_shows,
+    worst_error,
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
@@ -58,7 +59,7 @@ class MoveEvaluation(SearchState):
                 None if forced else most,
                 self.parallel,
                 anew=key == self.root,
-                flown=key in self.tried.free_runs.screened,
+                flown=key in self.tried.free_runs.screened or self._is_close(parent),
             )
             self._fit_from_output_error(parent)
             self.tried.free_runs.screened.add(key)
@@ -70,6 +71,10 @@ class MoveEvaluation(SearchState):
             self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
             self._refine_children(key)
         return self._children(key)
+
+    def _is_close(self, parent: ScoredModel) -> bool:
+        """Whether a model's free run is so near the noise that to first order its likelihood shows whatever its free run does."""
+        return frozenset(parent.names) != self.root and worst_error(parent, self.floor) < MISSING_ERROR_RATIO
 
     def step_from_other_solutions(self, parent: ScoredModel) -> None:
         """Fit an expanded model with each effect that its other solutions lack, from those solutions."""

@@ -101,9 +101,13 @@ class Search(MoveEvaluation):
         best = next(iter(children), parent)
         if not (gains_any_evidence(parent, best) and leaves_error(best, self.floor)):
             return
-        for other in [h for h in children[1:] if gains_any_evidence(parent, h) or lowers_error(parent, h)][:MAX_JOINED]:
-            if self.may_go_on(leading=True):
-                best = max(best, self._join(best, other, other.effects), key=lambda h: h.log_evidence)
+        left = [h for h in children[1:] if gains_any_evidence(parent, h) or lowers_error(parent, h)][:MAX_JOINED]
+        while left and self.may_go_on(leading=True):
+            joined = self._joined([(best, other, other.effects) for other in left])
+            # each is added to the best so far: what was fitted without the first that helps is fitted again
+            helped = next((i for i, h in enumerate(joined) if h.log_evidence > best.log_evidence), len(left) - 1)
+            self._keep_joined(joined[: helped + 1])
+            best, left = max(best, joined[helped], key=lambda h: h.log_evidence), left[helped + 1 :]
 
     def _join_leaders(self) -> None:
         """Fit the sets of clearly lower error with what the model of the highest evidence has besides, the small effects or all.
@@ -113,22 +117,29 @@ class Search(MoveEvaluation):
         """
         best = self._most_evident()
         small = [e for e in best.effects if e.name not in self.core_of(best)]
-        for h in self._front(best)[:MAX_JOINED]:
-            for joined in (small, best.effects):
-                self._join(h, best, joined)
+        self._keep_joined(self._joined([(h, best, e) for h in self._front(best)[:MAX_JOINED] for e in (small, best.effects)]))
 
-    def _join(self, h: ScoredModel, other: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
-        """Return a model with what it lacks of another's effects, fitted from their numbers there; itself if that is known."""
-        fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
-        more = [e for e in effects if e.name not in h.names]
-        names = frozenset((*h.names, *(e.name for e in more)))
-        if names in self.tried:
-            return h
-        problem = fitted.problem.with_effects([*h.effects, *more])
-        start = carry_parameters(problem.layout, fitted.vector, there.vector)
-        ml_fit = fit_maximum_likelihood(problem, start, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
-        self.tried[names] = prefer_output_error(self._keep(ml_fit), self.floor)
-        return self.tried[names]
+    def _joined(self, asked: Sequence[tuple[ScoredModel, ScoredModel, Sequence[Effect]]]) -> list[ScoredModel]:
+        """Return each first model with what it lacks of some effects of the second, fitted from their numbers there.
+
+        Itself where that set was tried, or is asked for before in the list.
+        """
+        sets = [frozenset((*h.names, *(e.name for e in effects))) for h, _, effects in asked]
+
+        def join(i: int) -> ScoredModel:
+            (h, other, effects), names = asked[i], sets[i]
+            if names in self.tried or names in sets[:i]:
+                return h
+            fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
+            problem = fitted.problem.with_effects([*h.effects, *(e for e in effects if e.name not in h.names)])
+            start = carry_parameters(problem.layout, fitted.vector, there.vector)
+            ml_fit = fit_maximum_likelihood(problem, start, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+            return prefer_output_error(score_model(ml_fit, self.validation), self.floor).evaluate_errors(fitted=True)
+
+        return self.parallel.map(join, range(len(asked)))
+
+    def _keep_joined(self, joined: Sequence[ScoredModel]) -> None:
+        self.tried.update({frozenset(h.names): h for h in joined})
 
     def _grow_rivals(self) -> None:
         """Add to the accepted sets that predict as well as the model of the highest evidence what may bring them above it.
