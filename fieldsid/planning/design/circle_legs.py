@@ -14,6 +14,7 @@ from fieldsid.planning.design.leg import CIRCLE, Leg
 from fieldsid.planning.design.objective import make_objective
 from fieldsid.planning.flight.excitation import Excitation
 from fieldsid.planning.safety.envelope import MOST_TURNS
+from fieldsid.runtime.worker_pool import parallel_map
 
 SETTLED_TURN = 2.5 * np.pi
 """Heading (rad) to turn through: half a circle to settle, one to be measured on."""
@@ -29,7 +30,7 @@ def circle_legs(setting: Setting, speeds: Sequence[float]) -> list[Leg]:
     A circle turns through more than a whole turn: its heading has a limit of its own. All other limits hold.
     Raises UsageError when a circle does not fit them.
     """
-    return [leg for speed in speeds for leg in (_circle(setting, speed, 0.0), _circle(setting, speed, 1.0))]
+    return parallel_map(lambda turn: _circle(setting, *turn), [(speed, side) for speed in speeds for side in (0.0, 1.0)])
 
 
 def _circle(setting: Setting, speed: float, mirrored: float) -> Leg:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
+from fieldsid.runtime.worker_pool import parallel_map
 
 SHORTEST_WINDOW_S = 15.0
 MOST_PASSES = 40
@@ -101,17 +102,21 @@ def _legs(model: Model, request: Request, step: Callable[[], None]) -> list[Leg]
 
     What takes t s at one speed takes t times the ratio of the dampings at another: it is tried both ways.
     """
-    order = sorted(range(len(request.speeds)), key=lambda i: abs(request.speeds[i] - float(np.median(request.speeds))))
-    damping = {u: model.at_speed(u)[NAMES[model.axis].damping] for u in request.speeds}
-    made: dict[int, Leg] = {}
-    best: list[Excitation] = []
-    for i in order:
-        speed = request.speeds[i]
-        factor = damping[request.speeds[order[0]]] / damping[speed]
+    middle = min(range(len(request.speeds)), key=lambda i: abs(request.speeds[i] - float(np.median(request.speeds))))
+    damping = [model.at_speed(u)[NAMES[model.axis].damping] for u in request.speeds]
+
+    def leg_at(i: int, best: Sequence[Excitation]) -> Leg:
+        factor = damping[middle] / damping[i]
         known = [*best, *(c.stretched(factor) for c in best if factor > 0)]
-        made[i] = best_leg(setting_at(model, request, speed), speed, known)
+        return best_leg(setting_at(model, request, request.speeds[i]), request.speeds[i], known)
+
+    first = leg_at(middle, [])
+    step()
+    best = _finalists(first)
+    others = [i for i in range(len(request.speeds)) if i != middle]
+    made = {middle: first, **dict(zip(others, parallel_map(lambda i: leg_at(i, best), others), strict=True))}
+    for _ in others:
         step()
-        best = best or _finalists(made[i])
     return [made[i] for i in range(len(request.speeds))]
 
 

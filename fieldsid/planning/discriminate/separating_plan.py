@@ -17,6 +17,7 @@ from fieldsid.planning.design.plan import SHORTEST_WINDOW_S, Plan, Request, chec
 from fieldsid.planning.discriminate.discriminate import FAST_HZ, Separation, as_flown, candidate_maneuvers, separate, worth
 from fieldsid.planning.flight.excitation import Excitation
 from fieldsid.planning.safety.envelope import check_room, check_speeds
+from fieldsid.runtime.worker_pool import parallel_map
 
 COARSE_DRAWS = 60
 """Draws of the prior that each maneuver of the catalogue is first lowered by; the one that is flown is kept inside by many."""
@@ -37,12 +38,10 @@ def separating_plan(
     check_room(request.envelope, request.speeds, request.run_up_s, SHORTEST_WINDOW_S)
     for rival in rivals:
         checked_prior(rival, rivals[0].axis, request.speeds)
-    legs, found = [], []
-    for speed in request.speeds:
-        leg, separation = _leg_at(rivals, request, speed)
-        legs.append(leg)
-        found.append(separation)
+    made = parallel_map(lambda speed: _leg_at(rivals, request, speed), request.speeds)
+    for _ in made:
         step()
+    legs, found = [leg for leg, _ in made], [separation for _, separation in made]
     if request.radius:
         legs += circle_legs(setting_at(rivals[0], request, max(request.speeds)), request.speeds)
     check_minutes(legs, request)
