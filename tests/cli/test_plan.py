@@ -93,7 +93,7 @@ def test_rivals_are_told_apart_with_odds(run_cli):
 
 
 def test_rivals_get_a_leg_at_every_speed_inside_the_default_limits_and_circles_where_asked(run_cli):
-    body = run_cli("plan", "--separate", "servo_lag,delay", "--speeds", "1.0,1.4", "--radius", "--json").json
+    body = run_cli("plan", "--separate", "servo_lag,delay", "--speeds", "1.0,1.4", "--window", "22", "--radius", "--json").json
     assert [leg["speed_m_s"] for leg in body["legs"]] == [1.0, 1.4, 1.0, 1.0, 1.4, 1.4]
     assert [leg["purpose"] for leg in body["legs"]].count("turn radius") == 4
     assert body["envelope"]["heading"] == pytest.approx(np.radians(60.0))
