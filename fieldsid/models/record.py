@@ -208,7 +208,8 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         raise DataError(
             f"no model follows `{names.angle}` and `{names.rate}` of run {run.name!r} as they are",
             found=said,
-            hint="correct it in the mapping and import the log again, or leave the wrong one out: one of the two is enough",
+            hint="import the log again with a right mapping, see `sysid inspect LOG --write-mapping mapping.yaml`; or leave "
+            "the wrong one of the two out of it: one is enough",
         )
     angle, angle_ok = _measured(run, names.angle)
     rate, rate_ok = _measured(run, names.rate)

@@ -49,8 +49,9 @@ def angle_findings(run: Run, stated: Stated, faulty: Container[str] = ()) -> lis
     found: list[Note] = []
     for angle, rate in PAIRS:
         if run.has(angle) and run.has(rate):
-            told = _swapped(run, angle, rate)
-            told = told or [*_angle_and_rate(run, angle, rate, stated), *_jumps(run, angle, rate)]
+            told = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, stated)
+            if not any(n.code in CONTRADICTING for n in told):
+                told = [*told, *_jumps(run, angle, rate)]
             found += told or ([] if angle in faulty or rate in faulty else _unrelated(run, angle, rate))
     return found
 

@@ -120,6 +120,14 @@ def test_an_angle_and_a_rate_of_two_motions_are_told(signal):
     assert not {code for code, _ in codes_of} & {"swapped", "rate_sign", "unit"}
 
 
+def test_a_rate_of_the_wrong_sign_jumps_nowhere():
+    run, rng = healthy(), np.random.default_rng(5)
+    pulses = np.interp(run.time % 20.0, [0.0, 10.0, 10.1, 12.0, 12.1, 20.0], [0.0, 0.0, 0.8, 0.8, 0.0, 0.0])
+    noise = 0.003 * rng.normal(size=(2, len(run)))
+    against = changed(run, yaw_rate_rad_s=noise[0] - pulses, yaw_rad=np.cumsum(pulses) * 0.05 + noise[1])
+    assert codes(against) == {("rate_sign", "yaw_rate_rad_s")}
+
+
 def test_a_heading_that_stands_still_in_its_last_digit_is_of_no_other_motion():
     run, rng = healthy(), np.random.default_rng(4)
     still = np.round(0.001 * np.cumsum(rng.normal(size=len(run))) / 0.0175) * 0.0175
