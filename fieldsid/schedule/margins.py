@@ -14,21 +14,35 @@ from fieldsid.schedule.controller import Gains, least_damping, loop
 from fieldsid.schedule.linear_plant import LinearPlant
 
 FREQUENCY_GRID_RAD_S = np.geomspace(1e-3, 200.0, 1500)
+CONTROL_GRID_RAD_S = FREQUENCY_GRID_RAD_S[::3]
+"""The grid that python-control lays a spline through, for which it takes time in proportion."""
 HELD_SHARE = 0.95
 """Share of the draws that a number of the identified set speaks for."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlantResponse:
+    """What of every draw's loop on a grid is the plant's, whatever the gains: log size and unwrapped phase (d, w), rad/s (w,)."""
+
+    plant: LinearPlant
+    omega: FloatArray
+    log_size: FloatArray
+    phase: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
     """Smallest margins (d,): phase deg, gain dB (up), delay s, at crossover rad/s; inf where the loop never crosses.
 
-    An unstable closed loop has a phase margin below zero, whatever its crossings are, and no other margin.
+    An unstable closed loop has a phase margin below zero, whatever its crossings are, and no other margin. `damping` is the least
+    damping ratio of the closed loop's poles.
     """
 
     phase_deg: FloatArray
     gain_db: FloatArray
     delay_s: FloatArray
     crossover: FloatArray
+    damping: FloatArray
 
     def worst(self) -> tuple[float, float, float]:
         """Return the smallest phase, gain and delay margin over 95 % of the draws."""
@@ -42,25 +56,28 @@ def worst_of(values: FloatArray, *, most: bool) -> float:
     return float(ordered[int(np.ceil(HELD_SHARE * ordered.size - 1e-9)) - 1]) * (1.0 if most else -1.0)
 
 
+def plant_response(plant: LinearPlant, omega: FloatArray = FREQUENCY_GRID_RAD_S) -> PlantResponse:
+    """Return the response of every draw on the grid (w,) rad/s."""
+    response = plant.response(omega)
+    return PlantResponse(plant, omega, np.log(np.abs(response)), np.unwrap(np.angle(response), axis=1))
+
+
 def margins(plant: LinearPlant, gains: Gains, omega: FloatArray = FREQUENCY_GRID_RAD_S) -> Margins:
     """Return the margins of every draw, from the grid (w,) rad/s by interpolation at each crossing."""
-    open_loop = loop(plant, gains, omega)
-    size = np.log(np.abs(open_loop))
-    phase = np.unwrap(np.angle(open_loop), axis=1)
+    return margins_of(plant_response(plant, omega), gains)
+
+
+def margins_of(known: PlantResponse, gains: Gains) -> Margins:
+    """Return the margins of every draw with gains, from a plant's response on a grid by interpolation at each crossing."""
+    controller = gains.response(known.omega)
+    size = known.log_size + np.log(np.abs(controller))
+    phase = known.phase + np.unwrap(np.angle(controller))
     # an unwrapped phase may sit a turn off: a loop with positive gain starts between -360 and 0
     phase -= 2 * np.pi * np.ceil(phase[:, :1] / (2 * np.pi) - 1e-9)
-    found = _read_off(size, phase, np.log(omega))
-    unstable = least_damping(plant, gains) < 0.0
-    below = -np.minimum(np.abs(found.phase_deg), 180.0)
-    return Margins(
-        np.where(unstable, below, found.phase_deg),
-        np.where(unstable, 0.0, found.gain_db),
-        np.where(unstable, 0.0, found.delay_s),
-        found.crossover,
-    )
+    return _read_off(size, phase, np.log(known.omega), least_damping(known.plant, gains))
 
 
-def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray) -> Margins:
+def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray, damping: FloatArray) -> Margins:
     count = size.shape[0]
     phase_margin, delay, crossover = np.full(count, np.inf), np.full(count, np.inf), np.full(count, np.nan)
     gain_margin = np.full(count, np.inf)
@@ -80,7 +97,14 @@ def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray) -> Mar
         # a crossing above one is a gain that may not fall below it; whether the loop is stable there, the phase margin says
         if log_size < 0:
             gain_margin[i] = min(gain_margin[i], -20 / np.log(10) * log_size)
-    return Margins(phase_margin, gain_margin, delay, crossover)
+    unstable = damping < 0.0
+    return Margins(
+        np.where(unstable, -np.minimum(np.abs(phase_margin), 180.0), phase_margin),
+        np.where(unstable, 0.0, gain_margin),
+        np.where(unstable, 0.0, delay),
+        crossover,
+        damping,
+    )
 
 
 def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
@@ -92,8 +116,8 @@ def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, flo
         control: Any = import_module("control")
     except ImportError as error:
         raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
-    response = loop(plant.one(), gains, FREQUENCY_GRID_RAD_S)[0]
-    system = control.FrequencyResponseData(response, FREQUENCY_GRID_RAD_S, smooth=True)
+    response = loop(plant.one(), gains, CONTROL_GRID_RAD_S)[0]
+    system = control.FrequencyResponseData(response, CONTROL_GRID_RAD_S, smooth=True)
     gain, phase, _, _, phase_crossing, _ = control.stability_margins(system)
     delay = np.radians(phase) / phase_crossing if np.isfinite(phase_crossing) and phase_crossing > 0 else np.inf
     gain_db = 20 * np.log10(gain) if gain > 1.0 else np.inf

@@ -17,11 +17,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.schedule.controller import Gains, least_damping
+from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.flown.pace import Pace
 from fieldsid.schedule.flown.response import LIMIT_CYCLE_SHARE, about_rest, lateness, overshoot, settling, step_response, swing
 from fieldsid.schedule.linear_plant import LinearPlant
-from fieldsid.schedule.margins import HELD_SHARE, margins, worst_of
+from fieldsid.schedule.margins import HELD_SHARE, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.record import Row
 
 DRAWS_MARGIN_SHARE = 0.5
@@ -99,13 +99,14 @@ def minimum(cost: Callable[[float], float], low: float, high: float) -> float:
 
 def fastest_gains(family: LinearPlant, attempt: Callable[[float], Gains], demand: Demand) -> Found:
     """Return the gains of the largest share (up to 1) of what an attempt wishes that lack nothing, or the least."""
+    known = plant_response(family, SEARCHED_RAD_S)
 
     def cost(log_share: float) -> float:
         gains = attempt(float(np.exp(log_share)))
-        return LACK_PRICE * (linear_lack(family, gains, demand) + flown_lack(family, gains, demand)) - log_share
+        return LACK_PRICE * (linear_lack(known, gains, demand) + flown_lack(family, gains, demand)) - log_share
 
     share = float(np.exp(minimum(cost, np.log(SLOWEST_SHARE), 0.0)))
-    return _found(family, attempt(share), share, demand)
+    return _found(known, attempt(share), share, demand)
 
 
 def soonest_gains(
@@ -115,20 +116,20 @@ def soonest_gains(
 
     `most_damping` is the largest multiple of the wished damping; `bounded` keeps to a bandwidth that was asked for.
     """
-    most = float(np.log(most_damping))
+    most, known = float(np.log(most_damping)), plant_response(family, SEARCHED_RAD_S)
 
     def needed(share: float) -> float:
         def lacking(log_more: float) -> float:
-            return LACK_PRICE * linear_lack(family, attempt(share, float(np.exp(log_more))), demand) + DAMPING_PRICE * log_more
+            return LACK_PRICE * linear_lack(known, attempt(share, float(np.exp(log_more))), demand) + DAMPING_PRICE * log_more
 
-        return minimum(lacking, 0.0, most) if most > 0.0 and linear_lack(family, attempt(share, 1.0), demand) > 0.0 else 0.0
+        return minimum(lacking, 0.0, most) if most > 0.0 and linear_lack(known, attempt(share, 1.0), demand) > 0.0 else 0.0
 
     def cost(share: float, log_more: float) -> float:
         gains = attempt(share, float(np.exp(log_more)))
         late, lack = _lateness_and_lack(family, gains, demand)
         beyond = BANDWIDTH_PRICE * np.log(share) + BEYOND_PRICE * max(np.log(share), 0.0)
         price = -np.log(share) if bounded else np.log(late) + beyond
-        return float(price + DAMPING_PRICE * log_more + LACK_PRICE * (linear_lack(family, gains, demand) + lack))
+        return float(price + DAMPING_PRICE * log_more + LACK_PRICE * (linear_lack(known, gains, demand) + lack))
 
     def of_share(log_share: float) -> float:
         share = float(np.exp(log_share))
@@ -138,22 +139,22 @@ def soonest_gains(
     # the price has its corner at the whole fin: met exactly, a row is the formula's, not a thousandth off
     share = 1.0 if abs(place) <= 2.0 * PLACE_ROUNDING and of_share(0.0) <= of_share(place) else float(np.exp(place))
     more = minimum(lambda x: cost(share, x), needed(share), most) if most > 0.0 else 0.0
-    return _found(family, attempt(share, float(np.exp(more))), share, demand)
+    return _found(known, attempt(share, float(np.exp(more))), share, demand)
 
 
-def linear_lack(family: LinearPlant, gains: Gains, demand: Demand) -> float:
+def linear_lack(known: PlantResponse, gains: Gains, demand: Demand) -> float:
     """Return what poles and phase margins lack, each as a share of what is asked; zero where nothing lacks."""
-    own, draws = _lacks(family, gains, demand)
+    own, draws = _lacks(known, gains, demand)
     return OWN_PRICE * own + draws
 
 
-def _lacks(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[float, float]:
+def _lacks(known: PlantResponse, gains: Gains, demand: Demand) -> tuple[float, float]:
     """Return what the estimate's poles and margin lack, and what the margins of 95 % of the draws do."""
     asked = demand.phase_margin_deg
-    phase = margins(family, gains, SEARCHED_RAD_S).phase_deg
-    poles = max(demand.damping - float(least_damping(family.one(), gains)[0]), 0.0) / demand.damping
+    found = margins_of(known, gains)
+    phase, poles = found.phase_deg, max(demand.damping - float(found.damping[0]), 0.0) / demand.damping
     own = poles + max(asked - float(phase[0]), 0.0) / asked
-    draws = _of_draws((DRAWS_MARGIN_SHARE * asked - phase) / asked) if family.count > 1 else 0.0
+    draws = _of_draws((DRAWS_MARGIN_SHARE * asked - phase) / asked) if known.plant.count > 1 else 0.0
     return own if own > FORMULA_ROUNDING else 0.0, draws
 
 
@@ -189,9 +190,9 @@ def _step(family: LinearPlant, gains: Gains, demand: Demand) -> tuple[FloatArray
     return steps.time, steps.angle
 
 
-def _found(family: LinearPlant, gains: Gains, share: float, demand: Demand) -> Found:
-    own, draws = _lacks(family, gains, demand)
-    return Found(gains, share, own, own + draws + flown_lack(family, gains, demand))
+def _found(known: PlantResponse, gains: Gains, share: float, demand: Demand) -> Found:
+    own, draws = _lacks(known, gains, demand)
+    return Found(gains, share, own, own + draws + flown_lack(known.plant, gains, demand))
 
 
 def flown(family: LinearPlant, gains: Gains, demand: Demand) -> Flown:
