@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
-from fieldsid.logs.doctor.angle_and_rate import contradiction
+from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
 from fieldsid.logs.doctor.holes import JITTER, hole_notes, unbroken, usual_step
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.run import Note, Run
@@ -204,13 +204,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
             found=", ".join(k for k in run.signals if run.has(k)),
             hint="map one of them on import, where the log has it",
         )
-    if said := contradiction(run, names.angle, names.rate):
-        raise DataError(
-            f"no model follows `{names.angle}` and `{names.rate}` of run {run.name!r} as they are",
-            found=said,
-            hint="import the log again with a right mapping, see `sysid inspect LOG --write-mapping mapping.yaml`; or leave "
-            "the wrong one of the two out of it: one is enough",
-        )
+    refuse_contradiction(run, names.angle, names.rate)
     angle, angle_ok = _measured(run, names.angle)
     rate, rate_ok = _measured(run, names.rate)
     if axis is Axis.YAW and angle_ok.any():

@@ -11,6 +11,7 @@ import numpy as np
 
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.units import UNITS, factor_to
+from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
 from fieldsid.logs.mapping.canonical_names import TIME, canonical
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import no_fin
@@ -40,11 +41,15 @@ def fin_column(run: Run, axis: Axis) -> str:
 
 
 def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]:
-    """Yield the samples of a run after a time in s; raises DataError where the log has no fin, or neither angle nor rate."""
+    """Yield the samples of a run after a time in s.
+
+    Raises DataError where the log has no fin, or neither angle nor rate, or both and a finding says that they contradict.
+    """
     names, column = NAMES[axis], fin_column(run, axis)
     if not run.has(names.angle) and not run.has(names.rate):
         found = ", ".join(s for s in run.signals if run.has(s))
         raise DataError(f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`", found=found, hint="map one of them")
+    refuse_contradiction(run, names.angle, names.rate)
     nothing = np.full(len(run), nan)
     wanted = (column, names.angle, names.rate, SURGE)
     arrays = [run.time, *(run.signals.get(c, nothing) for c in wanted)]

@@ -11,6 +11,7 @@ from collections.abc import Container
 
 import numpy as np
 
+from fieldsid.errors import DataError
 from fieldsid.logs.doctor.spikes import DIGITS, last_digit
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import SIGNALS, Note, Run
@@ -91,10 +92,18 @@ def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
     return [Note("swapped", message, {"signal": angle, "value": trust, "limit": STRONG, **both})]
 
 
-def contradiction(run: Run, angle: str, rate: str) -> str:
-    """Return the finding on a run by which no model can follow both an angle and its rate; empty where there is none."""
-    notes = (n for n in run.notes if n.code in CONTRADICTING and {angle, rate} & set(n.data.get("signals", ())))
-    return next((n.message for n in notes), "") if run.has(angle) and run.has(rate) else ""
+def refuse_contradiction(run: Run, angle: str, rate: str) -> None:
+    """Raise DataError where a finding on a run says that no model can follow both an angle and its rate."""
+    if not (run.has(angle) and run.has(rate)):
+        return
+    found = [n for n in run.notes if n.code in CONTRADICTING and {angle, rate} & set(n.data.get("signals", ()))]
+    if found:
+        raise DataError(
+            f"no model follows `{angle}` and `{rate}` of run {run.name!r} as they are",
+            found=found[0].message,
+            hint="import the log again with a right mapping, see `sysid inspect LOG --write-mapping mapping.yaml`; or leave "
+            "the wrong one of the two out of it: one is enough",
+        )
 
 
 def _is_rate_of(changes: tuple[FloatArray, FloatArray, float], least: float) -> bool:

@@ -13,6 +13,7 @@ from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
+from fieldsid.online.samples import samples_of
 
 
 def healthy(seed=1, n=1200):
@@ -148,6 +149,8 @@ def test_a_run_whose_angle_contradicts_its_rate_is_refused(damage):
     with pytest.raises(DataError, match="no model follows `yaw_rad` and `yaw_rate_rad_s`") as caught:
         record_of(Run(run.name, run.time, run.signals, notes=notes), Axis.YAW)
     assert caught.value.found in {n.message for n in notes}
+    with pytest.raises(DataError, match="no model follows"):
+        list(samples_of(Run(run.name, run.time, run.signals, notes=notes), Axis.YAW))
     alone = {k: v for k, v in run.signals.items() if k != "yaw_rate_rad_s"}
     assert record_of(Run(run.name, run.time, alone, notes=notes), Axis.YAW).angle_ok.all()
 
