@@ -12,6 +12,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
     compared_errors,
     excess_share,
     fitted_errors,
+    settles_error,
     validation_error_ratio,
     worst_error,
 )
@@ -106,16 +107,18 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
 
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
-    """Return the models of the same size that the data cannot distinguish from the final one."""
+    """Return the models that cannot be distinguished from the final one, of its size, or larger and ending a visible error."""
     margin, sums = RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
+
+    def predicts(h: ScoredModel) -> bool:
+        if len(h.names) > len(found.names):
+            return set(found.names) < set(h.names) and settles_error(found, h, search.floor)
+        alike = h.selection_errors.mean < EQUAL_ERROR_RATIO * found.selection_errors.mean
+        return len(h.names) == len(found.names) and alike
+
     return tuple(
-        h
-        for h in search.ranked()
-        if h is not found
-        and len(h.names) == len(found.names)
-        and best - sums.get(frozenset(h.names), -np.inf) < margin
-        and h.selection_errors.mean < EQUAL_ERROR_RATIO * found.selection_errors.mean
+        h for h in search.ranked() if h is not found and best - sums.get(frozenset(h.names), -np.inf) < margin and predicts(h)
     )
 
 

@@ -18,6 +18,7 @@ from fieldsid.diagnosis.thresholds import (
     MAX_ERROR_RATIO,
     MAX_VALIDATION_ERROR_RATIO,
     MIN_TRAINING_GAIN,
+    RIVAL_LOG_ODDS,
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.models.model import Noise
@@ -125,6 +126,19 @@ def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     own = any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
     learned = float(with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()) > (MIN_TRAINING_GAIN if own else 0.0)
     return learned and with_.log_evidence > without.log_evidence
+
+
+def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
+    """Whether an addition that is a rival by log evidence, the prior against it included, ends a visible error on all runs.
+
+    A slow disturbance takes up in the likelihood, at next to no cost, what a drift or a current does. Which of the two it is such
+    runs do not tell, and a model that follows all of them to the noise is no part of one that does not. Effects with numbers of
+    each run's own follow any run, and are left out.
+    """
+    added = [e for e in with_.effects if e.name not in without.names]
+    own = any(e.nuisance or e.extra_states for e in added)
+    rivals = with_.log_evidence > without.log_evidence - RIVAL_LOG_ODDS
+    return rivals and not own and worst_error(with_, floor) <= SUFFICIENT_ERROR_RATIO < worst_error(without, floor)
 
 
 def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

@@ -65,8 +65,9 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
     says = "; ".join(_says(found, n) for n in verdict.effects)
     fall = _fall(search, found, floor, runs)
     if verdict.word == "undecided":
-        others = ", ".join("+".join(n for n in r.names if n not in search.known) for r in verdict.rivals)
-        return f"{names} or {others}: these data cannot tell them apart; with {names} {fall}"
+        others = {"+".join(n for n in r.names if n not in search.known): r for r in verdict.rivals}
+        ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
+        return f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
     return f"{names} ({says}): {fall}"
 
 

@@ -8,7 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
-from fieldsid.diagnosis.evidence.acceptance import excess_share, is_accepted, leaves_error, lowers_error, worst_error
+from fieldsid.diagnosis.evidence.acceptance import (
+    excess_share,
+    is_accepted,
+    leaves_error,
+    lowers_error,
+    settles_error,
+    worst_error,
+)
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem, LikelihoodFit
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
@@ -198,7 +205,8 @@ class SearchState:
         """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good.
 
         An effect that gains evidence beside all else stays where it lowers the error, though it may gain none once a small one is
-        left out: what that leaves in fast samples, a disturbance takes up with the rest.
+        left out: what that leaves in fast samples, a disturbance takes up with the rest. So does one that ends a visible error
+        and is a rival by evidence.
         """
         floor = sensor_noise(self.floor, self.tried.get(self.root))
         least = self._least_to_explain(floor)
@@ -206,7 +214,11 @@ class SearchState:
         while idle := [
             w
             for name, w in self._without_each(h)
-            if not (is_accepted(w, h, floor, least) or (name in proven and lowers_error(w, h, floor, least)))
+            if not (
+                is_accepted(w, h, floor, least)
+                or (name in proven and lowers_error(w, h, floor, least))
+                or settles_error(w, h, floor)
+            )
         ]:
             h = max(idle, key=lambda w: w.log_evidence)
         return frozenset(h.names)

@@ -16,6 +16,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
     leaves_error,
     lowers_error,
     only_validation_shows,
+    settles_error,
 )
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
@@ -92,6 +93,23 @@ def test_another_variant_may_not_raise_the_error_on_unseen_runs(over, kept):
 def test_the_error_alone_is_not_enough(gain, paid):
     found = hypothesis("servo_lag", gain=gain, over=1.0)
     assert (is_accepted(BASE, found), gains_evidence(BASE, found)) == (paid, paid)
+
+
+@pytest.mark.parametrize(
+    ("added", "gain", "over", "train", "settles"),
+    [
+        ("trim_drift", -2.5, 1.05, 1.1, True),
+        ("trim_drift", 1.0, 1.05, 1.1, True),
+        ("trim_drift", -3.5, 1.05, 1.1, False),  # the prior against it is not met
+        ("trim_drift", -2.5, 1.2, 1.1, False),  # unseen runs still show an error
+        ("trim_drift", -2.5, 1.1, 1.2, False),
+        ("step_change", -2.5, 1.05, 1.1, False),  # its size and time are each run's own
+    ],
+)
+def test_a_rival_that_ends_a_visible_error_settles_it(added, gain, over, train, settles):
+    lacks = hypothesis("deadband", over=1.6, train=1.7)
+    assert settles_error(lacks, hypothesis("deadband", added, gain=gain, over=over, train=train), FLOOR) == settles
+    assert not settles_error(hypothesis("deadband", over=1.1), hypothesis("deadband", added, gain=gain), FLOOR)
 
 
 @pytest.mark.parametrize(
