@@ -62,9 +62,9 @@ def plant_response(plant: LinearPlant, omega: FloatArray = FREQUENCY_GRID_RAD_S)
     return PlantResponse(plant, omega, np.log(np.abs(response)), np.unwrap(np.angle(response), axis=1))
 
 
-def margins(plant: LinearPlant, gains: Gains, omega: FloatArray = FREQUENCY_GRID_RAD_S) -> Margins:
-    """Return the margins of every draw, from the grid (w,) rad/s by interpolation at each crossing."""
-    return margins_of(plant_response(plant, omega), gains)
+def margins(plant: LinearPlant, gains: Gains) -> Margins:
+    """Return the margins of every draw, from the whole grid by interpolation at each crossing."""
+    return margins_of(plant_response(plant), gains)
 
 
 def margins_of(known: PlantResponse, gains: Gains) -> Margins:

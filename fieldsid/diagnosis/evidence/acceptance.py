@@ -122,10 +122,15 @@ def leaves_error(h: ScoredModel, floor: Noise) -> bool:
 
 def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence over all runs, whatever happens to the free-run error."""
-    known = {e.name for e in without.effects}
-    own = any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
-    learned = float(with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()) > (MIN_TRAINING_GAIN if own else 0.0)
+    least = MIN_TRAINING_GAIN if _adds_numbers_of_runs(without, with_) else 0.0
+    learned = float(with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()) > least
     return learned and with_.log_evidence > without.log_evidence
+
+
+def _adds_numbers_of_runs(without: ScoredModel, with_: ScoredModel) -> bool:
+    """Whether an addition has numbers of each run's own, a coefficient or the start of a hidden state."""
+    known = {e.name for e in without.effects}
+    return any(e.nuisance or e.extra_states for e in with_.effects if e.name not in known)
 
 
 def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> bool:
@@ -135,10 +140,9 @@ def settles_error(without: ScoredModel, with_: ScoredModel, floor: Noise) -> boo
     runs do not tell, and a model that follows all of them to the noise is no part of one that does not. Effects with numbers of
     each run's own follow any run, and are left out.
     """
-    added = [e for e in with_.effects if e.name not in without.names]
-    own = any(e.nuisance or e.extra_states for e in added)
-    rivals = with_.log_evidence > without.log_evidence - RIVAL_LOG_ODDS
-    return rivals and not own and worst_error(with_, floor) <= SUFFICIENT_ERROR_RATIO < worst_error(without, floor)
+    if with_.log_evidence <= without.log_evidence - RIVAL_LOG_ODDS or _adds_numbers_of_runs(without, with_):
+        return False
+    return worst_error(with_, floor) <= SUFFICIENT_ERROR_RATIO < worst_error(without, floor)
 
 
 def gains_any_evidence(without: ScoredModel, with_: ScoredModel) -> bool:

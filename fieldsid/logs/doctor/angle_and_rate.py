@@ -76,20 +76,21 @@ def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
         return []
     others = [s for s, unit in SIGNALS.items() if s not in (angle, rate) and unit in ("rad", "rad/s") and run.has(s)]
     asked = [(rate, angle), *((angle, s) for s in others), *((s, rate) for s in others)]
-    pairs = [(one, of) for one, of in asked if (c := _changes(run, one, of)) is not None and _is_rate_of(c, STRONG)]
-    if not pairs:
+    pairs = ((one, of) for one, of in asked if (c := _changes(run, one, of)) is not None and _is_rate_of(c, STRONG))
+    one, of = next(pairs, ("", ""))
+    if not one:
         return []
-    (one, of), trust = pairs[0], slope_of(*own[:2])[1] if own else 0.0
+    slope, trust = (0.0, 0.0) if own is None else slope_of(*own[:2])
     if one == rate:
         said = f"{rate} changes as {angle} says, in place of the other way round"
     elif one == angle:
         said = f"{angle} changes as {of} says, and not as {rate}"
     else:
         said = f"{one} changes as {rate} says, and {angle} does not"
-    seen = "it hardly moves" if own is None else "correlation {1:.2f}, slope {0:.3g}, should be 1".format(*slope_of(*own[:2]))
+    seen = "it hardly moves" if own is None else f"correlation {trust:.2f}, slope {slope:.3g}, should be 1"
     message = f"{said} ({seen}): two columns are swapped"
-    both = {"signals": list(dict.fromkeys((angle, rate, one, of)))}
-    return [Note("swapped", message, {"signal": angle, "value": trust, "limit": STRONG, **both})]
+    signals = list(dict.fromkeys((angle, rate, one, of)))
+    return [Note("swapped", message, {"signal": angle, "signals": signals, "value": trust, "limit": STRONG})]
 
 
 def refuse_contradiction(run: Run, angle: str, rate: str) -> None:
