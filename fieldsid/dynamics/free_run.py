@@ -116,13 +116,15 @@ def command_record(
     speed: float,
     signals: Mapping[str, FloatArray] = MappingProxyType({}),
     name: str = "command",
+    measures: bool = False,
 ) -> Record:
     """Return a record made of a held fin command alone, time (n,) s and fin (n,) rad, at a speed in m/s.
 
-    Helper roles that are not given are filled as on a steady straight run: surge at `speed`, the rest zero.
+    Helper roles that are not given are filled as on a steady straight run: surge at `speed`, the rest zero. `measures` marks both
+    sensors as measuring, zero throughout.
     """
     t = np.ascontiguousarray(time, dtype=np.float64)
-    none = np.zeros(t.size, dtype=bool)
+    seen = np.full(t.size, measures)
     steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth", "cross")} | {"surge": np.full(t.size, speed)}
     return Record(
         name=name,
@@ -133,8 +135,8 @@ def command_record(
         fin_is_measured=False,
         angle=np.zeros(t.size),
         rate=np.zeros(t.size),
-        angle_ok=none,
-        rate_ok=none,
+        angle_ok=seen,
+        rate_ok=seen,
         signals=MappingProxyType(steady | dict(signals)),
         speed=speed,
     )

@@ -9,7 +9,7 @@ from typing import cast
 from fieldsid.angles import parse_angle
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters
-from fieldsid.maneuvers._flight import Autopilot, Flight, Limits, Plant, Schedule, fly
+from fieldsid.maneuvers._flight import Autopilot, Flight, Limits, Plant, Schedule, fly, steer, within
 from fieldsid.registry import members, pick
 
 __all__ = [
@@ -26,6 +26,8 @@ __all__ = [
     "parse_spec",
     "pick_maneuver",
     "spec_of",
+    "steer",
+    "within",
 ]
 
 

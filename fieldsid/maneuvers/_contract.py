@@ -18,8 +18,9 @@ from fieldsid.registry import near
 Parameters = Mapping[str, float]
 Command = Callable[[Parameters, FloatArray], FloatArray]
 """command(parameters, time (n,) s) -> fin (n,) rad, NaN where the autopilot has it."""
-Rule = Callable[[Parameters, float, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""rule(parameters, time s, angle (m,), rate (m,), memory (m, k)) -> fin (m,), memory (m, k), for m vehicles at once."""
+Rule = Callable[[FloatArray, float, FloatArray, FloatArray, FloatArray, FloatArray], None]
+"""rule(values of the parameters in their order, time s, angle (m,), rate (m,), memory (m, k), fin (m,)): fills the fins of m
+vehicles, NaN where the autopilot has one, and changes their memory; a function of `numerics.jit`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,10 @@ class Maneuver:
     command: Command | None = None
     rule: Rule | None = None
     memory: Callable[[Parameters], tuple[float, ...]] = lambda _: ()
+
+    def vector(self, values: Parameters) -> FloatArray:
+        """Return values in the order of the parameters, as a rule takes them."""
+        return np.array([float(values[p.name]) for p in self.parameters])
 
     @property
     def defaults(self) -> dict[str, float]:

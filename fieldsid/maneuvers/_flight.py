@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers._contract import Maneuver, Parameters
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
+from fieldsid.numerics.jit import inner, jit
 
 
 class Plant(Protocol):
@@ -41,11 +41,6 @@ class Limits:
                 hint="set `fin_max_rad` and `fin_rate_max_rad_s` in vehicle.yaml",
             )
 
-    def apply(self, fin: FloatArray, last: FloatArray, step: float) -> FloatArray:
-        """Return the fins (m,) moved into the limits, `last` being those of the sample before."""
-        reach = self.fin_rate * step
-        return _within(_within(fin, last - reach, last + reach) if np.isfinite(reach) else fin, -self.fin, self.fin)
-
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
@@ -55,15 +50,45 @@ class Autopilot:
     rate_gain: float
     fin: float = np.inf
 
-    def command(self, angle: FloatArray, rate: FloatArray) -> FloatArray:
-        """Return the fins (m,) for angles and rates (m,)."""
-        short = np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
-        return _within(-(self.angle_gain * short + self.rate_gain * rate), -self.fin, self.fin)
+    @property
+    def gains(self) -> FloatArray:
+        """Return angle gain, rate gain and largest fin, (3,), as `steer` takes them."""
+        return np.array([self.angle_gain, self.rate_gain, self.fin])
 
 
-def _within(values: FloatArray, low: FloatArray | float, high: FloatArray | float) -> FloatArray:
-    """Return values no lower and no higher than these: a third of what np.clip takes for a few of them, at every sample."""
-    return np.asarray(np.minimum(np.maximum(values, low), high))
+@inner
+def within(fin: float, last: float, reach: float, low: float, high: float) -> float:
+    """Return a fin moved to within `reach` of the last one, then to within its own limits."""
+    return min(max(min(max(fin, last - reach), last + reach), low), high)
+
+
+@inner
+def steer(
+    asked: float, angle: float, rate: float, last: float, gains: FloatArray, reach: float, low: float, high: float
+) -> float:  # fmt: skip
+    """Return the fin that is commanded: what is asked for, the autopilot's where that is NaN, moved into the limits.
+
+    gains (3,) are the autopilot's, see `Autopilot.gains`; the other numbers are those of `within`.
+    """
+    fin = asked
+    if np.isnan(asked):
+        short = (angle + np.pi) % (2.0 * np.pi) - np.pi
+        fin = min(max(-(gains[0] * short + gains[1] * rate), -gains[2]), gains[2])
+    return within(fin, last, reach, low, high)
+
+
+@jit
+def steer_all(
+    asked: FloatArray, angle: FloatArray, rate: FloatArray, last: FloatArray, gains: FloatArray, reach: float, most: float,
+    fin: FloatArray, free: BoolArray,
+) -> int:  # fmt: skip
+    """Fill fin (m,) with what is commanded and free (m,) with where the autopilot commands it; return for how many it does."""
+    count = 0
+    for i in range(fin.shape[0]):
+        free[i] = np.isnan(asked[i])
+        count += free[i]
+        fin[i] = steer(asked[i], angle[i], rate[i], last[i], gains, reach, -most, most)
+    return count
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +99,7 @@ class Flight:
     fin: FloatArray
     angle: FloatArray
     rate: FloatArray
-    recovering: npt.NDArray[np.bool_]
+    recovering: BoolArray
     excitation: tuple[float, float]
 
 
@@ -102,66 +127,29 @@ def fly(
     shorter than a sample.
     """
     schedule = schedule or Schedule()
-    values = maneuver.checked(parameters)
-    step = 1.0 / schedule.rate_hz
-    excite = max(maneuver.duration(values), step)
-    count = round((schedule.run_up + excite + schedule.recover) * schedule.rate_hz) + 1
-    log = _Log(count, plant.size)
-    asked = _Asked(maneuver, values, schedule.run_up, plant.size)
-    angle = rate = last = np.zeros(plant.size)
-    end = count
+    values, size = maneuver.checked(parameters), plant.size
+    numbers, memory, gains = maneuver.vector(values), np.tile(np.array(maneuver.memory(values)), (size, 1)), autopilot.gains
+    step, length = 1.0 / schedule.rate_hz, maneuver.duration(values)
+    excite = max(length, step)
+    count = end = round((schedule.run_up + excite + schedule.recover) * schedule.rate_hz) + 1
+    fin, angle, rate = np.zeros((3, count, size))
+    free, asked, last, done = np.zeros((count, size), dtype=bool), np.full(size, np.nan), np.zeros(size), False
+    finish = schedule.run_up + excite
     for i in range(count):
         time = i * step
-        fin, free = asked.at(time, angle, rate)
-        wanted = np.where(free, autopilot.command(angle, rate), fin) if free.any() else fin
-        last = limits.apply(wanted, last, step)
-        log.put(i, last, angle, rate, free)
-        if asked.done is not None and i >= (end := min(count, round((asked.done + schedule.recover) * schedule.rate_hz) + 1)) - 1:
+        since = time - schedule.run_up
+        begun = since >= -1e-9
+        if begun and maneuver.rule is not None:
+            maneuver.rule(numbers, max(since, 0.0), angle[i], rate[i], memory, asked)
+        elif begun and maneuver.command is not None:
+            asked[:] = maneuver.command(values, np.array([since]))[0]
+        given = steer_all(asked, angle[i], rate[i], last, gains, limits.fin_rate * step, limits.fin, fin[i], free[i])
+        last = fin[i]
+        if begun and not done and (since >= length - 1e-9 or (maneuver.rule is not None and given == size)):
+            done, finish = True, time
+            end = min(count, round((finish + schedule.recover) * schedule.rate_hz) + 1)
+        if i >= end - 1:
             break
-        angle, rate = plant.advance(last, step)
-    finish = asked.done if asked.done is not None else schedule.run_up + excite
-    return log.flight(end, step, (schedule.run_up, finish))
-
-
-class _Log:
-    """Arrays that are filled sample by sample."""
-
-    def __init__(self, count: int, size: int) -> None:
-        self.values = np.zeros((3, count, size))
-        self.free = np.zeros((count, size), dtype=bool)
-
-    def put(self, i: int, fin: FloatArray, angle: FloatArray, rate: FloatArray, free: npt.NDArray[np.bool_]) -> None:
-        self.values[0, i], self.values[1, i], self.values[2, i] = fin, angle, rate
-        self.free[i] = free
-
-    def flight(self, end: int, step: float, excitation: tuple[float, float]) -> Flight:
-        kept = self.values[:, :end]
-        return Flight(np.arange(end, dtype=np.float64) * step, kept[0], kept[1], kept[2], self.free[:end], excitation)
-
-
-class _Asked:
-    """What the maneuver asks for at a time: the fins, and where the autopilot has them."""
-
-    def __init__(self, maneuver: Maneuver, values: Parameters, start: float, size: int) -> None:
-        self.maneuver, self.values, self.start, self.size = maneuver, values, start, size
-        self.memory = np.tile(np.array(maneuver.memory(values)), (size, 1))
-        self.length = maneuver.duration(values)
-        self.done: float | None = None
-
-    def at(self, time: float, angle: FloatArray, rate: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        since = time - self.start
-        if since < -1e-9:
-            return np.zeros(self.size), np.ones(self.size, dtype=bool)
-        fin = self._fin(since, angle, rate)
-        free = np.isnan(fin)
-        if self.done is None and (since >= self.length - 1e-9 or (self.maneuver.rule is not None and bool(free.all()))):
-            self.done = time
-        return fin, free
-
-    def _fin(self, since: float, angle: FloatArray, rate: FloatArray) -> FloatArray:
-        if self.maneuver.rule is not None:
-            fin, self.memory = self.maneuver.rule(self.values, max(since, 0.0), angle, rate, self.memory)
-            return fin
-        if self.maneuver.command is None:
-            raise UsageError(f"maneuver `{self.maneuver.name}` has neither a command nor a rule")
-        return np.full(self.size, self.maneuver.command(self.values, np.array([since]))[0])
+        angle[i + 1], rate[i + 1] = plant.advance(last, step)
+    clock, excitation = np.arange(end, dtype=np.float64) * step, (schedule.run_up, finish)
+    return Flight(clock, fin[:end], angle[:end], rate[:end], free[:end], excitation)

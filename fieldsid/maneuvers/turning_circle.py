@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, side
+from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 
 def _memory(_: Parameters) -> tuple[float, ...]:
     return (np.inf,)  # the time at which the pull-out began
 
 
-def _rule(p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
-    limit = p["turn"] if time < p["duration"] - p["pull_out"] else 0.0
-    began = np.minimum(memory[:, 0], np.where(np.abs(angle) >= limit, time, np.inf))
-    fin = np.where(time < began, p["amplitude"] * side(p), 0.0)
-    return np.where(time >= began + p["pull_out"], np.nan, fin), began[:, None]
+@jit
+def _rule(values: FloatArray, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray, fin: FloatArray) -> None:
+    most, turn, pull_out, mirrored, duration = values[0], values[1], values[2], values[3], values[4]
+    limit = turn if time < duration - pull_out else 0.0
+    for i in range(fin.shape[0]):
+        if abs(angle[i]) >= limit:
+            memory[i, 0] = min(memory[i, 0], time)
+        if time >= memory[i, 0] + pull_out:
+            fin[i] = np.nan
+        else:
+            fin[i] = most * (1.0 - 2.0 * mirrored) if time < memory[i, 0] else 0.0
 
 
 MANEUVER = Maneuver(

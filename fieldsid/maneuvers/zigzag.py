@@ -6,6 +6,7 @@ import numpy as np
 
 from fieldsid.maneuvers._contract import Maneuver, Parameter, Parameters, amplitude, side
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.jit import jit
 
 SIDE, SENSE, LEFT = 0, 1, 2
 """Columns of the memory: side of the fin, which way a positive fin turns (0 not known yet), reversals left."""
@@ -15,17 +16,18 @@ def _memory(p: Parameters) -> tuple[float, ...]:
     return (side(p), 0.0, p["reversals"])
 
 
-def _rule(p: Parameters, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
-    out = memory.copy()
-    # The first crossing tells which way the fin turns the vehicle: the sign of the authority need not be known.
-    crossed = np.abs(angle) >= p["turn"]
-    first = crossed & (out[:, SENSE] == 0)
-    out[first, SENSE] = np.sign(angle[first]) * out[first, SIDE]
-    passed = crossed & (angle * out[:, SENSE] * out[:, SIDE] > 0)
-    out[passed, SIDE] *= -1.0
-    out[passed, LEFT] -= 1.0
-    over = (out[:, LEFT] < 0) | (time >= p["duration"])
-    return np.where(over, np.nan, p["amplitude"] * out[:, SIDE]), out
+@jit
+def _rule(values: FloatArray, time: float, angle: FloatArray, rate: FloatArray, memory: FloatArray, fin: FloatArray) -> None:
+    most, turn, duration = values[0], values[1], values[4]
+    for i in range(fin.shape[0]):
+        if abs(angle[i]) >= turn:
+            # The first crossing tells which way the fin turns the vehicle: the sign of the authority need not be known.
+            if memory[i, SENSE] == 0.0:
+                memory[i, SENSE] = np.sign(angle[i]) * memory[i, SIDE]
+            if angle[i] * memory[i, SENSE] * memory[i, SIDE] > 0.0:
+                memory[i, SIDE] *= -1.0
+                memory[i, LEFT] -= 1.0
+        fin[i] = np.nan if memory[i, LEFT] < 0.0 or time >= duration else most * memory[i, SIDE]
 
 
 MANEUVER = Maneuver(

@@ -6,6 +6,7 @@ import numpy as np
 
 from fieldsid.dynamics import integrate
 from fieldsid.dynamics.linear_kernel import linear_sensitivities
+from fieldsid.maneuvers import Autopilot, Limits, Schedule, all_maneuvers, fly
 from fieldsid.noise.kalman.disturbance import disturbance_filter
 from fieldsid.planning.flight.closed_loop import closed_loop
 from fieldsid.planning.flight.rule_flight import OperatingPointPlant
@@ -22,4 +23,9 @@ def compile_planning() -> None:
     drive, c = zero((m, n - 1, len(integrate.DRIVES))), zero((m, len(integrate.CONSTANTS)))
     push, off = zero((m, n - 1, 3)), zero((m, n - 1, 2))
     closed_loop(steps, drive[0].copy(), c[0], 1, zero(n), off[0], push[0], zero(3), zero(4), zero(n), zero((n, 3)))
-    OperatingPointPlant(drive, c, 1, push, zero(m), off, zero((m, 3))).advance(zero(m), 0.05)
+    plant = OperatingPointPlant(drive, c, 1, push, zero(m), off, zero((m, 3)))
+    still, short = Autopilot(0.0, 0.0), Schedule(20.0, 0.0, 0.0)
+    for maneuver in all_maneuvers().values():
+        if maneuver.rule is not None:
+            shortest = {p.name: p.low for p in maneuver.parameters}
+            fly(maneuver, shortest, plant.again(off), limits=Limits(0.1), autopilot=still, schedule=short)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import Autopilot, Limits, Schedule, all_maneuvers, fly, parse_spec, spec_of
+from fieldsid.numerics.jit import plain_of
 
 ALL = list(all_maneuvers().values())
 OPEN = [m for m in ALL if m.rule is None]
@@ -113,6 +115,26 @@ def test_a_rule_ends_by_itself_on_vehicles_of_either_fin_sign(maneuver, sign):
     assert flight.recovering[-1].all()
     assert not flight.recovering[round(2.5 * RATE_HZ)].any()
     assert np.all(np.abs(flight.fin) <= 0.3 + 1e-12)
+
+
+@pytest.mark.parametrize("maneuver", RULES, ids=attrgetter("name"))
+def test_a_rule_compiled_is_the_rule_as_written(maneuver):
+    plain = replace(maneuver, rule=plain_of(maneuver.rule))
+    for values in (maneuver.defaults, maneuver.checked({"mirrored": 1, "duration": 9.0})):
+        one, other = (
+            fly(
+                m,
+                values,
+                Hull((1.0, 0.9), (1.6, -0.7), (2.0, 0.0)),
+                limits=Limits(0.3, 0.5),
+                autopilot=Autopilot(0.4, 0.2, 0.3),
+                schedule=Schedule(RATE_HZ),
+            )
+            for m in (maneuver, plain)
+        )
+        np.testing.assert_array_equal(one.fin, other.fin)
+        np.testing.assert_array_equal(one.recovering, other.recovering)
+        assert one.excitation == other.excitation
 
 
 @pytest.mark.parametrize("maneuver", ALL, ids=attrgetter("name"))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.logs.run import Note, Run
-from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 JITTER = 0.35
 """Share of the usual step within which steps differ by the clock's jitter, not by a sample that is missing."""
@@ -40,7 +40,12 @@ def usual_step(steps: FloatArray) -> float | None:
     if steps.size == 0:
         return None
     usual = float(np.median(steps))
-    return usual if np.count_nonzero(np.abs(steps - usual) < JITTER * usual) > REGULAR * steps.size else None
+    return usual if is_usual(np.abs(steps - usual) < JITTER * usual) else None
+
+
+def is_usual(regular: BoolArray) -> bool:
+    """Whether the median of some steps is their usual one, told by which of them differ from it by jitter alone (n,)."""
+    return bool(np.count_nonzero(regular) > REGULAR * regular.size)
 
 
 def holes_of(time: FloatArray, fin: FloatArray) -> tuple[Hole, ...]:

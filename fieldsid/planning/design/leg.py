@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.display import Brief
-from fieldsid.maneuvers import Autopilot
+from fieldsid.maneuvers import Autopilot, within
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.excitation import Excitation, Window, asked_of
 from fieldsid.planning.safety.envelope import Envelope
@@ -121,10 +121,9 @@ def commands_of(leg: Leg, envelope: Envelope) -> tuple[FloatArray, FloatArray, F
     steered = np.isnan(asked)
     wanted = np.where(steered, 0.0, asked)
     fin = np.empty(time.size)
-    last = np.zeros(1)
+    last, reach = 0.0, limits.fin_rate / leg.window.rate_hz
     for i in range(time.size):
-        last = limits.apply(wanted[i : i + 1], last, 1.0 / leg.window.rate_hz)
-        fin[i] = last[0]
+        fin[i] = last = within(wanted[i], last, reach, -limits.fin, limits.fin)
     return time, fin, steered.astype(np.float64)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
-from fieldsid.maneuvers import Autopilot, Limits
+from fieldsid.maneuvers import Autopilot, Limits, steer
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
@@ -48,14 +48,7 @@ def closed_loop(
     last = 0.0
     out[0, 0], out[0, 1], out[0, 2] = 0.0, 0.0, 0.0
     for i in range(n):
-        fin = asked[i]
-        if np.isnan(fin):
-            short = (state[0] + np.pi) % (2.0 * np.pi) - np.pi
-            fin = -(gains[0] * short + gains[1] * state[1])
-            fin = min(max(fin, -gains[2]), gains[2])
-        reach = limits[2] * steps[min(i, n - 2)]
-        fin = min(max(fin, last - reach), last + reach)
-        fin = min(max(fin, limits[0]), limits[1])
+        fin = steer(asked[i], state[0], state[1], last, gains, limits[2] * steps[min(i, n - 2)], limits[0], limits[1])
         command[i] = fin
         last = fin
         if i == n - 1:
@@ -89,8 +82,7 @@ def respond(
     moving = any(e.fin is not None for e in scene.effects)
     off = np.zeros((n - 1, 2))
     command, out = np.zeros(n), np.zeros((n, 3))
-    gains = np.array([autopilot.angle_gain, autopilot.rate_gain, autopilot.fin])
-    trim = scene.trim_fin
+    gains, trim = autopilot.gains, scene.trim_fin
     bounds = np.array([min(-limits.fin - trim, 0.0), max(limits.fin - trim, 0.0), limits.fin_rate, trim])
     clean = ready.drive.copy()
     if moment is not None:

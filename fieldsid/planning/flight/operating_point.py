@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,9 +52,7 @@ class OperatingPoint:
 
     def record(self, time: FloatArray, fin: FloatArray) -> Record:
         """Return the record of a fin command (n,) rad over time (n,) s, with both sensors marked as measuring."""
-        made = command_record(self.axis, time, fin, speed=self.speed)
-        seen = np.ones(time.size, dtype=bool)
-        return replace(made, angle_ok=seen, rate_ok=seen)
+        return command_record(self.axis, time, fin, speed=self.speed, measures=True)
 
 
 def operating_point(model: Model, speed: float) -> OperatingPoint:

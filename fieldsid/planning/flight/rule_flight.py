@@ -19,20 +19,26 @@ from fieldsid.planning.flight.operating_point import OperatingPoint
 
 @jit
 def advance_all(
-    step: float, drive: FloatArray, c: FloatArray, pieces: int, push: FloatArray, start: FloatArray, end: FloatArray,
-    state: FloatArray,
+    step: float, at: int, drive: FloatArray, c: FloatArray, pieces: int, push: FloatArray, fin: FloatArray, trim: FloatArray,
+    off: FloatArray, state: FloatArray, moved: FloatArray,
 ) -> None:  # fmt: skip
-    """Move states (m, 3) on by one interval: drive (m, 8) before the fin, push (m, 3), fin angles at both ends (m,)."""
-    steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[1]))
+    """Move states (m, 3) on by the interval `at` with fins (m,) about trim (m,), and fill moved (2, m) with angles and rates.
+
+    drive (m, n-1, 8) before the fin, push (m, n-1, 3), off (m, n-1, 2) the fin's angle less its command at both ends.
+    """
+    steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[2]))
     for i in range(state.shape[0]):
-        for j in range(drive.shape[1]):
-            now[0, j] = drive[i, j]
-        now[0, 2] += push[i, 0] * start[i]
-        now[0, 3] += push[i, 1] * end[i]
-        now[0, 5] += push[i, 2] * 0.5 * (start[i] + end[i])
+        for j in range(drive.shape[2]):
+            now[0, j] = drive[i, at, j]
+        angle = trim[i] + fin[i]
+        start, end = angle + off[i, at, 0], angle + off[i, at, 1]
+        now[0, 2] += push[i, at, 0] * start
+        now[0, 3] += push[i, at, 1] * end
+        now[0, 5] += push[i, at, 2] * 0.5 * (start + end)
         nonlinear_motion(steps, now, c[i], state[i], pieces, pair)
         for j in range(3):
             state[i, j] = pair[1, j]
+        moved[0, i], moved[1, i] = state[i, 0], state[i, 1]
 
 
 @dataclass(slots=True)
@@ -55,12 +61,12 @@ class OperatingPointPlant:
 
     def advance(self, fin: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
         """Hold the fins (m,) about trim for `step` s; return angles and rates (m,)."""
-        i = min(self.at, self.drive.shape[1] - 1)
-        angle = self.trim + fin
-        start, end = angle + self.off[:, i, 0], angle + self.off[:, i, 1]
-        advance_all(step, self.drive[:, i], self.constants, self.pieces, self.push[:, i], start, end, self.state)
+        at, moved = min(self.at, self.drive.shape[1] - 1), np.empty((2, self.size))
+        advance_all(
+            step, at, self.drive, self.constants, self.pieces, self.push, fin, self.trim, self.off, self.state, moved
+        )  # fmt: skip
         self.at += 1
-        return self.state[:, 0].copy(), self.state[:, 1].copy()
+        return moved[0], moved[1]
 
     def first(self, count: int) -> OperatingPointPlant:
         """Return the first scenes only, at rest."""

@@ -107,7 +107,7 @@ def _open_loop(crowd: Ensemble, asked: FloatArray, envelope: Envelope, autopilot
     fin, fin_rate = envelope.fin, envelope.fin_rate
     low, high = np.minimum(-fin - plant.trim, 0.0), np.maximum(fin - plant.trim, 0.0)
     limits = np.column_stack([low, high, np.full(plant.size, fin_rate), plant.trim])
-    gains = np.array([autopilot.angle_gain, autopilot.rate_gain, autopilot.fin])
+    gains = autopilot.gains
     moving = any(e.fin is not None for s in crowd.scenes for e in s.effects)
     off, steps, out = plant.off, np.diff(time), np.empty((time.size, 3))
     rounds = ACTUATOR_ROUNDS if moving else 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fieldsid.errors import UsageError
-from fieldsid.maneuvers import Autopilot, Limits, Schedule, fly, parse_spec, pick_maneuver
+from fieldsid.maneuvers import Autopilot, Limits, Schedule, fly, parse_spec, pick_maneuver, steer
 from fieldsid.maneuvers.multisine import crest_factor, harmonics
 from fieldsid.maneuvers.prbs import TAPS, bits
 
@@ -126,8 +126,8 @@ def test_a_turning_circle_turns_as_far_as_asked_then_pulls_out():
 
 
 def test_the_autopilot_comes_back_the_shorter_way_round():
-    after_a_circle = np.array([2 * np.pi + 0.1])
-    assert Autopilot(1.0, 0.0).command(after_a_circle, np.zeros(1)) == pytest.approx([-0.1])
+    after_a_circle = 2 * np.pi + 0.1
+    assert steer(np.nan, after_a_circle, 0.0, 0.0, Autopilot(1.0, 0.0).gains, np.inf, -0.3, 0.3) == pytest.approx(-0.1)
 
 
 @pytest.mark.parametrize(
