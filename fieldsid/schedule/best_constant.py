@@ -31,18 +31,20 @@ def best_constant(schedule: Schedule, plants: Sequence[LinearPlant], paces: Sequ
     candidates = [r for r in multiples if abs(r.gains.kp) * step <= most]
     margin = margin_kept(schedule)
     few = [p.pick(np.arange(min(TRIED_DRAWS, p.count))) for p in plants]
-
-    def cost(row: Row) -> tuple[int, float]:
-        slowest, lost = 0.0, 0
+    best, least = candidates[0], (len(few) + 1, np.inf)
+    for row in candidates:
+        lost, slowest = 0, 0.0
         for plant, pace in zip(few, paces, strict=True):
             held = held_at(row, schedule, plant.speed)
             steps = step_response(plant, held, reference=step, seconds=pace.flight, step_s=pace.step)
             kept = (swing(steps.angle, step) <= LIMIT_CYCLE_SHARE) & (margins(plant, row.gains).phase_deg >= margin)
             lost += int(np.mean(kept) < HELD_SHARE)
             slowest = max(slowest, worst_of(settling(steps.time, about_rest(steps.angle, step), step), most=True))
-        return lost, slowest
-
-    return min(candidates, key=cost)
+            if (lost, slowest) >= least:  # neither falls at another speed
+                break
+        else:
+            best, least = row, (lost, slowest)
+    return best
 
 
 def held_at(constant: Row, schedule: Schedule, speed: float) -> Row:

@@ -14,7 +14,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 
 SEED = 4711
-CASES = (("single", 1), ("single", 5), ("single", 12), ("none", 2), ("pair", 3), ("uncatalogued", 4))
+CASES = (("single", 1), ("single", 5), ("single", 12), ("none", 2), ("pair", 4), ("uncatalogued", 4))
 ODD_IN_MIRROR = ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", "roll_rad", "sway_m_s", "y_m")
 """Signals that change their sign where port and starboard are exchanged."""
 Log = dict[str, np.ndarray]
@@ -61,6 +61,15 @@ def test_what_is_named_is_the_most_probable_of_the_table_and_nothing_listed_is_b
         assert d.final.validation.over(d.noise_floor) < d.base.validation.over(d.noise_floor)
     else:
         assert d.effects == ()
+
+
+@pytest.mark.parametrize(("kind", "index"), CASES)
+def test_probabilities_of_all_hypotheses_never_exceed_one(kind, index):
+    d = found(kind, index)
+    total = sum(c.probability for c in d.candidates)
+    assert 0.0 <= total <= 1.0 + 1e-9
+    assert total > 0.0 or not d.effects
+    assert all(0.0 <= c.explained <= 1.0 for c in d.candidates)
 
 
 @pytest.mark.parametrize(("kind", "index"), CASES)

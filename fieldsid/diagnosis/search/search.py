@@ -272,20 +272,23 @@ class Search(MoveEvaluation):
         Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
         the two. Of two optima of the same effects that are rivals by evidence the one stands whose free run predicts better.
         """
-        base = self.base().likelihood_fit
+        base, leading, under = self.base().likelihood_fit, self._most_evident(), (self.resolution_floor, self.noise_kind)
         at = linearise_at(base.fitted.problem, base.fitted.x, base.noise)
+        rival = leading.likelihood_fit.log_likelihood - leading.complexity_penalty  # no set pays less than nothing
 
         def fit(pair: tuple[Effect, Effect]) -> list[LikelihoodFit]:
             problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
             points = scan_points(at, next(e for e in pair if e.extra_states))
             starts = [carry_parameters(problem.layout, base.fitted.vector, otherwise=v) for v in points]
             best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
-            return [fit_maximum_likelihood(problem, x, base.noise, self.resolution_floor, self.noise_kind) for x in best]
+            ends = [fit_maximum_likelihood(problem, x, base.noise, *under, rival=rival) for x in best]
+            return sorted(ends, key=lambda end: -end.log_likelihood)  # what is far behind the first is not scored
 
         before = dict(self.tried)
         for ml_fit in chain.from_iterable(self.parallel.map(fit, pairs)):
             self._keep(ml_fit)
-        found = [h for key, h in self.tried.items() if h is not before.get(key)]
+        new = [h for key, h in self.tried.items() if h is not before.get(key)]
+        found = [h for h in new if h.likelihood_fit.log_likelihood > rival]
         flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(fitted=True), found)
         for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
             self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)

@@ -62,10 +62,11 @@ def at_rest(row: FloatArray, now: FloatArray) -> tuple[float, float, float]:
 @inner
 def at_speed(row: FloatArray, ratio: float, out: FloatArray) -> None:
     """Fill out (6,) with damping, authority and the cross state's four coefficients at a speed over the first one."""
-    log = np.log(ratio)
     for j in range(6):
-        value = row[0] if j == 0 else row[5 + j]
-        out[j] = (row[2] if j == 1 else value) * np.exp(row[14 + j] * log)
+        value, power = row[0] if j == 0 else row[5 + j], row[14 + j]
+        # a law's powers are whole but for a fitted one, and a product takes a tenth of the time
+        factor = 1.0 if power == 0.0 else ratio if power == 1.0 else ratio * ratio if power == 2.0 else ratio**power
+        out[j] = (row[2] if j == 1 else value) * factor
 
 
 @inner

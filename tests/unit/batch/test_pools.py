@@ -166,7 +166,9 @@ def test_a_cluster_that_loses_a_worker_still_answers_for_every_log(tmp_path):
 @in_own_process
 def test_an_address_without_a_scheduler_is_said(tmp_path):
     pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
-    from fieldsid.batch.dask_cluster import run_on_cluster
+    from fieldsid.batch import dask_cluster
 
-    with pytest.raises(UsageError, match="no Dask scheduler"):
-        next(run_on_cluster([], "tcp://127.0.0.1:9"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dask_cluster, "CONNECT_S", 1)
+        with pytest.raises(UsageError, match="no Dask scheduler"):
+            next(dask_cluster.run_on_cluster([], "tcp://127.0.0.1:9"))
