@@ -16,13 +16,12 @@ Names = frozenset[str]
 class Progress:
     """What was done under one set of assumptions, by set of effects.
 
-    The spec that stands for it; whether it was expanded, and from its other solutions too; the log evidence at which variants of
+    The spec that stands for it; whether it was expanded; the log evidence at which variants of
     its effects were tried; and the specs that were fitted without each of their effects.
     """
 
     standing: dict[Names, ModelSpec] = field(default_factory=dict)
     expanded: set[Names] = field(default_factory=set)
-    expanded_from_others: set[Names] = field(default_factory=set)
     evidence_at_variants: dict[tuple[Names, Names], float] = field(default_factory=dict)
     thinned: set[ModelSpec] = field(default_factory=set)
 
@@ -61,19 +60,6 @@ class Archive(MutableMapping[Names, ScoredModel]):
     def noise_kinds(self) -> set[str]:
         """The kinds of noise that models were tried under."""
         return {spec.assumptions.noise_kind for spec in self.models}
-
-    def before_variants(self, names: Names) -> ScoredModel | None:
-        """Return the model of some effects in their textbook variants, where one in another variant stands for them now.
-
-        The variant may have taken up the motion of an effect that is missing.
-        """
-        spec = self.progress.standing[names]
-        plain = [
-            h
-            for s, h in self.models.items()
-            if s.names == names and s.assumptions == spec.assumptions and s.variants < spec.variants
-        ]
-        return min(plain, key=lambda h: (sum(e.is_formed for e in h.effects), -h.log_evidence), default=None)
 
     def __getitem__(self, names: Names) -> ScoredModel:
         """Return the model that stands for some effects; raises KeyError where none was tried."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 
@@ -45,11 +45,6 @@ class ModelSpec:
             snapped=groups.snapped,
             assumptions=Assumptions.of(h),
         )
-
-    def without(self, name: str) -> ModelSpec:
-        """Return that of the model less one of its effects."""
-        effects = frozenset(e for e in self.effects if e[0] != name)
-        return replace(self, effects=effects, variants=self.variants - {name})
 
     @property
     def names(self) -> frozenset[str]:

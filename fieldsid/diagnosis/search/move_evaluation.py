@@ -36,7 +36,7 @@ from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
-from fieldsid.fitting.initial.effect_screen import carry_parameters, equivalent_solution
+from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
@@ -76,16 +76,6 @@ class MoveEvaluation(SearchState):
         """Whether a model's free run is so near the noise that to first order its likelihood shows whatever its free run does."""
         return frozenset(parent.names) != self.root and worst_error(parent, self.floor) < MISSING_ERROR_RATIO
 
-    def step_from_other_solutions(self, parent: ScoredModel) -> None:
-        """Fit an expanded model with each effect that its other solutions lack, from those solutions."""
-        key = frozenset(parent.names)
-        self.tried.progress.expanded_from_others.add(key)
-        others = self._other_solutions(parent)
-        for other in others:
-            self._fit_from_other(parent, other, [e for e in self.catalogue if e.name not in key])
-        if others:
-            self._refine_children(key)
-
     def _refine_children(self, key: frozenset[str]) -> None:
         """Fit a model again from its best child, its leading children by output error and under other laws and variants."""
         if self.may_go_on():
@@ -93,47 +83,6 @@ class MoveEvaluation(SearchState):
         self._prefer_output_error(key)
         if self.may_go_on():
             self._try_laws_and_variants(key, self._leading(key))
-
-    def _other_solutions(self, parent: ScoredModel) -> list[ScoredModel]:
-        """Return what the same effects are in the textbook's variants, and with the smaller of two equivalent coefficients.
-
-        A variant may have taken up the motion of an effect that is missing. So may the larger of two equivalent coefficients:
-        what looks like a servo slower than the hull is a fast one where the hull drifts too.
-        """
-        textbook = self.tried.before_variants(frozenset(parent.names))
-        ml_fit, found = parent.likelihood_fit, [] if textbook is None else [textbook]
-        for effect in parent.effects:
-            x = equivalent_solution(ml_fit.fitted.problem, ml_fit.fitted.x, effect)
-            if x is None:
-                continue
-            place = ml_fit.fitted.problem.layout.names.index(effect.coefficients[0].name)
-            if x[place] < ml_fit.fitted.x[place]:
-                again = fit_maximum_likelihood(ml_fit.fitted.problem, x, ml_fit.noise, self.resolution_floor, self.noise_kind)
-                found.append(score_model(again, self.validation))
-        return found
-
-    def _fit_from_other(self, parent: ScoredModel, other: ScoredModel, left: Sequence[Effect]) -> None:
-        """Fit both with each effect that the other solution lacks, from that solution with the effect.
-
-        From the parent's own solution that effect may explain little, and with it the other solution may be enough.
-        """
-        fitted = parent.likelihood_fit.fitted
-        moves = add_effect(other, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=False)
-
-        def fit_all(group: Sequence[SearchMove]) -> ScoredModel:
-            effect = group[0].screened.effect
-            problem = fitted.problem.with_effects([*parent.effects, effect])
-            for move in group:
-                plain, x = move.screened.problem, move.screened.start
-                if move.by_output_error:
-                    x = fit_output_error(plain, x, fitted.weights).x
-                    if plain.layout.names != problem.layout.names:
-                        start = carry_parameters(problem.layout, (plain.layout, x), fitted.vector)
-                        self._fit_child(parent, problem, start, effect)
-                self._fit_child(other, plain, x, effect)
-            return self.tried[frozenset((*parent.names, effect.name))].evaluate_errors()
-
-        self.tried.update({frozenset(h.names): h for h in self.parallel.map(fit_all, by_effect(moves))})
 
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, leaves_error, lowers_error
-from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
-from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise, sensor_noise
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, likelihood_at
+from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
 from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, add_effect, by_effect
 from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MoveEvaluation
-from fieldsid.diagnosis.search.multistart import multistart
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import (
     ALTERNATIVE_LOG_ODDS,
@@ -25,14 +23,11 @@ from fieldsid.diagnosis.thresholds import (
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
 )
-from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
-from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
-from fieldsid.models.effect import Effect, Stage
+from fieldsid.fitting.initial.effect_screen import carry_parameters
+from fieldsid.models.effect import Effect
 
 MAX_JOINED = 3
 """Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
-MAX_STARTS_IN_SERIES = 4
-"""Scan points, those of the lowest cost, that an actuator and a hidden state are fitted from together."""
 
 
 @dataclass(slots=True)
@@ -42,10 +37,7 @@ class Search(MoveEvaluation):
     def best(self) -> ScoredModel:
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
-        self._join_leaders()
         self._grow_rivals()
-        if self.leaves_visible_error():
-            self._fit_in_series(self._all_in_series())
         self._exchange_leaders()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
@@ -61,12 +53,6 @@ class Search(MoveEvaluation):
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
             found = self.best_admissible()
-        if self.error_ratio(found) > MISSING_ERROR_RATIO and self.may_go_on():
-            found = multistart(
-                found, self.known, self.resolution_floor, self.noise_kind, sensor_noise(self.floor, self.base()), self.parallel
-            )
-            self.tried[frozenset(found.names)] = found
-        self._lift_under_other_trim_law()
         while True:
             self.share_own_moments()
             found = self.best_admissible()
@@ -74,18 +60,10 @@ class Search(MoveEvaluation):
                 return found
 
     def _expand(self) -> None:
-        """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise.
-
-        Those expanded are expanded from their other solutions where that has not led there.
-        """
+        """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise."""
         self.base()
-        while True:
-            if (leading := self._next_to_expand()) is not None:
-                self._join_children(self.forward_step(leading), leading)
-            elif (leading := self._next_from_others()) is not None:
-                self.step_from_other_solutions(leading)
-            else:
-                return
+        while (leading := self._next_to_expand()) is not None:
+            self._join_children(self.forward_step(leading), leading)
             self._drop_each(self._most_evident())
             self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
@@ -103,43 +81,29 @@ class Search(MoveEvaluation):
             return
         left = [h for h in children[1:] if gains_any_evidence(parent, h) or lowers_error(parent, h)][:MAX_JOINED]
         while left and self.may_go_on(leading=True):
-            joined = self._joined([(best, other, other.effects) for other in left])
+            joined = self._joined(best, left)
             # each is added to the best so far: what was fitted without the first that helps is fitted again
             helped = next((i for i, h in enumerate(joined) if h.log_evidence > best.log_evidence), len(left) - 1)
-            self._keep_joined(joined[: helped + 1])
+            self.tried.update({frozenset(h.names): h for h in joined[: helped + 1]})
             best, left = max(best, joined[helped], key=lambda h: h.log_evidence), left[helped + 1 :]
 
-    def _join_leaders(self) -> None:
-        """Fit the sets of clearly lower error with what the model of the highest evidence has besides, the small effects or all.
+    def _joined(self, best: ScoredModel, others: Sequence[ScoredModel]) -> list[ScoredModel]:
+        """Return a model with what each of others has besides, fitted from their numbers.
 
-        A lag of a sample shows in the evidence more than a large effect that is slow; a set without it is compared unfairly, and
-        the search may have ended before both were tried together.
+        Itself where that set was tried, or comes before in the list.
         """
-        best = self._most_evident()
-        small = [e for e in best.effects if e.name not in self.core_of(best)]
-        self._keep_joined(self._joined([(h, best, e) for h in self._front(best)[:MAX_JOINED] for e in (small, best.effects)]))
-
-    def _joined(self, asked: Sequence[tuple[ScoredModel, ScoredModel, Sequence[Effect]]]) -> list[ScoredModel]:
-        """Return each first model with what it lacks of some effects of the second, fitted from their numbers there.
-
-        Itself where that set was tried, or is asked for before in the list.
-        """
-        sets = [frozenset((*h.names, *(e.name for e in effects))) for h, _, effects in asked]
+        sets = [frozenset((*best.names, *h.names)) for h in others]
 
         def join(i: int) -> ScoredModel:
-            (h, other, effects), names = asked[i], sets[i]
-            if names in self.tried or names in sets[:i]:
-                return h
-            fitted, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
-            problem = fitted.problem.with_effects([*h.effects, *(e for e in effects if e.name not in h.names)])
-            start = carry_parameters(problem.layout, fitted.vector, there.vector)
-            ml_fit = fit_maximum_likelihood(problem, start, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+            if sets[i] in self.tried or sets[i] in sets[:i]:
+                return best
+            here, there = best.likelihood_fit.fitted, others[i].likelihood_fit
+            problem = here.problem.with_effects([*best.effects, *(e for e in others[i].effects if e.name not in best.names)])
+            start = carry_parameters(problem.layout, here.vector, there.fitted.vector)
+            ml_fit = fit_maximum_likelihood(problem, start, there.noise, self.resolution_floor, self.noise_kind)
             return prefer_output_error(score_model(ml_fit, self.validation), self.floor).evaluate_errors(fitted=True)
 
-        return self.parallel.map(join, range(len(asked)))
-
-    def _keep_joined(self, joined: Sequence[ScoredModel]) -> None:
-        self.tried.update({frozenset(h.names): h for h in joined})
+        return self.parallel.map(join, range(len(others)))
 
     def _grow_rivals(self) -> None:
         """Add to the accepted sets that predict as well as the model of the highest evidence what may bring them above it.
@@ -203,8 +167,6 @@ class Search(MoveEvaluation):
                 keys = [frozenset((*parent.names, e.name)) for e in alike]
                 near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
                 self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
-            if stands.is_formed and len(others) == len(self.known):
-                self._fit_in_series([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
@@ -232,12 +194,6 @@ class Search(MoveEvaluation):
             return best
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
 
-    def _next_from_others(self) -> ScoredModel | None:
-        """Return the leading model to expand next from its other solutions, None where all that leave an error are."""
-        done = self.tried.progress
-        left = done.expanded - done.expanded_from_others
-        return next((h for h in self._leading_models() if frozenset(h.names) in left and leaves_error(h, self.floor)), None)
-
     def _leading_models(self) -> list[ScoredModel]:
         """Return the leading models, none where the budget is used up.
 
@@ -258,40 +214,6 @@ class Search(MoveEvaluation):
         """
         is_new = frozenset(h.names) not in self.tried.progress.expanded
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
-
-    def _all_in_series(self) -> list[tuple[Effect, Effect]]:
-        """Return every actuator with every hidden state that it is mistaken for, one in the variant that stands for it."""
-        alone = (self.tried.get(self.root | {e.name}) for e in self.catalogue)
-        effects = [next(e for e in h.effects if e.name not in self.known) for h in alone if h is not None]
-        pairs = ((a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known)
-        return list({frozenset((e.name, e.is_formed) for e in pair): pair for pair in pairs}.values())
-
-    def _fit_in_series(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
-        """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
-
-        Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
-        the two. Of two optima of the same effects that are rivals by evidence the one stands whose free run predicts better.
-        """
-        base, leading, under = self.base().likelihood_fit, self._most_evident(), (self.resolution_floor, self.noise_kind)
-        at = linearise_at(base.fitted.problem, base.fitted.x, base.noise)
-        rival = leading.likelihood_fit.log_likelihood - leading.complexity_penalty  # no set pays less than nothing
-
-        def fit(pair: tuple[Effect, Effect]) -> list[LikelihoodFit]:
-            problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
-            points = scan_points(at, next(e for e in pair if e.extra_states))
-            starts = [carry_parameters(problem.layout, base.fitted.vector, otherwise=v) for v in points]
-            best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
-            ends = [fit_maximum_likelihood(problem, x, base.noise, *under, rival=rival) for x in best]
-            return sorted(ends, key=lambda end: -end.log_likelihood)  # what is far behind the first is not scored
-
-        before = dict(self.tried)
-        for ml_fit in chain.from_iterable(self.parallel.map(fit, pairs)):
-            self._keep(ml_fit)
-        new = [h for key, h in self.tried.items() if h is not before.get(key)]
-        found = [h for h in new if h.likelihood_fit.log_likelihood > rival]
-        flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(fitted=True), found)
-        for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
-            self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
 
     def _drop_each(self, h: ScoredModel) -> bool:
         """Fit a model without each of its effects, unless that was done: later ones may have made earlier ones idle.
@@ -335,14 +257,6 @@ class Search(MoveEvaluation):
             self.tried[frozenset(again.names)] = again if known is None or again.log_evidence > known.log_evidence else known
         return True
 
-    def _lift_under_other_trim_law(self) -> None:
-        """Let what lacks one of the found effects count under the other trim law, where that explains it better.
-
-        What a law explains without an effect is no evidence for that effect.
-        """
-        lawful = self.trim_laws.without_an_effect(self.best_admissible(), self.tried)
-        self.tried.update({frozenset(h.names): prefer_output_error(h, self.floor) for h in lawful})
-
     def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
         """Return a model without one of its effects, fitted from the parameters it has with it."""
         fitted = h.likelihood_fit.fitted
@@ -360,16 +274,3 @@ class Search(MoveEvaluation):
         if kept is not before:
             self.tried[key] = prefer_output_error(kept, self.floor)
         return self.tried[key]
-
-
-def _better_optimum(known: ScoredModel, h: ScoredModel) -> ScoredModel:
-    """Return the one with more evidence of two fits of the same effects; of rivals the one whose free run predicts better."""
-    if abs(known.log_evidence - h.log_evidence) < RIVAL_LOG_ODDS:
-        return min(known, h, key=lambda one: one.selection_errors.mean)
-    return max(known, h, key=lambda one: one.log_evidence)
-
-
-def _in_series(effect: Effect, other: Effect) -> bool:
-    """Whether two effects are mistaken for each other, one acting on the fin and one a state of the hull's."""
-    alike = other.name in effect.mistaken_for
-    return alike and any(a.stage is Stage.ACTUATOR and bool(b.extra_states) for a, b in ((effect, other), (other, effect)))

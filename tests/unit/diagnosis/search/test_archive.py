@@ -58,10 +58,9 @@ def test_a_spec_tells_variants_speed_laws_trims_and_noise_apart(base: ScoredMode
 def test_the_textbook_variant_is_kept_when_another_takes_its_place(base: ScoredModel) -> None:
     tried = Archive(assumptions=AT_SEA)
     tried[LAG] = plain = lagging(base)
-    assert tried.before_variants(LAG) is None
     tried[LAG] = formed = lagging(base, variant=True)
     assert tried[LAG] is formed
-    assert tried.before_variants(LAG) is plain
+    assert tried.models[ModelSpec.of(plain)] is plain
     assert len(tried) == 1
 
 

@@ -9,14 +9,12 @@ import hidden_lag
 import numpy as np
 import pytest
 
-from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
 from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
-from fieldsid.fitting.initial.effect_screen import equivalent_solution
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
@@ -60,19 +58,6 @@ def other_ends(monkeypatch):
     return by
 
 
-def test_a_servo_slower_than_the_hull_is_tried_as_a_faster_one(base):
-    lag = base.catalogue[0]
-    base._evaluate_moves(base.base(), by_effect(add_effect(base.base(), [lag], None, base.parallel, anew=True, flown=False)))
-    fast = base.tried[frozenset(["servo_lag"])]
-    assert not base._other_solutions(fast)
-    fitted = fast.likelihood_fit.fitted
-    slow = replace(fitted, x=equivalent_solution(fitted.problem, fitted.x, lag))
-    slow = score_model(replace(fast.likelihood_fit, fitted=slow), base.validation)
-    assert slow.model.values["lag"] > fast.model.values["lag"]
-    (other,) = base._other_solutions(slow)
-    assert other.model.values["lag"] == pytest.approx(fast.model.values["lag"], rel=0.2)
-
-
 def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch):
     made = search_for("servo_lag", "delay", "gyro_bias")
     effects = all_effects(Axis.YAW)
@@ -108,26 +93,6 @@ def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(
     assert frozenset(["delay", "servo_lag"]) in made.tried
 
 
-def test_a_set_of_clearly_lower_error_is_fitted_with_all_that_the_most_evident_has_besides(monkeypatch):
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    effects = all_effects(Axis.YAW)
-    base = made.base()
-    made._evaluate_moves(
-        base,
-        by_effect(
-            add_effect(base, [effects[n] for n in ("servo_lag", "gyro_bias")], None, made.parallel, anew=False, flown=True)
-        ),
-    )
-    lagged, biased = (made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias"))
-    monkeypatch.setattr(Search, "_most_evident", lambda _self: biased)
-    monkeypatch.setattr(Search, "core_of", lambda _self, h: frozenset(h.names))
-    monkeypatch.setattr(Search, "_front", lambda _self, _best: [lagged])
-    made._join_leaders()
-    both = made.tried[frozenset(["servo_lag", "gyro_bias"])]
-    assert both.log_likelihood_by_run.sum() > biased.log_likelihood_by_run.sum()
-    assert both.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
-
-
 @pytest.mark.parametrize("ends", [False, True])
 def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(monkeypatch, ends):
     made = search_for("servo_lag", "delay", "gyro_bias")
@@ -149,41 +114,6 @@ def test_models_without_children_are_joined_with_nothing(base):
     tried = len(base.tried)
     base._join_children([], base.base())
     assert len(base.tried) == tried
-
-
-def test_other_solutions_are_asked_once_all_leading_models_are_expanded(monkeypatch):
-    made, asked = search_for("servo_lag", "gyro_bias"), []
-    forward, others = Search.forward_step, Search.step_from_other_solutions
-    monkeypatch.setattr(Search, "forward_step", lambda self, h: (asked.append("all"), forward(self, h))[1])
-    monkeypatch.setattr(Search, "step_from_other_solutions", lambda self, h: (asked.append("others"), others(self, h))[1])
-    monkeypatch.setattr(search, "leaves_error", lambda *_: True)
-    made._expand()
-    assert asked.count("others") == len(made.tried.progress.expanded_from_others) > 0
-    assert asked[: asked.count("all")] == ["all"] * asked.count("all")
-
-
-def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(monkeypatch):
-    made = search_for("servo_lag", "sway_coupling", "gyro_bias")
-    effects, starts = all_effects(Axis.YAW), []
-    base = made.base()
-    moves = add_effect(base, [effects["sway_coupling"]], None, made.parallel, anew=False, flown=True)
-    made._evaluate_moves(base, by_effect(moves))
-    real = search.fit_maximum_likelihood
-
-    def fit(problem, start, *more):
-        starts.append(dict(zip(problem.layout.names, start, strict=False)))
-        return real(problem, start, *more)
-
-    monkeypatch.setattr(search, "fit_maximum_likelihood", fit)
-    monkeypatch.setattr(made.parallel, "map", lambda function, items: [function(i) for i in items])
-    pairs = made._all_in_series()
-    assert [(a.name, b.name) for a, b in pairs] == [("sway_coupling", "servo_lag")]
-    made._fit_in_series(pairs)
-    assert len({(start["cross_damping"], start["cross_rate"]) for start in starts}) == len(starts) == search.MAX_STARTS_IN_SERIES
-    for start in starts:
-        assert start["lag"] == pytest.approx(0.15)
-        assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
-    assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
 
 
 def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence(base):
