@@ -68,6 +68,8 @@ def said(progress: Progress) -> str:
     match progress.verdict:
         case "starting":
             return "0 % of the data: no estimate yet"
+        case "contradicts":
+            return f"0 % of the data can be used: {progress.contradiction}"
         case "enough":
             known = ", ".join(_known(p) for p in wanted)
             return f"enough data, come up: {known}; settled for {LOOK_BACK_S:.0f} s"

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online.identifier import OnlineEstimate
 
-Verdict = Literal["starting", "collecting", "not_excited", "moving", "enough"]
+Verdict = Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
 DEFAULT_ACCURACY = 0.05
 """Relative standard error of damping, stiffness and authority that is asked for where nothing else is."""
 LOOK_BACK_S = 10.0
@@ -56,7 +56,8 @@ class Progress:
     """How far the estimate is.
 
     share is the least of the parameters' shares, `limited_by` whose it is, `left_s` the time to the goal at the pace of the last
-    seconds (inf where nothing grows, NaN where unknown), `fin_rms` rad and `rate_rms` rad/s the excitation of the last seconds.
+    seconds (inf where nothing grows, NaN where unknown), `fin_rms` rad and `rate_rms` rad/s the excitation of the last seconds,
+    `contradiction` what angle and rate say against each other.
     """
 
     verdict: Verdict
@@ -66,6 +67,7 @@ class Progress:
     fin_rms: float
     rate_rms: float
     parameters: tuple[ParameterProgress, ...]
+    contradiction: str = ""
 
     @property
     def is_settled(self) -> bool:
@@ -172,10 +174,11 @@ class Watch:
         wanted = [p for p in known if p.name in self.goals]
         least = min(wanted, key=lambda p: p.share, default=None)
         fin, rate = self.excitation.rms()
+        if now.contradiction:
+            return Progress("contradicts", 0.0, "", nan, fin, rate, known, now.contradiction)
         left = self._left(least, now) if least else nan
         share = least.share if least else 0.0
-        verdict = self._verdict(known, share, fin)
-        return Progress(verdict, share, least.name if least else "", left, fin, rate, known)
+        return Progress(self._verdict(known, share, fin), share, least.name if least else "", left, fin, rate, known)
 
     def _of(self, name: str, now: OnlineEstimate) -> ParameterProgress:
         value, error = now.values[name], now.std_errors[name]

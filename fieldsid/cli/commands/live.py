@@ -190,10 +190,12 @@ class _Feed:
         """Lines that were no JSON objects with a time."""
         return self.reader.unreadable if self.reader else 0
 
-    @property
-    def then(self) -> str:
-        """The command that comes next."""
-        return shlex.join(["sysid", "identify", str(self.log), "--axis", self.axis.value, "-o", "models/"]) if self.is_log else ""
+    def then(self, *, usable: bool) -> str:
+        """Return the command that comes next: to look at a log that cannot be used as it is."""
+        if not self.is_log:
+            return ""
+        words = ["identify", str(self.log), "--axis", self.axis.value, "-o", "models/"] if usable else ["inspect", str(self.log)]
+        return shlex.join(["sysid", *words])
 
     def samples(self, after: float) -> Iterator[Sample | None]:
         """Yield the samples after a time in s."""
@@ -269,7 +271,8 @@ def _looks(
         now = identifier.estimate()
         watch.goals = dict(goals(now.speed))
         progress = watch.look(now)
-        return look_body(now, progress, source=feed.name, goals_from=goals_from, unreadable=feed.unreadable, then=feed.then)
+        then = feed.then(usable=not progress.contradiction)
+        return look_body(now, progress, source=feed.name, goals_from=goals_from, unreadable=feed.unreadable, then=then)
 
     with closing(feed.samples(after)) as samples:  # type: ignore[type-var]
         for sample in samples:

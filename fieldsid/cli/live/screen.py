@@ -17,7 +17,14 @@ from fieldsid.cli.console import FAR
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import shown_estimate, shown_in
 
-STYLE = {"starting": "dim", "collecting": "cyan", "not_excited": "yellow", "moving": "cyan", "enough": "bold green"}
+STYLE = {
+    "starting": "dim",
+    "contradicts": "bold red",
+    "collecting": "cyan",
+    "not_excited": "yellow",
+    "moving": "cyan",
+    "enough": "bold green",
+}
 BAR = 20
 
 

@@ -107,6 +107,15 @@ def refuse_contradiction(run: Run, angle: str, rate: str) -> None:
         )
 
 
+def contradiction(run: Run, angle: str, rate: str) -> str:
+    """Return how an angle and its rate contradict each other in a part of a run, empty where they do not.
+
+    A sign, a unit and a swap show in any stretch that moves. That the two are of two motions is told by a whole run alone.
+    """
+    found = _swapped(run, angle, rate) or _angle_and_rate(run, angle, rate, Stated())
+    return next((n.message for n in found if n.code in CONTRADICTING), "")
+
+
 def _is_rate_of(changes: tuple[FloatArray, FloatArray, float], least: float) -> bool:
     """Whether changes of a signal go with the integral of another, one to one and with a correlation above a least one."""
     slope, trust = slope_of(*changes[:2])

@@ -45,8 +45,9 @@ class Live(Shape):
     """Where the samples come from."""
     time_s: Number
     """Stamp of the newest sample."""
-    verdict: Literal["starting", "collecting", "not_excited", "moving", "enough"]
-    """`enough`: every goal is reached and has settled; `moving`: reached, not settled; `not_excited`: the fin is still."""
+    verdict: Literal["starting", "contradicts", "collecting", "not_excited", "moving", "enough"]
+    """`enough`: every goal is reached and has settled; `moving`: reached, not settled; `not_excited`: the fin is still;
+    `contradicts`: angle and rate are not each other's."""
     said: str
     """The verdict in a sentence."""
     share: float

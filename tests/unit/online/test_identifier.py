@@ -172,3 +172,30 @@ def test_forgetting_follows_a_vehicle_that_changes():
     half = 0.5 * np.asarray(then[1])
     fed(online, (then[0] + 200.0, half, then[2], then[3]))
     assert online.estimate().values["b2"] == pytest.approx(2.0 * TRUTH["yaw"]["b2"], rel=0.05)
+
+
+@pytest.mark.parametrize(("factor", "says"), [(1.0, ""), (-1.0, "sign"), (57.3, "deg/s")], ids=["right", "turned", "degrees"])
+def test_an_angle_and_a_rate_that_contradict_each_other_are_said_after_a_few_seconds(factor, says):
+    time, fin, angle, rate = flown(count=1200)
+    online, told = OnlineIdentifier("yaw"), []
+    for i, sample in enumerate(zip(time.tolist(), fin.tolist(), angle.tolist(), (factor * rate).tolist(), strict=True)):
+        online.update(*sample)
+        if i % 200 == 199:
+            told.append(online.estimate().contradiction)
+    assert told[0] == ""
+    assert all((says in text) and bool(text) == bool(says) for text in told[-3:]), told
+    again = OnlineIdentifier.from_state(json.loads(json.dumps(online.state())))
+    assert again.estimate().contradiction == told[-1]
+
+
+def test_a_clock_that_starts_again_and_a_rate_that_is_missing_contradict_nothing():
+    time, fin, angle, rate = (s.tolist() for s in flown(count=900))
+    online = OnlineIdentifier("yaw")
+    for shift in (0.0, -7.0):
+        for sample in zip(time, fin, angle, rate, strict=True):
+            online.update(sample[0] + shift, *sample[1:])
+        assert online.estimate().contradiction == ""
+    by_angle = OnlineIdentifier("yaw")
+    for sample in zip(time, fin, angle, strict=True):
+        by_angle.update(*sample)
+    assert by_angle.estimate().contradiction == ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, isnan, nan
 
 import pytest
@@ -91,3 +92,12 @@ def test_a_look_is_plain_and_its_sentence_leads_with_the_number():
     assert body["counts"]["unreadable"] == 2
     assert body["said"].split()[0].isdecimal() or body["said"].startswith("enough")
     assert body["parameters"]["a22"]["interval95"][0] < body["parameters"]["a22"]["value"]
+
+
+def test_nothing_is_enough_where_angle_and_rate_contradict_each_other():
+    watch = Watch(default_goals(Axis.YAW))
+    for time in range(30):
+        found = watch.look(replace(estimate(float(time), -1.0, 0.02), contradiction="the slope is -1, should be 1"))
+    assert (found.verdict, found.share) == ("contradicts", 0.0)
+    assert said(found) == "0 % of the data can be used: the slope is -1, should be 1"
+    assert watch.look(estimate(30.0, -1.0, 0.02)).verdict == "enough"
