@@ -16,6 +16,12 @@ def over_noise(errors: Mapping[str, Any], floor: Mapping[str, Any]) -> float:
     return max((float(e) / float(f) for e, f in pairs if e and f and isfinite(e) and isfinite(f)), default=float("nan"))
 
 
+def pooled_over_noise(*channels: tuple[float | None, float | None]) -> float:
+    """Return free-run errors over their noises, (error, noise) of each channel, pooled over what was measured; else NaN."""
+    parts = [(error / noise) ** 2 for error, noise in channels if error is not None and noise and isfinite(error)]
+    return float((sum(parts) / len(parts)) ** 0.5) if parts else float("nan")
+
+
 def is_noise(over: float) -> bool:
     """Whether an error over the noise floor is the noise alone."""
     return not over > SUFFICIENT_ERROR_RATIO

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import isfinite, prod
 from typing import Any
 
+from fieldsid.comparison.sufficient import pooled_over_noise
 from fieldsid.display import Brief, Displayed, Plotted
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
@@ -29,12 +30,7 @@ class Errors(Brief):
 
     def over(self, floor: Noise) -> float:
         """Return the error over the noise floor, both measured channels pooled."""
-        parts = [
-            (rms / sigma) ** 2
-            for rms, sigma in ((self.angle_rms_rad, floor.angle), (self.rate_rms_rad_s, floor.rate))
-            if isfinite(rms) and sigma > 0.0
-        ]
-        return float((sum(parts) / len(parts)) ** 0.5) if parts else float("nan")
+        return pooled_over_noise((self.angle_rms_rad, floor.angle), (self.rate_rms_rad_s, floor.rate))
 
     def sized(self, angle: str = "rad", factor: float = 1.0) -> str:
         """Return the errors of the measured channels in their units, in another unit of angle where factor has rad in it."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldsid.artifacts import sha256_of
-from fieldsid.comparison.sufficient import is_noise
+from fieldsid.comparison.sufficient import is_noise, pooled_over_noise
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.rounding import MANY
@@ -158,16 +158,10 @@ def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
 def left_by(model: Mapping[str, Any]) -> float:
     """Return the error over the noise floor that an extended model leaves, the larger of fitted and unseen runs; else NaN."""
     record = (model.get("info") or {}).get("extension") or {}
-    over = [_over(errors, record.get("noise_floor") or {}) for errors in (record.get("after") or {}).values()]
-    return max((o for o in over if isfinite(o)), default=float("nan"))
-
-
-def _over(errors: Mapping[str, float | None], floor: Mapping[str, float | None]) -> float:
-    """Return errors over the noise floor, the measured channels pooled, as `sysid extend` says it."""
+    floor = record.get("noise_floor") or {}
     names = (("angle_rms_rad", "angle_rad"), ("rate_rms_rad_s", "rate_rad_s"))
-    pairs = [(errors.get(name), floor.get(of)) for name, of in names]
-    parts = [(e / f) ** 2 for e, f in pairs if e is not None and isfinite(e) and f]
-    return (sum(parts) / len(parts)) ** 0.5 if parts else float("nan")
+    pairs = [[(errors.get(name), floor.get(of)) for name, of in names] for errors in (record.get("after") or {}).values()]
+    return max((o for o in (pooled_over_noise(*p) for p in pairs) if isfinite(o)), default=float("nan"))
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:
