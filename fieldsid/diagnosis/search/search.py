@@ -52,7 +52,7 @@ class Search(MoveEvaluation):
             )
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
-            found = self.best_admissible()
+        self._lift_under_other_trim_law()
         while True:
             self.share_own_moments()
             found = self.best_admissible()
@@ -256,6 +256,14 @@ class Search(MoveEvaluation):
             known, again = self.tried.get(frozenset(again.names)), prefer_output_error(again, self.floor)
             self.tried[frozenset(again.names)] = again if known is None or again.log_evidence > known.log_evidence else known
         return True
+
+    def _lift_under_other_trim_law(self) -> None:
+        """Let what lacks one of the found effects count under the other trim law, where that explains it better.
+
+        What a law explains without an effect is no evidence for that effect.
+        """
+        lawful = self.trim_laws.without_an_effect(self.best_admissible(), self.tried)
+        self.tried.update({frozenset(h.names): prefer_output_error(h, self.floor) for h in lawful})
 
     def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
         """Return a model without one of its effects, fitted from the parameters it has with it."""

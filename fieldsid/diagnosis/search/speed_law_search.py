@@ -157,6 +157,13 @@ class TrimLawSearch:
         ]
         return answer, max(better, key=lambda h: h.log_evidence, default=None)
 
+    def without_an_effect(self, found: ScoredModel, tried: Mapping[frozenset[str], ScoredModel]) -> list[ScoredModel]:
+        """Return the models that lack one of a model's effects and have more evidence under the other trim law, under that."""
+        key = frozenset(found.names)
+        less = [h for k, h in tried.items() if k < key and len(k) == len(key) - 1]
+        others = [(h, self.known.get((h.names, h.log_evidence))) for h in less]
+        return [other for h, other in others if other is not None and _predicts(other, h)]
+
 
 def _prior_log_odds(h: ScoredModel) -> float:
     """Return the prior log odds against a model's trim law, which a search turns to: those of any other law of the speed."""

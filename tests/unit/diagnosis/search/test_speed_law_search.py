@@ -102,4 +102,7 @@ def test_a_search_does_not_turn_to_an_unusual_law_for_less_than_its_prior_odds(m
     monkeypatch.setattr(speed_law_search, "_prior_log_odds", lambda _h: 6.0)
     found = hypothesis("delay", score=100.0)
     tried = {frozenset(): hypothesis(score=97.0), frozenset(("delay",)): found}
-    assert TrimLawSearch().best_alternative(found, tried, FLOOR, FLOOR, ParallelMap((), ()), str)[1] is None
+    trims = TrimLawSearch()
+    assert trims.best_alternative(found, tried, FLOOR, FLOOR, ParallelMap((), ()), str)[1] is None
+    (without,) = trims.without_an_effect(found, tried)
+    assert (without.names, without.log_evidence) == ((), 102.0)
