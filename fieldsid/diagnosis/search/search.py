@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, leaves_error, lowers_error
-from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_maximum_likelihood, likelihood_at
+from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
@@ -23,9 +24,12 @@ from fieldsid.diagnosis.thresholds import (
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
 )
-from fieldsid.fitting.initial.effect_screen import carry_parameters
-from fieldsid.models.effect import Effect
+from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
+from fieldsid.models.effect import Effect, Stage
 
+MAX_STARTS_IN_SERIES = 4
+"""Scan points, those of the lowest cost, that an actuator and a hidden state are fitted from together."""
 MAX_JOINED = 3
 """Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
 
@@ -38,6 +42,8 @@ class Search(MoveEvaluation):
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
         self._grow_rivals()
+        if self.leaves_visible_error():
+            self._fit_in_series(self._all_in_series())
         self._exchange_leaders()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
@@ -167,6 +173,8 @@ class Search(MoveEvaluation):
                 keys = [frozenset((*parent.names, e.name)) for e in alike]
                 near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
                 self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
+            if stands.is_formed and len(others) == len(self.known):
+                self._fit_in_series([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
@@ -214,6 +222,40 @@ class Search(MoveEvaluation):
         """
         is_new = frozenset(h.names) not in self.tried.progress.expanded
         return is_new and bool(np.isfinite(h.log_evidence)) and leaves_error(h, self.floor)
+
+    def _all_in_series(self) -> list[tuple[Effect, Effect]]:
+        """Return every actuator with every hidden state that it is mistaken for, one in the variant that stands for it."""
+        alone = (self.tried.get(self.root | {e.name}) for e in self.catalogue)
+        effects = [next(e for e in h.effects if e.name not in self.known) for h in alone if h is not None]
+        pairs = ((a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known)
+        return list({frozenset((e.name, e.is_formed) for e in pair): pair for pair in pairs}.values())
+
+    def _fit_in_series(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
+        """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
+
+        Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
+        the two. Of two optima of the same effects that are rivals by evidence the one stands whose free run predicts better.
+        """
+        base, leading, under = self.base().likelihood_fit, self._most_evident(), (self.resolution_floor, self.noise_kind)
+        at = linearise_at(base.fitted.problem, base.fitted.x, base.noise)
+        rival = leading.likelihood_fit.log_likelihood - leading.complexity_penalty  # no set pays less than nothing
+
+        def fit(pair: tuple[Effect, Effect]) -> list[LikelihoodFit]:
+            problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
+            points = scan_points(at, next(e for e in pair if e.extra_states))
+            starts = [carry_parameters(problem.layout, base.fitted.vector, otherwise=v) for v in points]
+            best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
+            ends = [fit_maximum_likelihood(problem, x, base.noise, *under, rival=rival) for x in best]
+            return sorted(ends, key=lambda end: -end.log_likelihood)  # what is far behind the first is not scored
+
+        before = dict(self.tried)
+        for ml_fit in chain.from_iterable(self.parallel.map(fit, pairs)):
+            self._keep(ml_fit)
+        new = [h for key, h in self.tried.items() if h is not before.get(key)]
+        found = [h for h in new if h.likelihood_fit.log_likelihood > rival]
+        flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(fitted=True), found)
+        for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
+            self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
 
     def _drop_each(self, h: ScoredModel) -> bool:
         """Fit a model without each of its effects, unless that was done: later ones may have made earlier ones idle.
@@ -282,3 +324,16 @@ class Search(MoveEvaluation):
         if kept is not before:
             self.tried[key] = prefer_output_error(kept, self.floor)
         return self.tried[key]
+
+
+def _better_optimum(known: ScoredModel, h: ScoredModel) -> ScoredModel:
+    """Return the one with more evidence of two fits of the same effects; of rivals the one whose free run predicts better."""
+    if abs(known.log_evidence - h.log_evidence) < RIVAL_LOG_ODDS:
+        return min(known, h, key=lambda one: one.selection_errors.mean)
+    return max(known, h, key=lambda one: one.log_evidence)
+
+
+def _in_series(effect: Effect, other: Effect) -> bool:
+    """Whether two effects are mistaken for each other, one acting on the fin and one a state of the hull's."""
+    alike = other.name in effect.mistaken_for
+    return alike and any(a.stage is Stage.ACTUATOR and bool(b.extra_states) for a, b in ((effect, other), (other, effect)))

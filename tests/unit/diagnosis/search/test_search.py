@@ -214,3 +214,27 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
     work._without_each = lambda h: search_state.SearchState._without_each(work, h)
     assert search_state.SearchState.core_of(work, tried[3]) == set(both)
     assert search_state.SearchState.core_of(work, tried[1]) == {"stall"}
+
+
+def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(monkeypatch):
+    made = search_for("servo_lag", "sway_coupling", "gyro_bias")
+    effects, starts = all_effects(Axis.YAW), []
+    base = made.base()
+    moves = add_effect(base, [effects["sway_coupling"]], None, made.parallel, anew=False, flown=True)
+    made._evaluate_moves(base, by_effect(moves))
+    real = search.fit_maximum_likelihood
+
+    def fit(problem, start, *more, rival):
+        starts.append(dict(zip(problem.layout.names, start, strict=False)))
+        return real(problem, start, *more, rival=rival)
+
+    monkeypatch.setattr(search, "fit_maximum_likelihood", fit)
+    monkeypatch.setattr(made.parallel, "map", lambda function, items: [function(i) for i in items])
+    pairs = made._all_in_series()
+    assert [(a.name, b.name) for a, b in pairs] == [("sway_coupling", "servo_lag")]
+    made._fit_in_series(pairs)
+    assert len({(start["cross_damping"], start["cross_rate"]) for start in starts}) == len(starts) == search.MAX_STARTS_IN_SERIES
+    for start in starts:
+        assert start["lag"] == pytest.approx(0.15)
+        assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
+    assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
