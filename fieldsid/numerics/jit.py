@@ -28,7 +28,7 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function as it is, which functions of `jit` may call: compiled with them, not callable from Python."""
+    """Return the function as it is, which functions of `jit` may call, compiled with them; called from Python it is plain."""
     if not HAS_NUMBA:
         return function
     numba: Any = import_module("numba.extending")

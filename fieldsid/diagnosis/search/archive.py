@@ -16,8 +16,8 @@ Names = frozenset[str]
 class Progress:
     """What was done under one set of assumptions, by set of effects.
 
-    The spec that stands for it; whether it was expanded; the log evidence at which variants of
-    its effects were tried; and the specs that were fitted without each of their effects.
+    The spec that stands for it; whether it was expanded; the log evidence at which variants of its effects were tried; and the
+    specs that were fitted without each of their effects.
     """
 
     standing: dict[Names, ModelSpec] = field(default_factory=dict)
