@@ -22,9 +22,10 @@ from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.yaw_plant import steady_fins
 from fieldsid.turning.maneuvering.equations import coefficients, longest_step, simulate
-from fieldsid.turning.maneuvering.fit import FARTHEST_PRIOR_COST, Fitted, fit_maneuvering
+from fieldsid.turning.maneuvering.fit import Fitted, fit_maneuvering
 from fieldsid.turning.maneuvering.flown import HEADING, OWN_EFFECTS, RATE, SURGE, SWAY, FlownRun, usable_runs
 from fieldsid.turning.maneuvering.posterior import Posterior, draw_posterior, effective_draws, settled_turns, weighted_quantile
+from fieldsid.turning.maneuvering.prior import FARTHEST_COST
 from fieldsid.turning.model_error import STALL_LOG_SD
 from fieldsid.turning.steady.transient import Transient, read_off
 
@@ -165,10 +166,10 @@ def like_no_vehicle(fitted: Fitted, length: float | None) -> Note:
     hint = "" if length is not None else "state `length_m` in vehicle.yaml, "
     words = (
         "what all runs together make of surge, sway and yaw lies where no vehicle does: "
-        f"{away:.0f} from the vehicles known, 999 of 1000 lie below {FARTHEST_PRIOR_COST:.0f} ({', '.join(runs)}); "
+        f"{away:.0f} from the vehicles known, 999 of 1000 lie below {FARTHEST_COST:.0f} ({', '.join(runs)}); "
         f"each speed's own model is taken instead: {hint}look at the runs with `sysid inspect`, or fly a zig-zag"
     )
-    return Note("like_no_vehicle", words, {"runs": runs, "value": away, "limit": FARTHEST_PRIOR_COST})
+    return Note("like_no_vehicle", words, {"runs": runs, "value": away, "limit": FARTHEST_COST})
 
 
 class _Known:

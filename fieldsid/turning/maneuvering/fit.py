@@ -15,7 +15,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.turning.maneuvering.cut_run import OWN, CutRun, cut_run
 from fieldsid.turning.maneuvering.equations import NAMES, coefficients, growth_rate
 from fieldsid.turning.maneuvering.flown import FlownRun
-from fieldsid.turning.maneuvering.prior import prior
+from fieldsid.turning.maneuvering.prior import FARTHEST_COST, Prior, prior
 
 SHARED = len(NAMES)
 FIRST_NOISE = np.array([0.05, 0.05, 0.02, 0.02])
@@ -33,9 +33,6 @@ MAX_ITERATIONS = 25
 MAX_BACKTRACKS = 8
 TOLERANCE, START_TOLERANCE = 0.02, 0.5
 """Of minus twice the log posterior; a start need not be at its minimum."""
-FARTHEST_PRIOR_COST = 48.3
-"""Chi-square of as many degrees of freedom as there are coefficients, 999 of 1000: a fit farther from every vehicle of the
-ensemble, of 2.5 times its spread, is in a wrong minimum, or the equations are not those of the vehicle."""
 DIFFERENCE = 1e-4
 MAX_RHO = 0.98
 
@@ -51,8 +48,7 @@ class Fitted:
     noise: FloatArray
     local: tuple[FloatArray, ...]
     response: tuple[FloatArray, ...]
-    mean: FloatArray
-    precision: FloatArray
+    prior: Prior
     cost: float
 
     def cost_at(self, vector: FloatArray) -> float:
@@ -65,13 +61,12 @@ class Fitted:
 
     def prior_cost(self, vector: FloatArray) -> float:
         """Return minus twice the log prior at a vector, less its least."""
-        away = vector - self.mean
-        return float(away @ self.precision @ away)
+        return self.prior.cost(vector)
 
     @property
     def is_usual(self) -> bool:
         """Whether the vector is one that vehicles have."""
-        return self.prior_cost(self.vector) < FARTHEST_PRIOR_COST
+        return self.prior_cost(self.vector) < FARTHEST_COST
 
     @property
     def runs(self) -> tuple[FlownRun, ...]:
@@ -84,20 +79,19 @@ def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
 
     Raises LinAlgError where the normal equations are singular or what they give is not finite.
     """
-    mean, covariance = prior(length)
-    precision = _inverse(covariance)
-    found = _from_start(runs, mean, mean, precision)
+    believed = prior(length)
+    found = _from_start(runs, believed.mean, believed)
     if not found.is_usual:
         away = np.zeros(SHARED)
-        away[0] = np.sqrt(covariance[0, 0])
-        tried = [found, *(_from_start(runs, mean + way * away, mean, precision) for way in (-1.0, 1.0))]
+        away[0] = 1.0 / believed.axes[0, 0]
+        tried = [found, *(_from_start(runs, believed.mean + way * away, believed) for way in (-1.0, 1.0))]
         found = min(tried, key=lambda f: f.cost)
     best, speed = coefficients(found.vector), float(np.median([r.speed for r in runs]))
     growth = growth_rate(best, speed)
     segment = max(LEAST_SEGMENT_S, SEGMENT_LENGTHS * float(best[0]) / speed)
     if growth > 0.0:
         segment = min(segment, max(LONGEST_GROWTH / growth, SHORTEST_SEGMENT_S))
-    whole = _problem(runs, segment, mean, precision)
+    whole = _problem(runs, segment, believed)
     # a noise taken from what does not follow yet, vector or first states, passes for one that hides what the run says
     found = whole.solved(found.vector, found.noise, keep_noise=True)
     found = whole.solved(found.vector, found.noise, keep_noise=False, local=found.local)
@@ -105,10 +99,10 @@ def fit_maneuvering(runs: Sequence[FlownRun], length: float | None) -> Fitted:
     return found
 
 
-def _from_start(runs: Sequence[FlownRun], start: FloatArray, mean: FloatArray, precision: FloatArray) -> Fitted:
+def _from_start(runs: Sequence[FlownRun], start: FloatArray, believed: Prior) -> Fitted:
     """Return the fit to longer and longer segments, the noise not known yet."""
     for segment in FIRST_SEGMENTS_S:
-        found = _problem(runs, segment, mean, precision).solved(start, FIRST_NOISE, keep_noise=True)
+        found = _problem(runs, segment, believed).solved(start, FIRST_NOISE, keep_noise=True)
         _refuse_not_finite(found)
         start = found.vector
     return found
@@ -130,8 +124,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 class _Problem:
     cuts: tuple[CutRun, ...]
     segment_s: float
-    mean: FloatArray
-    precision: FloatArray
+    prior: Prior
 
     def solved(
         self, vector: FloatArray, noise: FloatArray, *, keep_noise: bool, local: Sequence[FloatArray] | None = None
@@ -142,10 +135,12 @@ class _Problem:
         cost = self._cost(vector, local, noise)
         for _ in range(MAX_ITERATIONS):
             parts = [_normal(cut, vector, own, noise) for cut, own in zip(self.cuts, local, strict=True)]
+            precision = self.prior.precision(vector)
+            pull = precision @ (vector - self.prior.mean)
             moved = False
             before = cost
             for _ in range(MAX_BACKTRACKS):
-                step, own = _step(parts, self.precision, self.precision @ (vector - self.mean), damping)
+                step, own = _step(parts, precision, pull, damping)
                 tried = [l + o for l, o in zip(local, own, strict=True)]
                 new = self._cost(vector + step, tried, noise)
                 if new < cost:
@@ -161,17 +156,15 @@ class _Problem:
             if (small or not moved) and steady:
                 break
         parts = [_normal(cut, vector, own, noise) for cut, own in zip(self.cuts, local, strict=True)]
-        information = self.precision + sum(p.profiled for p in parts)
+        information = self.prior.precision(vector) + sum(p.profiled for p in parts)
         return Fitted(
             vector, _inverse(information), self.cuts, self.segment_s, noise, tuple(local),
-            tuple(p.response for p in parts), self.mean, self.precision, cost,
+            tuple(p.response for p in parts), self.prior, cost,
         )  # fmt: skip
 
     def _cost(self, vector: FloatArray, local: Sequence[FloatArray], noise: FloatArray) -> float:
-        away, p = vector - self.mean, coefficients(vector)
-        return float(away @ self.precision @ away) + sum(
-            cut.cost(p, own, noise) for cut, own in zip(self.cuts, local, strict=True)
-        )
+        p = coefficients(vector)
+        return self.prior.cost(vector) + sum(cut.cost(p, own, noise) for cut, own in zip(self.cuts, local, strict=True))
 
     def _noise(self, vector: FloatArray, local: Sequence[FloatArray]) -> FloatArray:
         """Return each channel's noise, correlated residuals counted as the fewer independent ones that they are."""
@@ -189,9 +182,9 @@ class _Problem:
         return out
 
 
-def _problem(runs: Sequence[FlownRun], segment_s: float, mean: FloatArray, precision: FloatArray) -> _Problem:
-    length = float(np.exp(mean[0]))
-    return _Problem(tuple(cut_run(r, segment_s, length) for r in runs), segment_s, mean, precision)
+def _problem(runs: Sequence[FlownRun], segment_s: float, believed: Prior) -> _Problem:
+    length = float(np.exp(believed.mean[0]))
+    return _Problem(tuple(cut_run(r, segment_s, length) for r in runs), segment_s, believed)
 
 
 def _normal(cut: CutRun, vector: FloatArray, local: FloatArray, noise: FloatArray) -> _Normal:

@@ -41,7 +41,7 @@ def singular(*_):
     ("where", "instead", "code", "says"),
     [
         (f"{BELIEF}.fit_maneuvering", singular, "maneuvering_not_fitted", "Singular matrix"),
-        ("fieldsid.turning.maneuvering.fit.FARTHEST_PRIOR_COST", -1.0, "like_no_vehicle", "state `length_m` in vehicle.yaml"),
+        ("fieldsid.turning.maneuvering.fit.FARTHEST_COST", -1.0, "like_no_vehicle", "state `length_m` in vehicle.yaml"),
     ],
 )
 def test_a_schedule_for_each_speeds_own_model_says_why(monkeypatch, trial, tmp_path, where, instead, code, says):

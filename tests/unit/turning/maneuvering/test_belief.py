@@ -78,7 +78,7 @@ def test_few_effective_draws_and_a_fit_like_no_vehicle_are_not_identified(monkey
     with monkeypatch.context() as patched:
         patched.setattr("fieldsid.turning.maneuvering.belief.effective_draws", lambda _: 4.0)
         few = only_row()
-    monkeypatch.setattr("fieldsid.turning.maneuvering.fit.FARTHEST_PRIOR_COST", 0.0)
+    monkeypatch.setattr("fieldsid.turning.maneuvering.fit.FARTHEST_COST", 0.0)
     far = only_row()
     assert few.trust == far.trust == "extrapolated"
     assert "too much alike" in " ".join(few.because)

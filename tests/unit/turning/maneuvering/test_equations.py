@@ -23,7 +23,7 @@ from fieldsid.turning.maneuvering.prior import prior
 
 
 def hull(**changed):
-    p = coefficients(prior(2.0)[0])
+    p = coefficients(prior(2.0).mean)
     p[[NAMES.index(n) for n in NAMES if n.endswith("_viscous")]] = 0.0
     for name, value in changed.items():
         p[NAMES.index(name)] = value
