@@ -91,7 +91,7 @@ def test_a_cause_that_no_catalogue_has_is_not_given_a_name() -> None:
     found = diagnosed(visible_case("uncatalogued", 0))
     assert found.verdict == "unexplained"
     assert found.effects == ()
-    assert "not in the catalogue" in found.says
+    assert "no effect of the catalogue" in found.says
 
 
 @pytest.mark.parametrize(("seed", "index"), [(126, 114), (126, 119), (126, 38), (126, 44)], ids=("servo", "fin", "roll", "wave"))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio
+import numpy as np
+
+from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio, worst_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.thresholds import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.diagnosis.verdict import Verdict, excess_explained, worsens
 from fieldsid.models.effect import effect_named, variant_of
 from fieldsid.models.model import Noise
@@ -47,28 +49,57 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "disturbed":
-        minor = [n for n in found.names if n not in search.known]
+        minor = _added(search, found)
         if not minor:
             return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
         leaves = "leaves" if len(minor) == 1 else "leave"
         beside = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
         return f"what is left, {base}, is for the most part {_disturbance(noise)}; {beside}"
     if verdict.word == "unexplained":
-        worse = validation_error_ratio(search.base(), search.floor)
-        return (
-            f"something is there that is not in the catalogue: error {base}, most of it in "
-            f"{left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average), "
-            f"it moves with {left.moves_with}"
-            + (f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else "")
-        )
+        return _unexplained(search, found, left, floor)
     names = " and ".join(verdict.effects)
     says = "; ".join(_says(found, n) for n in verdict.effects)
     fall = _fall(search, found, floor, runs)
     if verdict.word == "undecided":
-        others = {"+".join(n for n in r.names if n not in search.known): r for r in verdict.rivals}
+        others = {"+".join(_added(search, r)): r for r in verdict.rivals}
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
         return f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
     return f"{names} ({says}): {fall}"
+
+
+def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise) -> str:
+    """Return what is missing and no effect of the catalogue explains: its size, what becomes less likely of it, where it is."""
+    worse, added = validation_error_ratio(search.base(), search.floor), _added(search, found)
+    partly = f", {sized(search, found, floor)} with {' and '.join(added)}" if added else ""
+    where = (
+        f"most of {'what is left' if added else 'it'} in {left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s "
+        f"({left.worst_ratio:.1f} x the average), it moves with {left.moves_with}"
+    )
+    unseen = f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else ""
+    return (
+        f"no effect of the catalogue explains what is missing: error {sized(search, search.base(), floor)}{partly}, {where}"
+        f"{unseen}{_would_end(search, found, floor)}"
+    )
+
+
+def _would_end(search: Search, found: ScoredModel, floor: Noise) -> str:
+    """Return which set of effects ends the error on all runs although a smaller one is likelier; empty where none does."""
+    sums = search.evidences()
+
+    def reached(h: ScoredModel) -> float:
+        return sums.get(frozenset(h.names), -np.inf)
+
+    likely = [h for h in search.ranked() if h is not found and reached(h) > sums[search.root]]
+    ending = [h for h in likely if worst_error(h, floor) <= SUFFICIENT_ERROR_RATIO]
+    if search.is_noiseless or not ending:
+        return ""
+    best = max(ending, key=reached)
+    less = sums[frozenset(found.names)] - reached(best)
+    return f"; {'+'.join(_added(search, best))} leaves {sized(search, best, floor)}, but is {less:.0f} log units less likely"
+
+
+def _added(search: Search, h: ScoredModel) -> list[str]:
+    return [n for n in h.names if n not in search.known]
 
 
 def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
