@@ -69,10 +69,11 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
 
 def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise) -> str:
     """Return what is missing and no effect of the catalogue explains: its size, what becomes less likely of it, where it is."""
-    worse, added = validation_error_ratio(search.base(), search.floor), _added(search, found)
-    partly = f", {sized(search, found, floor)} with {' and '.join(added)}" if added else ""
+    worse = validation_error_ratio(search.base(), search.floor)
+    lowers = found.selection_errors.mean < search.base().selection_errors.mean
+    partly = f", {sized(search, found, floor)} with {' and '.join(_added(search, found))}" if lowers else ""
     where = (
-        f"most of {'what is left' if added else 'it'} in {left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s "
+        f"most of {'what is left' if lowers else 'it'} in {left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s "
         f"({left.worst_ratio:.1f} x the average), it moves with {left.moves_with}"
     )
     unseen = f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else ""

@@ -127,3 +127,38 @@ def test_a_disturbance_beside_small_effects_does_not_say_that_none_is_there():
     )
     assert beside.startswith("what is left, 1.93 x the noise floor, is for the most part a disturbance moment of 0.0065 rad/s^2")
     assert beside.endswith("; servo_lag may be there besides, and leaves 1.75 x the noise floor")
+
+
+def unexplained(base, found, *others):
+    """What is said where none of these models explains enough."""
+    for h in (base, found, *others):
+        h.train, h.validation, h.validation_errors = h.errors.train, (None,), h.errors.validation
+    shown = {frozenset(h.names): h.log_evidence for h in (base, found, *others)}
+    search = _search(base)
+    search.root, search.evidences, search.ranked = frozenset(), lambda: shown, lambda: [found, *others]
+    left = SimpleNamespace(worst_run="r0", worst_start_s=4.2, worst_end_s=6.1, worst_ratio=2.4, moves_with="rate")
+    return headline(search, Verdict("unexplained", ()), found, left, FLOOR, FLOOR)
+
+
+def test_the_unexplained_says_what_takes_a_part_of_it_and_which_larger_set_would_end_it():
+    base = _made(train=(1.4,), unseen=(1.5,), score=0.0)
+    part = _made("quadratic_damping", train=(1.2,), unseen=(1.3,), score=72.0)
+    ends = _made("quadratic_damping", "trim_drift", train=(1.03,), unseen=(1.08,), score=60.0)
+    misses = _made("quadratic_damping", "delay", train=(1.3,), unseen=(1.1,), score=65.0)
+    said = unexplained(base, part, misses, ends)
+    assert said == (
+        "no effect of the catalogue explains what is missing: error 1.50 x the noise floor, 1.30 x the noise floor with "
+        "quadratic_damping, most of what is left in r0 at 4-6 s (2.4 x the average), it moves with rate; "
+        "quadratic_damping+trim_drift leaves 1.08 x the noise floor, but is 12 log units less likely"
+    )
+    assert "less likely" not in unexplained(base, part, misses)
+
+
+def test_the_unexplained_says_nothing_of_what_raises_the_error_or_is_less_likely_than_none():
+    base = _made(train=(1.4,), unseen=(1.5,), score=0.0)
+    wave = _made("wave", train=(1.2,), unseen=(1.9,), score=30.0)
+    ends = _made("wave", "trim_drift", train=(1.03,), unseen=(1.08,), score=-2.0)
+    assert unexplained(base, wave, ends).startswith(
+        "no effect of the catalogue explains what is missing: error 1.50 x the noise floor, most of it in r0"
+    )
+    assert "trim_drift" not in unexplained(base, wave, ends)
