@@ -75,6 +75,7 @@ def test_sensors_that_wander_are_noise_and_nothing_is_missing() -> None:
     assert found.noise_floor.angle == pytest.approx(case.floor["angle_rad"], rel=0.15)
 
 
+@pytest.mark.slow
 def test_an_effect_that_the_others_have_made_idle_is_left_out() -> None:
     case = visible_case("pair", 0)
     axis = Axis(case.axis)
@@ -108,7 +109,7 @@ def test_an_effect_of_another_shape_is_followed_down_to_the_floor(seed: int, ind
     ("seed", "index", "colour"),
     [
         pytest.param(132, 75, None, id="far off", marks=pytest.mark.slow),
-        pytest.param(132, 84, "ar1", id="many ends"),
+        pytest.param(132, 84, "ar1", id="many ends", marks=pytest.mark.slow),
         pytest.param(136, 100, None, id="play behind a slow fin"),
         pytest.param(138, 102, None, id="another trim for one than for both"),
     ],
@@ -135,8 +136,12 @@ def test_a_propeller_trimmed_away_beside_a_moment_that_stays_is_named(index: int
 
 @pytest.mark.parametrize(
     ("seed", "index"),
-    [(136, 15), (136, 50), (136, 29), (171, 62)],
-    ids=("no better yet", "stands in", "another end", "other times of an event"),
+    [
+        pytest.param(136, 15, id="no better yet"),
+        pytest.param(136, 50, id="stands in", marks=pytest.mark.slow),
+        pytest.param(136, 29, id="another end", marks=pytest.mark.slow),
+        pytest.param(171, 62, id="other times of an event"),
+    ],
 )
 def test_a_single_effect_is_found_whatever_law_of_the_trim_or_end_of_the_fit_hid_it(seed: int, index: int) -> None:
     case = make_case(index, seed)
