@@ -85,11 +85,18 @@ HELD_BY_STRIPS = {
 """A torpedo of 1.6 m at 1.9 m/s whose sway is in no moment but that of the cross flow along it."""
 
 
-def noisy(physics: Physics, plan: maneuvers.Maneuver, rng: np.random.Generator, name: str, columns: tuple[str, ...]) -> Run:
+def noisy(
+    physics: Physics,
+    plan: maneuvers.Maneuver,
+    rng: np.random.Generator,
+    name: str,
+    columns: tuple[str, ...],
+    clock: Clock = CLOCK,
+) -> Run:
     """A run of a plan with the noise of a compass of 0.005 rad and a gyro of 0.003 rad/s."""
-    log = flown(physics, CLOCK, plan)
-    log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(CLOCK.time.size)
-    log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(CLOCK.time.size)
+    log = flown(physics, clock, plan)
+    log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(clock.time.size)
+    log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(clock.time.size)
     return Run(name, log["time_s"], {c: log[c] for c in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", *columns)})
 
 
@@ -115,6 +122,30 @@ def test_a_hull_that_only_the_cross_flow_holds_is_told_by_its_strips():
     assert values["strip_drag"] == pytest.approx(4.4, rel=0.1)
     assert values["strip_inertia"] == pytest.approx(3.1 * 1.6 / (32.0 * 4.4), rel=0.2)
     assert abs(values["cross_rate"]) == pytest.approx(1.0 / 1.6, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("backlash", {"servo_tau": 0.15, "backlash_gap": 0.03}),
+        pytest.param("deadband", {"servo_tau": 0.2, "deadband_width": 0.03}, marks=pytest.mark.slow),
+    ],
+)
+def test_behind_a_slow_and_worn_fin_such_a_hull_is_found_and_the_wear_too(name, path):
+    """The drift by its strips shows beside the servo only, and the wear beside both: a lag alone takes up a part of each."""
+    clock, rng = Clock(0.1, 500), np.random.default_rng(3)
+    plans = (
+        maneuvers.pulses(clock.time, 0.2, 0.12, recovery=3.0),
+        maneuvers.stairs(clock.time, 0.2, length=2.0),
+        maneuvers.pulses(clock.time, 0.17, 0.1, recovery=2.5),
+        maneuvers.stairs(clock.time, 0.17, length=2.5),
+    )
+    physics = Physics(**HELD_BY_STRIPS, **path)
+    runs = [noisy(physics, plan, rng, f"r{i}", (), clock) for i, plan in enumerate(plans)]
+    found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
+    assert (found.verdict, set(found.effects)) == ("effect", {"sway_coupling", "servo_lag", name})
+    assert found.final.validation.angle_rms_rad < 1.15 * 0.005
+    assert found.base.validation.angle_rms_rad > 5.0 * 0.005
 
 
 CROSS_FLOW = {"damping": 0.9, "authority": -1.4, "fin_bend": -0.01, "crossflow": 6.0, "length": 1.8}
