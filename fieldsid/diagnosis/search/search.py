@@ -43,8 +43,11 @@ class Search(MoveEvaluation):
         self._expand()
         self._grow_rivals()
         if self.leaves_visible_error():
-            self._fit_all_in_series()
+            self._fit_in_series(self._all_in_series())
         self._exchange_leaders()
+        if self.leaves_visible_error():
+            self._vary_states_in_series()
+            self._exchange_leaders()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out
         if (
@@ -132,14 +135,9 @@ class Search(MoveEvaluation):
         return alike and len(self.known) < len(h.names) <= len(best.names) and self.admissible(h)
 
     def _exchange_leaders(self) -> None:
-        """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
-
-        Beyond the budget what leads after it is exchanged only while a visible error is left.
-        """
+        """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn."""
         exchanged = set[ModelSpec]()
         while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged:
-            if exchanged and not self.may_go_on(leading=True):
-                return
             exchanged.add(spec)
             self._exchange_for_variants(best)
             self._exchange_for_lookalikes(self._most_evident())
@@ -235,15 +233,14 @@ class Search(MoveEvaluation):
         pairs = ((a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known)
         return list({frozenset((e.name, e.is_formed) for e in pair): pair for pair in pairs}.values())
 
-    def _fit_all_in_series(self) -> None:
-        """Fit every such pair, and the likeliest with its hidden state in other variants where a visible error is left.
+    def _vary_states_in_series(self) -> None:
+        """Try the likeliest pair in series with its hidden state in other variants.
 
-        Alone the state may gain nothing in another variant, as it takes up the actuator's response as well.
+        Alone the state may gain nothing in one, as it takes up the actuator's response as well: a drift that the cross flow holds
+        shows beside a slow servo only.
         """
-        pairs = self._all_in_series()
-        self._fit_in_series(pairs)
-        fitted = [h for pair in pairs if (h := self.tried.get(self.root | {e.name for e in pair})) is not None]
-        if fitted and self.leaves_visible_error():
+        pairs = (self.tried.get(self.root | {e.name for e in pair}) for pair in self._all_in_series())
+        if fitted := [h for h in pairs if h is not None]:
             best = max(fitted, key=lambda h: h.log_evidence)
             self._try_variants([VariantRequest(best, {e.name for e in best.effects if e.extra_states})])
 
