@@ -243,6 +243,8 @@ class Search(MoveEvaluation):
         if fitted := [h for h in pairs if h is not None]:
             best = max(fitted, key=lambda h: h.log_evidence)
             self._try_variants([VariantRequest(best, {e.name for e in best.effects if e.extra_states})])
+            if self.tried[key := frozenset(best.names)] is not best:
+                self.tried.progress.expanded.discard(key)  # what the textbook's leaves room for says nothing of the new one
 
     def _fit_in_series(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
         """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
