@@ -25,7 +25,7 @@ from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, resi
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
-from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, probabilities, verdict_of, worsens
+from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, names_added, probabilities, verdict_of, worsens
 from fieldsid.effects import all_effects, apart_from
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.fitting.fit_runs import records_of
@@ -204,7 +204,7 @@ def confusable(
         return min(own, its) > 0.0 and min(own, its) >= RIVAL_PROBABILITY_RATIO * max(own, its)
 
     return tuple(
-        "+".join(n for n in o.names if n not in work.known)
+        "+".join(names_added(work, o))
         for o in others
         if o is not h
         and len(o.names) == len(h.names)

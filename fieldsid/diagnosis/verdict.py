@@ -93,6 +93,11 @@ def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
     return Verdict("unexplained" if odd else "disturbed", ())
 
 
+def names_added(search: Search, h: ScoredModel) -> list[str]:
+    """Return the names of the effects that a model adds to the base, in the model's order."""
+    return [n for n in h.names if n not in search.known]
+
+
 def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
     """Return the effects that a model adds to the base, in order of the error of all runs without each of them, largest first.
 
@@ -103,7 +108,7 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
         without = search.tried.get(frozenset(h.names) - {name})
         return without.error_of_all_runs(search.floor) if without is not None else float("inf")
 
-    return tuple(sorted((n for n in h.names if n not in search.known), key=lambda n: -lack(n)))
+    return tuple(sorted(names_added(search, h), key=lambda n: -lack(n)))
 
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:

@@ -11,7 +11,7 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.report.report_text import sized
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS, SUFFICIENT_ERROR_RATIO
-from fieldsid.diagnosis.verdict import Verdict
+from fieldsid.diagnosis.verdict import Verdict, names_added
 from fieldsid.errors import FieldsidError
 from fieldsid.models.effect import effect_named
 from fieldsid.models.model import Noise
@@ -46,7 +46,7 @@ def _deciding(search: Search, rivals: list[ScoredModel]) -> dict[str, Any]:
     from fieldsid.planning.discriminate.discriminate import separate
     from fieldsid.planning.safety.envelope import LARGEST_FIN, Envelope
 
-    names = list(dict.fromkeys(n for h in rivals for n in h.names if n not in search.known))
+    names = list(dict.fromkeys(n for h in rivals for n in names_added(search, h)))
     command = {"separates": names, "command": f"sysid plan --separate {','.join('+'.join(h.names) for h in rivals)}"}
     fin = min(max(float(np.max(np.abs(r.fin - np.median(r.fin)))) for r in search.records), LARGEST_FIN)
     speeds = [r.speed for r in search.records if np.isfinite(r.speed)]

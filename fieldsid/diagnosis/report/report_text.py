@@ -10,7 +10,7 @@ from fieldsid.diagnosis.records import Pair
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
-from fieldsid.diagnosis.verdict import Verdict, excess_explained, worsens
+from fieldsid.diagnosis.verdict import Verdict, excess_explained, names_added, worsens
 from fieldsid.models.effect import effect_named, variant_of
 from fieldsid.models.model import Noise
 
@@ -49,7 +49,7 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
         return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
     if verdict.word == "disturbed":
-        minor = _added(search, found)
+        minor = names_added(search, found)
         if not minor:
             return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
         leaves = "leaves" if len(minor) == 1 else "leave"
@@ -61,17 +61,17 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
     says = "; ".join(_says(found, n) for n in verdict.effects)
     fall = _fall(search, found, floor, runs)
     if verdict.word == "undecided":
-        others = {"+".join(_added(search, r)): r for r in verdict.rivals}
+        others = {"+".join(names_added(search, r)): r for r in verdict.rivals}
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
         return f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
     return f"{names} ({says}): {fall}"
 
 
 def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise) -> str:
-    """Return what is missing and no effect of the catalogue explains: its size, what becomes less likely of it, where it is."""
+    """Return what is missing and no effect of the catalogue explains: its size, what takes a part of it, where it is."""
     worse = validation_error_ratio(search.base(), search.floor)
     lowers = found.selection_errors.mean < search.base().selection_errors.mean
-    partly = f", {sized(search, found, floor)} with {' and '.join(_added(search, found))}" if lowers else ""
+    partly = f", {sized(search, found, floor)} with {' and '.join(names_added(search, found))}" if lowers else ""
     where = (
         f"most of {'what is left' if lowers else 'it'} in {left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s "
         f"({left.worst_ratio:.1f} x the average), it moves with {left.moves_with}"
@@ -84,7 +84,9 @@ def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor:
 
 
 def _would_end(search: Search, found: ScoredModel, floor: Noise) -> str:
-    """Return which set of effects ends the error on all runs although a smaller one is likelier; empty where none does."""
+    """Return which set of effects ends the error on all runs although another is likelier; empty where none does."""
+    if search.is_noiseless:
+        return ""
     sums = search.evidences()
 
     def reached(h: ScoredModel) -> float:
@@ -92,15 +94,11 @@ def _would_end(search: Search, found: ScoredModel, floor: Noise) -> str:
 
     likely = [h for h in search.ranked() if h is not found and reached(h) > sums[search.root]]
     ending = [h for h in likely if worst_error(h, floor) <= SUFFICIENT_ERROR_RATIO]
-    if search.is_noiseless or not ending:
+    if not ending:
         return ""
     best = max(ending, key=reached)
     less = sums[frozenset(found.names)] - reached(best)
-    return f"; {'+'.join(_added(search, best))} leaves {sized(search, best, floor)}, but is {less:.0f} log units less likely"
-
-
-def _added(search: Search, h: ScoredModel) -> list[str]:
-    return [n for n in h.names if n not in search.known]
+    return f"; {'+'.join(names_added(search, best))} leaves {sized(search, best, floor)}, but is {less:.0f} log units less likely"
 
 
 def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:

@@ -162,7 +162,7 @@ def not_fitted(error: ModelError, runs: Sequence[Run]) -> Note:
 
 def like_no_vehicle(fitted: Fitted, length: float | None) -> Note:
     """Return what is said where the fit lies where no vehicle does and each speed's own model is taken."""
-    away, runs = fitted.prior_cost(fitted.vector), [run.name for run in fitted.runs]
+    away, runs = fitted.prior.cost(fitted.vector), [run.name for run in fitted.runs]
     hint = "" if length is not None else "state `length_m` in vehicle.yaml, "
     words = (
         "what all runs together make of surge, sway and yaw lies where no vehicle does: "

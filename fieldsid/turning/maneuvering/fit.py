@@ -54,19 +54,15 @@ class Fitted:
     def cost_at(self, vector: FloatArray) -> float:
         """Return minus twice the log posterior at a vector, the nuisances moved to where they fit best to first order."""
         step, p = vector - self.vector, coefficients(vector)
-        total = self.prior_cost(vector)
+        total = self.prior.cost(vector)
         for cut, local, response in zip(self.cuts, self.local, self.response, strict=True):
             total += cut.cost(p, local + response @ step, self.noise)
         return total
 
-    def prior_cost(self, vector: FloatArray) -> float:
-        """Return minus twice the log prior at a vector, less its least."""
-        return self.prior.cost(vector)
-
     @property
     def is_usual(self) -> bool:
         """Whether the vector is one that vehicles have."""
-        return self.prior_cost(self.vector) < FARTHEST_COST
+        return self.prior.cost(self.vector) < FARTHEST_COST
 
     @property
     def runs(self) -> tuple[FlownRun, ...]:

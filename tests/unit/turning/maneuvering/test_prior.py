@@ -12,10 +12,10 @@ from fieldsid.turning.maneuvering.prior_table import CORRELATION, STANDARD_DEVIA
 COUNT = len(NAMES)
 
 
-def drawn(seed, count=None):
+def drawn(seed, count):
     """Draws of the prior, (count, 22)."""
     believed = prior(None)
-    z = np.random.default_rng(seed).standard_t(FREEDOM, (1 if count is None else count, COUNT))
+    z = np.random.default_rng(seed).standard_t(FREEDOM, (count, COUNT))
     return believed.mean + z @ np.linalg.inv(believed.axes).T
 
 
