@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio, worst_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.thresholds import EQUAL_ERROR_RATIO, MAX_VALIDATION_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import (
+    EQUAL_ERROR_RATIO,
+    MAX_ERROR_RATIO,
+    MAX_VALIDATION_ERROR_RATIO,
+    SUFFICIENT_ERROR_RATIO,
+)
 from fieldsid.diagnosis.verdict import Verdict, excess_explained, names_added, worsens
 from fieldsid.models.effect import effect_named, variant_of
 from fieldsid.models.model import Noise
@@ -102,17 +109,39 @@ def _would_end(search: Search, found: ScoredModel, floor: Noise) -> str:
 
 
 def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
-    """Return how the error falls with a model's effects; where the fitted runs' numbers raise it, with all runs'."""
+    """Return how the error falls with a model's effects, on the validation runs where it clearly does there.
+
+    Where the fitted runs' numbers hardly lower it, those of all runs together may; else it is the fitted runs that tell.
+    """
     base = search.base()
-    if found.selection_errors.mean < base.selection_errors.mean or not search.validation:
-        return f"the error on {runs} falls from {sized(search, base, floor)} to {sized(search, found, floor)}"
-    fitted = " to ".join(f"{h.train.over(floor):.2f}" for h in (base, found))
-    before, after = (h.selection_errors.over(floor) for h in (base, found))
-    settled = min(errors.over(floor) for errors in found.unseen_errors)
-    return (
-        f"the error on the fitted runs goes from {fitted} x the noise floor, that on {runs} from {before:.2f} to {after:.2f} x "
-        f"with their numbers, to {settled:.2f} x with those that all runs together leave"
-    )
+
+    def falls(errors: Callable[[ScoredModel], Errors]) -> bool:
+        return errors(found).over(floor) < MAX_ERROR_RATIO * errors(base).over(floor)
+
+    def size(errors: Callable[[ScoredModel], Errors]) -> str:
+        before, after = errors(base), errors(found)
+        if search.is_noiseless:
+            return f"from {before.sized()} to {after.sized()}"
+        return f"from {before.over(floor):.2f} to {after.over(floor):.2f} x the noise floor"
+
+    if not search.validation or falls(_selected):
+        return f"the error on {runs} falls {size(_selected)}"
+    if falls(_settled):
+        alone = f"with the fitted runs' own it goes {size(_selected)}"
+        return f"with the numbers of all runs together the error on {runs} falls {size(_settled)}; {alone}"
+    return f"the error on the fitted runs goes {size(_fitted)}, that on {runs} {size(_selected)}"
+
+
+def _selected(h: ScoredModel) -> Errors:
+    return h.selection_errors
+
+
+def _settled(h: ScoredModel) -> Errors:
+    return h.unseen_errors[-1]
+
+
+def _fitted(h: ScoredModel) -> Errors:
+    return h.train
 
 
 def _disturbance(noise: Noise) -> str:

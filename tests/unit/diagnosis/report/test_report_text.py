@@ -105,17 +105,39 @@ def test_errors_hold_those_of_each_run():
     assert errors_of([], 0.0).each == ()
 
 
-def test_where_the_fitted_runs_leave_the_numbers_open_the_headline_says_both_errors():
-    base, found = _made(train=(3.0,), unseen=(7.0,), score=0.0), _made("current", train=(1.0,), unseen=(9.0,), score=40.0)
-    found.train, base.train, found.effects = found.errors.train, base.errors.train, ()
-    found.unseen_errors = (found.selection_errors, _errors(1.1))
-    search = _search(base)
-    search.is_noiseless = False
-    said = headline(search, Verdict("effect", ("current",)), found, SimpleNamespace(), FLOOR, FLOOR)
-    assert said.endswith(
-        "the error on the fitted runs goes from 3.00 to 1.00 x the noise floor, that on unseen runs from 7.00 to 9.00 x with "
-        "their numbers, to 1.10 x with those that all runs together leave"
+@pytest.mark.parametrize(
+    ("fitted", "unseen", "settled", "said"),
+    [
+        ((3.0, 1.0), (7.0, 1.1), (6.0, 1.1), "the error on unseen runs falls from 7.00 to 1.10 x the noise floor"),
+        (
+            (3.0, 1.0),
+            (2.82, 2.82),
+            (2.56, 1.43),
+            (
+                "with the numbers of all runs together the error on unseen runs falls from 2.56 to 1.43 x the noise floor; "
+                "with the fitted runs' own it goes from 2.82 to 2.82 x the noise floor"
+            ),
+        ),
+        (
+            (3.0, 1.0),
+            (1.03, 1.02),
+            (1.03, 1.02),
+            (
+                "the error on the fitted runs goes from 3.00 to 1.00 x the noise floor, that on unseen runs from 1.03 to 1.02 x "
+                "the noise floor"
+            ),
+        ),
+    ],
+    ids=["unseen", "settled", "fitted"],
+)
+def test_the_headline_says_the_error_that_falls(fitted, unseen, settled, said):
+    base, found = (
+        _made(*n, train=(f,), unseen=(u,), score=0.0) for n, f, u in zip([(), ("stall",)], fitted, unseen, strict=True)
     )
+    for h, all_runs in zip((base, found), settled, strict=True):
+        h.train, h.unseen_errors, h.effects = h.errors.train, (h.selection_errors, _errors(all_runs)), ()
+    search = _search(base)
+    assert headline(search, Verdict("effect", ("stall",)), found, SimpleNamespace(), FLOOR, FLOOR).endswith(f": {said}")
 
 
 def test_a_disturbance_beside_small_effects_does_not_say_that_none_is_there():
