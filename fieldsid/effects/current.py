@@ -3,18 +3,28 @@
 In a frame that drifts with the water the hull still has its log's heading; what is left is the moment of the flow
 across it, once per turn of the compass. In its other forms it goes twice as well, as the moment of a flow square across
 a long hull does, its direction turns by current_turn rad/s and is the stated one in the middle of a run, or the moment goes
-with a power of the run's speed: lift of the flow across the hull is in proportion to both.
-Source: Fossen 2011, section 8.3 (ocean current forces and moments).
+with a power of the run's speed: lift of the flow across the hull is in proportion to both. Or it is in the log and not on the
+hull: a speed over ground (DVL with bottom lock, GPS) is the speed through the water, which the fin and the damping go with, and
+the current along the heading, u - current_north cos(psi) - current_east sin(psi).
+Source: Fossen 2011, sections 8.3 (ocean current forces and moments) and 6.4 (lift against u^2).
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values, Variant
+from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Terms, Values, Variant
+from fieldsid.models.record import Record
+
+MIN_SPEED_RATIO = 0.05
+"""Share of the run's speed below which the water's speed past a hull is held, as in `speed_varying`."""
 
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients; scale is the run's speed over the reference speed."""
+    if "current_north" in values:
+        return Core()
     lift = scale ** values["current_power"] if "current_power" in values else 1.0
     return Core(
         heading_sin=values["current_sin"] * lift,
@@ -25,9 +35,19 @@ def core(values: Values, scale: float) -> Core:
     )
 
 
+def terms(values: Values, record: Record) -> Terms:
+    """Return the factors (n,) of a logged speed that is over ground; none where no heading is measured, as in a plan."""
+    if "current_north" not in values or "heading" not in record.signals:
+        return Terms()
+    heading = record["heading"]
+    along = values["current_north"] * np.cos(heading) + values["current_east"] * np.sin(heading)
+    factor = np.maximum((record["surge"] - along) / record.speed, MIN_SPEED_RATIO)
+    return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
+
+
 EFFECT = Effect(
     name="current",
-    says="a current across the course turns the hull, differently on every heading",
+    says="a current makes the hull answer differently on every heading",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW,),
     equation="r' += current_sin * sin(psi) + current_cos * cos(psi)",
@@ -40,6 +60,7 @@ EFFECT = Effect(
     mistaken_for=("compass_deviation", "trim_drift", "wave", "asymmetric_fin"),
     source="Fossen 2011, section 8.3",
     core=core,
+    terms=terms,
     variants=(
         Variant(
             "it goes twice per turn of the compass as well",
@@ -51,6 +72,15 @@ EFFECT = Effect(
         Variant(
             "it grows with the speed",
             (Coefficient("current_power", "1", -1.0, 3.0, 1.0, step=1e-3, says="power of the run's speed it goes with"),),
+        ),
+        Variant(
+            "the logged speed is over ground, and the one through the water differs by heading",
+            (
+                Coefficient("current_north", "m/s", -1.5, 1.5, 0.0, scan=(-0.3, 0.3), says="the water's velocity to the north"),
+                Coefficient("current_east", "m/s", -1.5, 1.5, 0.0, scan=(-0.3, 0.3), says="to the east"),
+            ),
+            needs=("surge", "heading"),
+            without=("current_sin", "current_cos"),
         ),
         Variant(
             "its direction turns",

@@ -1,8 +1,10 @@
 """The trim moment drifts: moment = drift (t - t_first) / 60, drift in rad/s^2 per minute, t_first the run's first sample.
 
 Flooding, a shifting battery or a cooling servo causes it; the trim parameter is that of the run's start. Positive
-drift turns toward positive angle. In its other form it levels off: drift (1 - exp(-levelling t)) / levelling, or gathers
-pace where levelling is negative. Source: Fossen 2011, section 4.1 (restoring moment of a moving centre of gravity).
+drift turns toward positive angle. In its other forms it levels off: drift (1 - exp(-levelling t)) / levelling, or gathers
+pace where levelling is negative; or it goes with a power of the speed, drift u^drift_power: what wanders is then the fin, whose
+moment goes with u^2, and not a weight.
+Source: Fossen 2011, sections 4.1 (restoring moment of a moving centre of gravity) and 6.4 (lift against u^2).
 """
 
 from __future__ import annotations
@@ -22,7 +24,10 @@ def terms(values: Values, record: Record) -> Terms:
     """Return the drifting moment, (n,) rad/s^2."""
     since, rate = record.time - record.time[0], values.get("levelling", 0.0)
     grown = since if abs(rate) <= MIN_LEVELLING_RATE_1_S else -np.expm1(-rate * since) / rate
-    return Terms(moment=values["drift"] * grown / MINUTE_S)
+    moment = values["drift"] * grown / MINUTE_S
+    if "drift_power" in values:
+        moment = moment * np.maximum(record["surge"], 0.0) ** values["drift_power"]
+    return Terms(moment=moment)
 
 
 EFFECT = Effect(
@@ -52,6 +57,11 @@ EFFECT = Effect(
                     says="rate at which the drift dies out",
                 ),
             ),
+        ),
+        Variant(
+            "it is the fin's, and goes with a power of the speed",
+            (Coefficient("drift_power", "1", 0.0, 4.0, 2.0, step=1e-3, says="power of the speed it goes with"),),
+            needs=("surge",),
         ),
     ),
 )

@@ -195,6 +195,43 @@ def test_damping_that_does_not_grow_with_the_speed_is_told_from_that_of_lift():
     assert values["damping_share"] == pytest.approx(0.0, abs=0.25)
 
 
+def test_a_current_is_told_by_a_log_whose_speed_is_over_ground():
+    """Through the water the hull is as fast on every heading; the fin's authority goes with that, and not with what is logged."""
+    rng, time, north, east = np.random.default_rng(4), CLOCK.time, 0.3, -0.2
+    runs = []
+    for i, (ratio, heading) in enumerate(zip((0.7, 1.0, 1.4, 1.2, 0.85), (0.4, 2.6, 4.4, 1.2, 5.5), strict=True)):
+        plan = maneuvers.pulses(time, 0.26, 0.15, recovery=4.0) if i % 2 else maneuvers.stairs(time, 0.25, length=6.0)
+        physics = Physics(damping=1.1 * ratio, authority=-0.9 * ratio**2, nominal_speed=1.5 * ratio)
+        log = flown(physics, CLOCK, plan, angle=heading)
+        over_ground = log["surge_m_s"] + north * np.cos(log["yaw_rad"]) + east * np.sin(log["yaw_rad"])
+        log["surge_m_s"] = over_ground + 0.02 * rng.standard_normal(time.size)
+        log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(time.size)
+        log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(time.size)
+        columns = ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", "surge_m_s")
+        runs.append(Run(f"r{i}", log["time_s"], {c: log[c] for c in columns}))
+    found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
+    assert (found.verdict, found.effects) == ("effect", ("current",))
+    assert found.final.validation.angle_rms_rad < 1.15 * 0.005 < 0.5 * found.base.validation.angle_rms_rad
+    values = found.candidates[0].parameters
+    assert values["current_north"] == pytest.approx(north, abs=0.03)
+    assert values["current_east"] == pytest.approx(east, abs=0.03)
+
+
+def test_a_fin_that_wanders_is_told_from_a_weight_that_does_by_runs_at_several_speeds():
+    rng, time = np.random.default_rng(4), CLOCK.time
+    runs = []
+    for i, ratio in enumerate((0.7, 1.0, 1.4, 1.2)):
+        plan = maneuvers.pulses(time, 0.26, 0.15, recovery=4.0) if i % 2 else maneuvers.stairs(time, 0.25, length=3.0)
+        physics = Physics(damping=1.1 * ratio, authority=-0.9 * ratio**2, drift=0.0012 * ratio**2, nominal_speed=1.5 * ratio)
+        runs.append(noisy(physics, plan, rng, f"r{i}", ("surge_m_s",)))
+    found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
+    assert (found.verdict, found.effects) == ("effect", ("trim_drift",))
+    assert found.final.validation.angle_rms_rad < 1.15 * 0.005
+    values = found.candidates[0].parameters
+    assert values["drift_power"] == pytest.approx(2.0, abs=0.1)
+    assert values["drift"] == pytest.approx(60.0 * 0.0012 / 1.5**2, rel=0.1)
+
+
 def test_every_effect_that_needs_no_helper_signal_is_in_the_list():
     helped = {"crossflow_drag", "prop_moment", "roll_coupling", "speed_moment"}
     assert {c.name for c in CASES} >= set(all_effects()) - helped

@@ -25,7 +25,7 @@ from fieldsid.fitting.initial.effect_screen import (
 )
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
-from fieldsid.models.effect import Effect
+from fieldsid.models.effect import Effect, with_variant
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -78,6 +78,7 @@ def add_effect(
         if flown
         else [(_output_error_linearisation(parent), True), (_likelihood_linearisation(parent), False)]
     )
+    left = [own for effect in left for own in mechanisms(effect)]
     # both screens at once, then all that is to be followed at once: each sharing out costs a copy of the process
     asked = [(linearisation, effect) for linearisation, _ in grounds for effect in left]
     points = parallel.map(lambda of: _best_points(*of), asked)
@@ -90,7 +91,7 @@ def add_effect(
             if most is None
             else [
                 p
-                for p in screened_points[: most + plain * EXTRA_ITERATED_EFFECTS]
+                for p in _first_effects(screened_points, most + plain * EXTRA_ITERATED_EFFECTS)
                 if cost - p[0].predicted_cost
                 > (MIN_OUTPUT_ERROR_COST_SHARE * cost if plain else _least_cost_fall(parent, p[0].effect, behind))
             ]
@@ -113,6 +114,18 @@ def add_effect(
     )
     found = best[:most] + [SearchMove(p, s.linearisation, s.by_output_error) for s, p in taken if not s.is_iterated]
     return found if most is None else [w for w in found if not w.by_output_error or w is found[0] or _matters(w)]
+
+
+def mechanisms(effect: Effect) -> list[Effect]:
+    """Return an effect, and it in each of its variants that does without all of the textbook's coefficients."""
+    own = {c.name for c in effect.coefficients}
+    return [effect, *(with_variant(effect, form) for form in effect.variants if own <= set(form.without))]
+
+
+def _first_effects(points: Sequence[list[ScreenResult]], most: int) -> list[list[ScreenResult]]:
+    """Return the scan points of the first few effects, each with its mechanisms."""
+    names = list(dict.fromkeys(p[0].effect.name for p in points))[:most]
+    return [p for p in points if p[0].effect.name in names]
 
 
 def _least_cost_fall(parent: ScoredModel, effect: Effect, behind: float) -> float:

@@ -13,7 +13,13 @@ from dataclasses import replace
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, MIN_OUTPUT_ERROR_COST_SHARE, SearchMove, iterate_points
+from fieldsid.diagnosis.search.add_effect import (
+    MAX_EFFECTS_LATER,
+    MIN_OUTPUT_ERROR_COST_SHARE,
+    SearchMove,
+    iterate_points,
+    mechanisms,
+)
 from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, screen_points, with_effect
 from fieldsid.fitting.problem.parameters import layout_of, speed_groups
 from fieldsid.fitting.problem.problem import Problem
@@ -30,7 +36,10 @@ def moves_of_all_runs(parent: ScoredModel, left: Sequence[Effect], parallel: Par
     start = carry_parameters(layout, (old, fitted.x))
     found = fit_output_error(problem, start, fitted.weights)
     ground = linearise_at(found.problem, found.x, found.weights)
-    points = sorted(parallel.map(lambda e: screen_points(ground, e), left), key=lambda p: p[0].predicted_cost)
+    points = sorted(
+        parallel.map(lambda e: screen_points(ground, e), [own for e in left for own in mechanisms(e)]),
+        key=lambda p: p[0].predicted_cost,
+    )
     worth = (1.0 - MIN_OUTPUT_ERROR_COST_SHARE) * ground.cost
     likely = [p[:1] for p in points[:MAX_EFFECTS_LATER] if p[0].predicted_cost < worth]
     moves = []

@@ -11,7 +11,7 @@ from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measure
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.effects import all_effects, pick_effect
 from fieldsid.models.axis import Axis
-from fieldsid.models.effect import Motion, as_fitted, with_variant
+from fieldsid.models.effect import Core, Motion, as_fitted, with_variant
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import first_part
 
@@ -24,6 +24,7 @@ NEUTRAL = {
     "current_cos2": 0.0, "current_turn": 0.0, "stall_drop": 0.0, "munk_exponent": 2.0, "prop_trimmed": 0.0,
     "scale_side": 0.0, "bias_drift": 0.0, "roll_cubic": 0.0, "speed_power": 2.0, "current_power": 0.0,
     "strip_drag": 0.0, "strip_inertia": 0.04, "strip_munk": 1.0, "damping_share": 1.0,
+    "drift_power": 0.0,
 }  # fmt: skip
 """Numbers at which a form is the textbook's; a servo's inertia has none within its bounds."""
 GENTLE = {"cross_quadratic": 4.0, "cross_fin": 0.5, "strip_drag": 4.0, "strip_munk": 0.5}
@@ -163,3 +164,24 @@ def test_moments_of_roll_speed_and_current_go_with_the_powers_that_their_forms_s
     np.testing.assert_allclose(speed, 0.02 * 1.4**1.3)
     core = pick_effect("current").core({"current_sin": 0.1, "current_cos": -0.2, "current_power": 1.5}, 2.0)
     assert (core.heading_sin, core.heading_cos) == pytest.approx((0.1 * 2.0**1.5, -0.2 * 2.0**1.5))
+
+
+def test_a_fins_drift_goes_with_the_power_of_the_speed_that_its_form_says():
+    log, drift = record(faster=True), pick_effect("trim_drift")
+    found = drift.terms({"drift": 0.6, "drift_power": 1.7}, log).moment
+    np.testing.assert_allclose(found, 0.01 * log.time * log["surge"] ** 1.7)
+
+
+def test_a_speed_over_ground_is_taken_through_the_water_where_a_heading_is_measured():
+    log, current = record(faster=True), pick_effect("current")
+    values = {"current_north": 0.3, "current_east": -0.2}
+    plain = current.terms(values, log)
+    assert not plain.has_factors
+    heading = np.linspace(0.0, 5.0, len(log))
+    turned = replace(log, signals={**log.signals, "heading": heading})
+    past = (log["surge"] - 0.3 * np.cos(heading) + 0.2 * np.sin(heading)) / log.speed
+    terms = current.terms(values, turned)
+    for part, power in (("authority_factor", 2), ("damping_factor", 1), ("cross_factor", 1)):
+        np.testing.assert_allclose(getattr(terms, part), past**power)
+    assert terms.moment is None
+    assert current.core(values, 1.3) == Core()

@@ -9,9 +9,10 @@ import hidden_lag
 import numpy as np
 import pytest
 
+from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
-from fieldsid.diagnosis.search.add_effect import add_effect, by_effect
+from fieldsid.diagnosis.search.add_effect import add_effect, by_effect, mechanisms
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
@@ -32,7 +33,8 @@ def search_for(*names):
     training, unseen = hidden_lag.runs()
     records = [[record_of(r, Axis.YAW) for r in runs] for runs in (training, [unseen])]
     effects = all_effects(Axis.YAW)
-    return Search(*records, Axis.YAW, [effects[n] for n in names])
+    catalogue, _ = applicable_effects([effects[n] for n in names], [*records[0], *records[1]])
+    return Search(*records, Axis.YAW, catalogue)
 
 
 @pytest.fixture(scope="module")
@@ -218,9 +220,9 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
 
 def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(monkeypatch):
     made = search_for("servo_lag", "sway_coupling", "gyro_bias")
-    effects, starts = all_effects(Axis.YAW), []
+    sway, starts = next(e for e in made.catalogue if e.name == "sway_coupling"), []
     base = made.base()
-    moves = add_effect(base, [effects["sway_coupling"]], None, made.parallel, anew=False, flown=True)
+    moves = add_effect(base, [sway], None, made.parallel, anew=False, flown=True)
     made._evaluate_moves(base, by_effect(moves))
     real = search.fit_maximum_likelihood
 
@@ -238,3 +240,12 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
         assert start["lag"] == pytest.approx(0.15)
         assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
     assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
+
+
+def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
+    effects = all_effects(Axis.YAW)
+    assert [[c.name for c in e.coefficients] for e in mechanisms(effects["current"])] == [
+        ["current_sin", "current_cos"],
+        ["current_north", "current_east"],
+    ]
+    assert mechanisms(effects["crossflow_drag"]) == [effects["crossflow_drag"]]
