@@ -5,7 +5,8 @@ across it, once per turn of the compass. In its other forms it goes twice as wel
 a long hull does, its direction turns by current_turn rad/s and is the stated one in the middle of a run, or the moment goes
 with a power of the run's speed: lift of the flow across the hull is in proportion to both. Or it is in the log and not on the
 hull: a speed over ground (DVL with bottom lock, GPS) is the speed through the water, which the fin and the damping go with, and
-the current along the heading, u - current_north cos(psi) - current_east sin(psi).
+the current along the heading, current_north cos(psi) + current_east sin(psi); a run's parameters then hold at its speed
+through the water, and what `speed_varying` says of the speed is said of that through the water.
 Source: Fossen 2011, sections 8.3 (ocean current forces and moments) and 6.4 (lift against u^2).
 """
 
@@ -39,10 +40,17 @@ def terms(values: Values, record: Record) -> Terms:
     """Return the factors (n,) of a logged speed that is over ground; none where no heading is measured, as in a plan."""
     if "current_north" not in values or "heading" not in record.signals:
         return Terms()
-    heading = record["heading"]
+    heading, surge = record["heading"], record["surge"]
     along = values["current_north"] * np.cos(heading) + values["current_east"] * np.sin(heading)
-    factor = np.maximum((record["surge"] - along) / record.speed, MIN_SPEED_RATIO)
-    return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
+    run = max(float(np.median(surge - along)) / record.speed, MIN_SPEED_RATIO)  # as the run's speed is that of its log
+    factor = np.full(surge.size, run)
+    if "speed_share" not in values:
+        return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
+    # that effect takes the logged speed over the run's: what is left is the one through the water over both
+    log = np.log(np.maximum((surge - along) / (run * np.maximum(surge, MIN_SPEED_RATIO * record.speed)), MIN_SPEED_RATIO))
+    within = run * np.exp(values["speed_share"] * log)
+    damping = run * np.exp(values["damping_share"] * log) if "damping_share" in values else within
+    return Terms(damping_factor=damping, authority_factor=within * within, cross_factor=within)
 
 
 EFFECT = Effect(
@@ -81,6 +89,7 @@ EFFECT = Effect(
             ),
             needs=("surge", "heading"),
             without=("current_sin", "current_cos"),
+            beside=("speed_varying",),
         ),
         Variant(
             "its direction turns",

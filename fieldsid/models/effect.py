@@ -92,9 +92,9 @@ class Variant:
     The effect's hooks compute the textbook's variant where the values lack these coefficients. `initial_guesses` gives start
     values of the shared ones as an effect's does, from the residuals of the textbook's variant, in place of their scan grids.
     `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals. `without` are
-    coefficients of the effect that it does without. `extra_states` are the variant's, None for those of the effect; a state
-    of its own is in place of the signals that the effect needs. `stand_in` is what a model is flown by in a plan or a turn, where
-    no signal is measured.
+    coefficients of the effect that it does without, `beside` effects beside which alone it may show. `extra_states` are the
+    variant's, None for those of the effect; a state of its own is in place of the signals that the effect needs. `stand_in` is
+    what a model is flown by in a plan or a turn, where no signal is measured.
     """
 
     says: str
@@ -103,6 +103,7 @@ class Variant:
     axes: tuple[Axis, ...] = tuple(Axis)
     needs: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
     extra_states: tuple[str, ...] | None = None
     stand_in: StandIn | None = None
 

@@ -26,7 +26,7 @@ from fieldsid.diagnosis.thresholds import (
 )
 from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
-from fieldsid.models.effect import Effect, Stage
+from fieldsid.models.effect import Effect, Stage, with_variant
 
 MAX_STARTS_IN_SERIES = 4
 """Scan points, those of the lowest cost, that an actuator and a hidden state are fitted from together."""
@@ -43,7 +43,8 @@ class Search(MoveEvaluation):
         self._expand()
         self._grow_rivals()
         if self.leaves_visible_error():
-            self._fit_in_series(self._all_in_series())
+            self._fit_pairs([*self._all_in_series(), *self._all_beside()])
+            self._join_pairs()
         self._exchange_leaders()
         if self.leaves_visible_error():
             self._vary_states_in_series()
@@ -177,7 +178,7 @@ class Search(MoveEvaluation):
                 near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
                 self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
             if stands.is_formed and len(others) == len(self.known):
-                self._fit_in_series([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
+                self._fit_pairs([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
@@ -233,6 +234,11 @@ class Search(MoveEvaluation):
         pairs = ((a, b) for a in effects for b in self.catalogue if _in_series(a, b) and b.name not in self.known)
         return list({frozenset((e.name, e.is_formed) for e in pair): pair for pair in pairs}.values())
 
+    def _all_beside(self) -> list[tuple[Effect, Effect]]:
+        """Return every effect in a variant that may show beside another only, with that other."""
+        left = [e for e in self.catalogue if e.name not in self.known]
+        return [(with_variant(e, v), b) for e in left for v in e.variants for b in left if b.name in v.beside]
+
     def _vary_states_in_series(self) -> None:
         """Try the likeliest pair in series with its hidden state in other variants.
 
@@ -246,11 +252,12 @@ class Search(MoveEvaluation):
             if self.tried[key := frozenset(best.names)] is not best:
                 self.tried.progress.expanded.discard(key)  # what the textbook's leaves room for says nothing of the new one
 
-    def _fit_in_series(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
+    def _fit_pairs(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
         """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.
 
         Where both are missing either takes up the response of the other, and ends at parameters from which no descent leads to
-        the two. Of two optima of the same effects that are rivals by evidence the one stands whose free run predicts better.
+        the two. So it is with other pairs, whose first is scanned then. Of two optima of the same effects that are rivals by
+        evidence the one stands whose free run predicts better.
         """
         base, leading, under = self.base().likelihood_fit, self._most_evident(), (self.resolution_floor, self.noise_kind)
         at = linearise_at(base.fitted.problem, base.fitted.x, base.noise)
@@ -258,7 +265,7 @@ class Search(MoveEvaluation):
 
         def fit(pair: tuple[Effect, Effect]) -> list[LikelihoodFit]:
             problem = base.fitted.problem.with_effects([*base.fitted.effects, *pair])
-            points = scan_points(at, next(e for e in pair if e.extra_states))
+            points = scan_points(at, next((e for e in pair if e.extra_states), pair[0]))
             starts = [carry_parameters(problem.layout, base.fitted.vector, otherwise=v) for v in points]
             best = sorted(starts, key=lambda x: cost_of(problem, x, base.noise))[:MAX_STARTS_IN_SERIES]
             ends = [fit_maximum_likelihood(problem, x, base.noise, *under, rival=rival) for x in best]
@@ -272,6 +279,18 @@ class Search(MoveEvaluation):
         flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(fitted=True), found)
         for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
             self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
+
+    def _join_pairs(self) -> None:
+        """Add to the model of the highest evidence the pairs that may show together only, where they gain any: see `_joined`.
+
+        What stands for such a pair there is found idle beside it.
+        """
+        best, pairs = self._most_evident(), [*self._all_in_series(), *self._all_beside()]
+        fitted = [h for pair in pairs if (h := self.tried.get(self.root | {e.name for e in pair})) and h is not best]
+        gaining = [h for h in fitted if gains_any_evidence(self.base(), h) and not set(h.names) <= set(best.names)]
+        joined = self._joined(best, sorted(gaining, key=lambda h: -h.log_evidence)[:MAX_JOINED])
+        self.tried.update({frozenset(h.names): h for h in joined})
+        self._drop_each(self._most_evident())
 
     def _drop_each(self, h: ScoredModel) -> bool:
         """Fit a model without each of its effects, unless that was done: later ones may have made earlier ones idle.

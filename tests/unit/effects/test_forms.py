@@ -179,9 +179,16 @@ def test_a_speed_over_ground_is_taken_through_the_water_where_a_heading_is_measu
     assert not plain.has_factors
     heading = np.linspace(0.0, 5.0, len(log))
     turned = replace(log, signals={**log.signals, "heading": heading})
-    past = (log["surge"] - 0.3 * np.cos(heading) + 0.2 * np.sin(heading)) / log.speed
+    past = log["surge"] - 0.3 * np.cos(heading) + 0.2 * np.sin(heading)
+    run = np.median(past) / log.speed
     terms = current.terms(values, turned)
     for part, power in (("authority_factor", 2), ("damping_factor", 1), ("cross_factor", 1)):
-        np.testing.assert_allclose(getattr(terms, part), past**power)
+        np.testing.assert_allclose(getattr(terms, part), run**power)
+    beside, shares = pick_effect("speed_varying"), {"speed_share": 0.8, "damping_share": 0.3}
+    both = current.terms(values | shares, turned).beside(beside.terms(values | shares, turned))
+    water = past / (run * log.speed)  # over the run's own through the water, at which its parameters hold
+    np.testing.assert_allclose(both.authority_factor, (run * water**0.8) ** 2)
+    np.testing.assert_allclose(both.damping_factor, run * water**0.3)
+    np.testing.assert_allclose(both.cross_factor, run * water**0.8)
     assert terms.moment is None
     assert current.core(values, 1.3) == Core()

@@ -234,7 +234,7 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
     monkeypatch.setattr(made.parallel, "map", lambda function, items: [function(i) for i in items])
     pairs = made._all_in_series()
     assert [(a.name, b.name) for a, b in pairs] == [("sway_coupling", "servo_lag")]
-    made._fit_in_series(pairs)
+    made._fit_pairs(pairs)
     assert len({(start["cross_damping"], start["cross_rate"]) for start in starts}) == len(starts) == search.MAX_STARTS_IN_SERIES
     for start in starts:
         assert start["lag"] == pytest.approx(0.15)
