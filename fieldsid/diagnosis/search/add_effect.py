@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_mar
 from fieldsid.models.effect import Effect, with_variant
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import BoolArray, FloatArray
+
+T = TypeVar("T")
 
 MAX_EFFECTS_AT_BASE, MAX_EFFECTS_LATER = 5, 4
 """Effects that pass each of the two screens, that of the free run's error and that of the whitened error: of the base, and of a
@@ -91,7 +94,7 @@ def add_effect(
             if most is None
             else [
                 p
-                for p in _first_effects(screened_points, most + plain * EXTRA_ITERATED_EFFECTS)
+                for p in first_few(screened_points, most + plain * EXTRA_ITERATED_EFFECTS, lambda points: points[0].effect)
                 if cost - p[0].predicted_cost
                 > (MIN_OUTPUT_ERROR_COST_SHARE * cost if plain else _least_cost_fall(parent, p[0].effect, behind))
             ]
@@ -112,7 +115,9 @@ def add_effect(
         (SearchMove(p, s.linearisation, s.by_output_error) for s, p in taken if s.is_iterated),
         key=lambda move: move.screened.predicted_cost,
     )
-    found = best[:most] + [SearchMove(p, s.linearisation, s.by_output_error) for s, p in taken if not s.is_iterated]
+    found = first_few(best, most, lambda move: move.screened.effect) + [
+        SearchMove(p, s.linearisation, s.by_output_error) for s, p in taken if not s.is_iterated
+    ]
     return found if most is None else [w for w in found if not w.by_output_error or w is found[0] or _matters(w)]
 
 
@@ -122,10 +127,14 @@ def mechanisms(effect: Effect) -> list[Effect]:
     return [effect, *(with_variant(effect, form) for form in effect.variants if own <= set(form.without))]
 
 
-def _first_effects(points: Sequence[list[ScreenResult]], most: int) -> list[list[ScreenResult]]:
-    """Return the scan points of the first few effects, each with its mechanisms."""
-    names = list(dict.fromkeys(p[0].effect.name for p in points))[:most]
-    return [p for p in points if p[0].effect.name in names]
+def first_few(ranked: Sequence[T], most: int | None, effect: Callable[[T], Effect]) -> list[T]:
+    """Return the first few of a ranking, and mechanisms beside the textbook's that come before the last of them.
+
+    These take no place of another effect's: what is tried without them is tried with them.
+    """
+    places = [i for i, one in enumerate(ranked) if not effect(one).is_formed]
+    end = len(ranked) if most is None or len(places) <= most else places[most]
+    return list(ranked[:end])
 
 
 def _least_cost_fall(parent: ScoredModel, effect: Effect, behind: float) -> float:

@@ -9,7 +9,7 @@ from itertools import chain
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, leaves_error, lowers_error
+from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, leaves_error, lowers_error, worst_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
@@ -30,6 +30,8 @@ from fieldsid.models.effect import Effect, Stage, with_variant
 
 MAX_STARTS_IN_SERIES = 4
 """Scan points, those of the lowest cost, that an actuator and a hidden state are fitted from together."""
+MAX_IDLE_EXPANSIONS = 2
+"""Expansions beyond the budget that may lower no error: the last of three effects that show together only is the third."""
 MAX_JOINED = 3
 """Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
 
@@ -77,6 +79,8 @@ class Search(MoveEvaluation):
             self._drop_each(self._most_evident())
             self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
+            lowest = self.tried.progress.lowest_errors
+            lowest.append(min([worst_error(self.best_admissible(), self.floor), *lowest[-1:]]))
             if self._switch_noise_or_trim():
                 self.base()
 
@@ -202,9 +206,17 @@ class Search(MoveEvaluation):
         if self.root not in self.tried.progress.expanded and (len(self.tried) == 1 or self.may_go_on()):
             return self.base()
         best = self._most_evident()
-        if self._is_expandable(best) and self.may_go_on(leading=True):
+        if self._is_expandable(best) and (self.may_go_on() or (self.leaves_visible_error() and self._gets_lower())):
             return best
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
+
+    def _gets_lower(self) -> bool:
+        """Whether the last few expansions have lowered the error of the best accepted set, by what an addition must.
+
+        A model that goes on to gain evidence and leaves the error where it is takes up what is in no effect's form.
+        """
+        lowest = self.tried.progress.lowest_errors
+        return len(lowest) <= MAX_IDLE_EXPANSIONS or lowest[-1] < MAX_ERROR_RATIO * lowest[-1 - MAX_IDLE_EXPANSIONS]
 
     def _leading_models(self) -> list[ScoredModel]:
         """Return the leading models, none where the budget is used up.

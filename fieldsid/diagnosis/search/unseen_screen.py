@@ -17,6 +17,7 @@ from fieldsid.diagnosis.search.add_effect import (
     MAX_EFFECTS_LATER,
     MIN_OUTPUT_ERROR_COST_SHARE,
     SearchMove,
+    first_few,
     iterate_points,
     mechanisms,
 )
@@ -41,7 +42,8 @@ def moves_of_all_runs(parent: ScoredModel, left: Sequence[Effect], parallel: Par
         key=lambda p: p[0].predicted_cost,
     )
     worth = (1.0 - MIN_OUTPUT_ERROR_COST_SHARE) * ground.cost
-    likely = [p[:1] for p in points[:MAX_EFFECTS_LATER] if p[0].predicted_cost < worth]
+    first = first_few(points, MAX_EFFECTS_LATER, lambda p: p[0].effect)
+    likely = [p[:1] for p in first if p[0].predicted_cost < worth]
     moves = []
     for screened in parallel.map(lambda p: iterate_points(ground, p), likely):
         coefficients = dict(zip(screened.problem.layout.names, screened.start.tolist(), strict=False))

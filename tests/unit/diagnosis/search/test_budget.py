@@ -87,6 +87,27 @@ def test_a_search_without_allowance_ends_with_what_the_base_leads_to(monkeypatch
     assert not thorough.budget.is_exhausted
 
 
+@pytest.mark.parametrize(
+    ("lowest", "goes_on"),
+    [
+        ([], True),
+        ([5.0, 5.0], True),
+        ([5.0, 3.0, 3.0], True),
+        ([5.0, 3.0, 3.0, 3.0], False),
+        ([5.0, 3.0, 2.9, 2.8], False),
+        ([5.0, 3.0, 3.0, 2.7], True),
+    ],
+)
+def test_beyond_the_allowance_the_leading_model_grows_only_while_the_error_falls(monkeypatch, lowest, goes_on):
+    allow_nothing(monkeypatch)
+    made = a_search(thorough=False)
+    leading = made._most_evident()
+    monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: True)
+    monkeypatch.setattr(Search, "_is_expandable", lambda _self, h: h is leading)
+    made.tried.progress.lowest_errors[:] = lowest
+    assert made._next_to_expand() is (leading if goes_on else None)
+
+
 @pytest.mark.parametrize("thorough", [False, True])
 def test_a_diagnosis_says_that_not_all_was_tried(monkeypatch, thorough):
     allow_nothing(monkeypatch)
