@@ -38,9 +38,13 @@ def core(values: Values, scale: float) -> Core:
 
 def terms(values: Values, record: Record) -> Terms:
     """Return the factors (n,) of a logged speed that is over ground; none where no heading is measured, as in a plan."""
-    if "current_north" not in values or "heading" not in record.signals:
+    seen = record.angle_ok
+    if "current_north" not in values or not seen.any():
         return Terms()
-    heading, surge = record["heading"], record["surge"]
+    heading, surge = (
+        record.angle if seen.all() else np.interp(record.time, record.time[seen], record.angle[seen]),
+        record["surge"],
+    )
     along = values["current_north"] * np.cos(heading) + values["current_east"] * np.sin(heading)
     run = max(float(np.median(surge - along)) / record.speed, MIN_SPEED_RATIO)  # as the run's speed is that of its log
     factor = np.full(surge.size, run)
@@ -87,7 +91,7 @@ EFFECT = Effect(
                 Coefficient("current_north", "m/s", -1.5, 1.5, 0.0, scan=(-0.3, 0.3), says="the water's velocity to the north"),
                 Coefficient("current_east", "m/s", -1.5, 1.5, 0.0, scan=(-0.3, 0.3), says="to the east"),
             ),
-            needs=("surge", "heading"),
+            needs=("surge",),
             without=("current_sin", "current_cos"),
             beside=("speed_varying",),
         ),

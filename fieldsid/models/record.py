@@ -221,8 +221,6 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         turning = np.interp(run.time, run.time[rate_ok], rate[rate_ok]) if rate_ok.any() else None
         causes, fastest_s = causes_of(signals.get("thrust"), turning, held), SHORTEST_TIME_CONSTANT_S["surge"]
         signals["surge"] = surge_behind(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
-    if axis is Axis.YAW and angle_ok.any():
-        signals["heading"] = np.interp(run.time, run.time[angle_ok], angle[angle_ok])
     if run.has(names.cross):
         signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
     if along:

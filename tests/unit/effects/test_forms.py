@@ -177,8 +177,9 @@ def test_a_speed_over_ground_is_taken_through_the_water_where_a_heading_is_measu
     values = {"current_north": 0.3, "current_east": -0.2}
     plain = current.terms(values, log)
     assert not plain.has_factors
-    heading = np.linspace(0.0, 5.0, len(log))
-    turned = replace(log, signals={**log.signals, "heading": heading})
+    heading, seen = np.linspace(0.0, 5.0, len(log)), np.ones(len(log), bool)
+    seen[40:60] = False
+    turned = replace(log, angle=np.where(seen, heading, np.nan), angle_ok=seen)
     past = log["surge"] - 0.3 * np.cos(heading) + 0.2 * np.sin(heading)
     run = np.median(past) / log.speed
     terms = current.terms(values, turned)
