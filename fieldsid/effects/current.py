@@ -14,12 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.effects._speed_powers import MIN_SPEED_RATIO, speed_powers
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
-
-MIN_SPEED_RATIO = 0.05
-"""Share of the run's speed below which the water's speed past a hull is held, as in `speed_varying`."""
 
 
 def core(values: Values, scale: float) -> Core:
@@ -41,20 +39,11 @@ def terms(values: Values, record: Record) -> Terms:
     seen = record.angle_ok
     if "current_north" not in values or not seen.any():
         return Terms()
-    heading, surge = (
-        record.angle if seen.all() else np.interp(record.time, record.time[seen], record.angle[seen]),
-        record["surge"],
-    )
-    along = values["current_north"] * np.cos(heading) + values["current_east"] * np.sin(heading)
+    heading = record.angle if seen.all() else np.interp(record.time, record.time[seen], record.angle[seen])
+    surge, along = record["surge"], values["current_north"] * np.cos(heading) + values["current_east"] * np.sin(heading)
     run = max(float(np.median(surge - along)) / record.speed, MIN_SPEED_RATIO)  # as the run's speed is that of its log
-    factor = np.full(surge.size, run)
-    if "speed_share" not in values:
-        return Terms(damping_factor=factor, authority_factor=factor * factor, cross_factor=factor)
-    # that effect takes the logged speed over the run's: what is left is the one through the water over both
-    log = np.log(np.maximum((surge - along) / (run * np.maximum(surge, MIN_SPEED_RATIO * record.speed)), MIN_SPEED_RATIO))
-    within = run * np.exp(values["speed_share"] * log)
-    damping = run * np.exp(values["damping_share"] * log) if "damping_share" in values else within
-    return Terms(damping_factor=damping, authority_factor=within * within, cross_factor=within)
+    # `speed_varying` takes the logged speed over the run's: what is left is the one through the water over both
+    return speed_powers(values, (surge - along) / (run * np.maximum(surge, MIN_SPEED_RATIO * record.speed)), run)
 
 
 EFFECT = Effect(

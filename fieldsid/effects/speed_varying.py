@@ -7,15 +7,11 @@ damping and skin friction does not grow with the speed. Source: Fossen 2011, sec
 
 from __future__ import annotations
 
-import numpy as np
-
+from fieldsid.effects._speed_powers import speed_powers
 from fieldsid.errors import EffectError
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
-
-MIN_SPEED_RATIO = 0.05
-"""Share of the run's speed below which a hull that stops or backs is held, since the law has no meaning there."""
 
 
 def terms(values: Values, record: Record) -> Terms:
@@ -27,10 +23,7 @@ def terms(values: Values, record: Record) -> Terms:
             found=f"median surge {record.speed:.3g} m/s",
             hint="leave `speed_varying` out, or check the sign of the surge speed on import",
         )
-    log = np.log(np.maximum(surge / record.speed, MIN_SPEED_RATIO))  # one logarithm for all powers: half of their time
-    factor = np.exp(values["speed_share"] * log)
-    damping = np.exp(values["damping_share"] * log) if "damping_share" in values else factor
-    return Terms(damping_factor=damping, authority_factor=factor * factor, cross_factor=factor)
+    return speed_powers(values, surge / record.speed)
 
 
 EFFECT = Effect(

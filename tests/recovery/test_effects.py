@@ -92,9 +92,10 @@ def noisy(
     name: str,
     columns: tuple[str, ...],
     clock: Clock = CLOCK,
+    angle: float = 0.0,
 ) -> Run:
     """A run of a plan with the noise of a compass of 0.005 rad and a gyro of 0.003 rad/s."""
-    log = flown(physics, clock, plan)
+    log = flown(physics, clock, plan, angle=angle)
     log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(clock.time.size)
     log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(clock.time.size)
     return Run(name, log["time_s"], {c: log[c] for c in ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", *columns)})
@@ -202,13 +203,10 @@ def test_a_current_is_told_by_a_log_whose_speed_is_over_ground():
     for i, (ratio, heading) in enumerate(zip((0.7, 1.0, 1.4, 1.2, 0.85), (0.4, 2.6, 4.4, 1.2, 5.5), strict=True)):
         plan = maneuvers.pulses(time, 0.26, 0.15, recovery=4.0) if i % 2 else maneuvers.stairs(time, 0.25, length=6.0)
         physics = Physics(damping=1.1 * ratio, authority=-0.9 * ratio**2, nominal_speed=1.5 * ratio)
-        log = flown(physics, CLOCK, plan, angle=heading)
-        over_ground = log["surge_m_s"] + north * np.cos(log["yaw_rad"]) + east * np.sin(log["yaw_rad"])
-        log["surge_m_s"] = over_ground + 0.02 * rng.standard_normal(time.size)
-        log["yaw_rad"] = log["yaw_rad"] + 0.005 * rng.standard_normal(time.size)
-        log["yaw_rate_rad_s"] = log["yaw_rate_rad_s"] + 0.003 * rng.standard_normal(time.size)
-        columns = ("yaw_rad", "yaw_rate_rad_s", "rudder_rad", "surge_m_s")
-        runs.append(Run(f"r{i}", log["time_s"], {c: log[c] for c in columns}))
+        run = noisy(physics, plan, rng, f"r{i}", ("surge_m_s",), angle=heading)
+        past, yaw = run.signals["surge_m_s"], run.signals["yaw_rad"]
+        over_ground = past + north * np.cos(yaw) + east * np.sin(yaw) + 0.02 * rng.standard_normal(time.size)
+        runs.append(replace(run, signals={**run.signals, "surge_m_s": over_ground}))
     found = fs.diagnose(runs[:3], "yaw", validate=runs[3:])
     assert (found.verdict, found.effects) == ("effect", ("current",))
     assert found.final.validation.angle_rms_rad < 1.15 * 0.005 < 0.5 * found.base.validation.angle_rms_rad

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio, worst_error
@@ -115,33 +113,22 @@ def _fall(search: Search, found: ScoredModel, floor: Noise, runs: str) -> str:
     """
     base = search.base()
 
-    def falls(errors: Callable[[ScoredModel], Errors]) -> bool:
-        return errors(found).over(floor) < MAX_ERROR_RATIO * errors(base).over(floor)
+    def falls(before: Errors, after: Errors) -> bool:
+        return after.over(floor) < MAX_ERROR_RATIO * before.over(floor)
 
-    def size(errors: Callable[[ScoredModel], Errors]) -> str:
-        before, after = errors(base), errors(found)
+    def size(before: Errors, after: Errors) -> str:
         if search.is_noiseless:
             return f"from {before.sized()} to {after.sized()}"
         return f"from {before.over(floor):.2f} to {after.over(floor):.2f} x the noise floor"
 
-    if not search.validation or falls(_selected):
-        return f"the error on {runs} falls {size(_selected)}"
-    if falls(_settled):
-        alone = f"with the fitted runs' own it goes {size(_selected)}"
-        return f"with the numbers of all runs together the error on {runs} falls {size(_settled)}; {alone}"
-    return f"the error on the fitted runs goes {size(_fitted)}, that on {runs} {size(_selected)}"
-
-
-def _selected(h: ScoredModel) -> Errors:
-    return h.selection_errors
-
-
-def _settled(h: ScoredModel) -> Errors:
-    return h.unseen_errors[-1]
-
-
-def _fitted(h: ScoredModel) -> Errors:
-    return h.train
+    selected = base.selection_errors, found.selection_errors
+    if not search.validation or falls(*selected):
+        return f"the error on {runs} falls {size(*selected)}"
+    settled = base.unseen_errors[-1], found.unseen_errors[-1]
+    if falls(*settled):
+        alone = f"with the fitted runs' own it goes {size(*selected)}"
+        return f"with the numbers of all runs together the error on {runs} falls {size(*settled)}; {alone}"
+    return f"the error on the fitted runs goes {size(base.train, found.train)}, that on {runs} {size(*selected)}"
 
 
 def _disturbance(noise: Noise) -> str:

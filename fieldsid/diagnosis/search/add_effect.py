@@ -81,7 +81,7 @@ def add_effect(
         if flown
         else [(_output_error_linearisation(parent), True), (_likelihood_linearisation(parent), False)]
     )
-    left = [own for effect in left for own in mechanisms(effect)]
+    left = mechanisms(left)
     # both screens at once, then all that is to be followed at once: each sharing out costs a copy of the process
     asked = [(linearisation, effect) for linearisation, _ in grounds for effect in left]
     points = parallel.map(lambda of: _best_points(*of), asked)
@@ -121,10 +121,13 @@ def add_effect(
     return found if most is None else [w for w in found if not w.by_output_error or w is found[0] or _matters(w)]
 
 
-def mechanisms(effect: Effect) -> list[Effect]:
-    """Return an effect, and it in each of its variants that does without all of the textbook's coefficients."""
-    own = {c.name for c in effect.coefficients}
-    return [effect, *(with_variant(effect, form) for form in effect.variants if own <= set(form.without))]
+def mechanisms(effects: Sequence[Effect]) -> list[Effect]:
+    """Return effects, and after each it in the variants that do without all of the textbook's coefficients."""
+    found: list[Effect] = []
+    for effect in effects:
+        own = {c.name for c in effect.coefficients}
+        found += [effect, *(with_variant(effect, form) for form in effect.variants if own <= set(form.without))]
+    return found
 
 
 def first_few(ranked: Sequence[T], most: int | None, effect: Callable[[T], Effect]) -> list[T]:

@@ -45,8 +45,9 @@ class Search(MoveEvaluation):
         self._expand()
         self._grow_rivals()
         if self.leaves_visible_error():
-            self._fit_pairs([*self._all_in_series(), *self._all_beside()])
-            self._join_pairs()
+            pairs = [*self._all_in_series(), *self._all_beside()]
+            self._fit_pairs(pairs)
+            self._join_pairs(pairs)
         self._exchange_leaders()
         if self.leaves_visible_error():
             self._vary_states_in_series()
@@ -257,8 +258,7 @@ class Search(MoveEvaluation):
         Alone the state may gain nothing in one, as it takes up the actuator's response as well: a drift that the cross flow holds
         shows beside a slow servo only.
         """
-        pairs = (self.tried.get(self.root | {e.name for e in pair}) for pair in self._all_in_series())
-        if fitted := [h for h in pairs if h is not None]:
+        if fitted := self._fitted(self._all_in_series()):
             best = max(fitted, key=lambda h: h.log_evidence)
             self._try_variants([VariantRequest(best, {e.name for e in best.effects if e.extra_states})])
             if self.tried[key := frozenset(best.names)] is not best:
@@ -292,13 +292,16 @@ class Search(MoveEvaluation):
         for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
             self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
 
-    def _join_pairs(self) -> None:
+    def _fitted(self, pairs: Sequence[tuple[Effect, Effect]]) -> list[ScoredModel]:
+        """Return the models of the pairs that were tried."""
+        return [h for pair in pairs if (h := self.tried.get(self.root | {e.name for e in pair})) is not None]
+
+    def _join_pairs(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
         """Add to the model of the highest evidence the pairs that may show together only, where they gain any: see `_joined`.
 
         What stands for such a pair there is found idle beside it.
         """
-        best, pairs = self._most_evident(), [*self._all_in_series(), *self._all_beside()]
-        fitted = [h for pair in pairs if (h := self.tried.get(self.root | {e.name for e in pair})) and h is not best]
+        best, fitted = self._most_evident(), self._fitted(pairs)
         gaining = [h for h in fitted if gains_any_evidence(self.base(), h) and not set(h.names) <= set(best.names)]
         joined = self._joined(best, sorted(gaining, key=lambda h: -h.log_evidence)[:MAX_JOINED])
         self.tried.update({frozenset(h.names): h for h in joined})

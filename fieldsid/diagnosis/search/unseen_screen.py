@@ -37,10 +37,7 @@ def moves_of_all_runs(parent: ScoredModel, left: Sequence[Effect], parallel: Par
     start = carry_parameters(layout, (old, fitted.x))
     found = fit_output_error(problem, start, fitted.weights)
     ground = linearise_at(found.problem, found.x, found.weights)
-    points = sorted(
-        parallel.map(lambda e: screen_points(ground, e), [own for e in left for own in mechanisms(e)]),
-        key=lambda p: p[0].predicted_cost,
-    )
+    points = sorted(parallel.map(lambda e: screen_points(ground, e), mechanisms(left)), key=lambda p: p[0].predicted_cost)
     worth = (1.0 - MIN_OUTPUT_ERROR_COST_SHARE) * ground.cost
     first = first_few(points, MAX_EFFECTS_LATER, lambda p: p[0].effect)
     likely = [p[:1] for p in first if p[0].predicted_cost < worth]

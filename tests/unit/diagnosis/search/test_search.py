@@ -244,8 +244,8 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
 
 def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
     effects = all_effects(Axis.YAW)
-    assert [[c.name for c in e.coefficients] for e in mechanisms(effects["current"])] == [
+    assert [[c.name for c in e.coefficients] for e in mechanisms([effects["current"]])] == [
         ["current_sin", "current_cos"],
         ["current_north", "current_east"],
     ]
-    assert mechanisms(effects["crossflow_drag"]) == [effects["crossflow_drag"]]
+    assert mechanisms([effects["crossflow_drag"]]) == [effects["crossflow_drag"]]
