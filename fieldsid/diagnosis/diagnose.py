@@ -73,17 +73,19 @@ def diagnose(
     missing = [n for n in known if n in skipped]
     if missing:
         raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
-    work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
-    work.base()
-    if work.is_noiseless:
+    begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough)
+    work = begin()
+    with work.parallel:
+        work.base()
+        if not work.is_noiseless:
+            return _diagnosis(_best_result(work), skipped, notes)
         found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
         if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
             ending = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
             return _diagnosis(ending, skipped, notes)
-        work = Search(learned, unseen, axis, catalogue, known, report, thorough=thorough)
-    found = work.best()
-    ending = _search_result(work, found, joint_noise_fit(found.likelihood_fit, work.parallel))
-    return _diagnosis(ending, skipped, notes)
+    again = begin()
+    with again.parallel:
+        return _diagnosis(_best_result(again), skipped, notes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +105,11 @@ class _SearchResult:
     places: tuple[tuple[Place, ...], tuple[Note, ...]]
     leading: Sequence[ScoredModel]
     errors: Sequence[Pair]
+
+
+def _best_result(work: Search) -> _SearchResult:
+    found = work.best()
+    return _search_result(work, found, joint_noise_fit(found.likelihood_fit, work.parallel))
 
 
 def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verdict: Verdict | None = None) -> _SearchResult:

@@ -7,39 +7,56 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
 from io import BytesIO
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect, variant_of, with_variant
 from fieldsid.models.record import Record
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
+from fieldsid.runtime.lockstep import Lockstep
 from fieldsid.runtime.pickling import WorkerPickler, dumps
-from fieldsid.runtime.worker_pool import parallel_map
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 class ParallelMap:
-    """The objects that two processes share: records by their place, effects by their name, the counter of evaluations."""
+    """The objects that two processes share: records by their place, effects by their name, the counter of evaluations.
+
+    As a context it keeps its worker, see `Lockstep`; `state` is a number that is equal in two searches that have come to the same
+    place.
+    """
 
     def __init__(
-        self, records: Iterable[Record], effects: Iterable[Effect], evaluations: EvaluationCounter | None = None
-    ) -> None:
+        self, records: Iterable[Record], effects: Iterable[Effect], evaluations: EvaluationCounter | None = None,
+        state: Callable[[], int] = int,
+    ) -> None:  # fmt: skip
         self.records, self.evaluations = tuple(records), evaluations or EvaluationCounter()
         self.effects = {e.name: e for e in effects}
+        self._lockstep = Lockstep(self.dumps, self.loads, state)
+
+    def __enter__(self) -> Self:
+        self._lockstep.__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._lockstep.__exit__(*error)
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Return a function of every item as `worker_pool.parallel_map` does, and count the worker's evaluations."""
-        before = self.evaluations.count
+        """Return a function of every item as `Lockstep.map` does, and count the evaluations of each, whoever has done them."""
 
-        def read(answer: bytes) -> dict[int, R]:
-            done, evaluated = self.loads(answer)
-            self.evaluations.add(evaluated)
-            return dict(done)
+        @wraps(function)
+        def counted(item: T) -> tuple[R, int]:
+            before = self.evaluations.count
+            value = function(item)
+            used, self.evaluations.count = self.evaluations.count - before, before
+            return value, used
 
-        return parallel_map(function, items, lambda done: self.dumps((done, self.evaluations.count - before)), read)
+        done = self._lockstep.map(counted, items)
+        self.evaluations.add(sum(used for _, used in done))
+        return [value for value, _ in done]
 
     def dumps(self, value: object) -> bytes:
         """Return a value as bytes that `loads` reads."""

@@ -1,16 +1,8 @@
-"""Work shared with a forked worker: a copy of this process, made for one piece of work, that answers with bytes.
+"""Workers: copies of this process, each made for one piece of work, that answer with bytes.
 
-A worker sees all that this process holds without its being pickled; its answers alone are. A ProcessPoolExecutor of one worker
-(`concurrent.futures`), initialised once with the records, the effects and the compiled kernels, was measured against it on five
-runs of `sysid diagnose` (four yaw, one pitch; 3 or 5 logs of 44 to 57 s; medians of three; two cores):
-
-    forked workers, as here             1.29 to 2.13 s
-    executor, start method fork         1.39 to 2.35 s      8 to 10 % more, and every closure pickled with what it holds
-    executor, start method spawn        2.23 to 3.23 s     52 to 73 % more
-    one process, one core               1.72 to 3.01 s     30 to 45 % more
-
-Only spawn works on macOS and with other threads, and there a second process costs more than it saves: where this process cannot
-be forked (`can_fork`), it does all of the work itself.
+A worker sees all that this process holds without its being pickled; its answer alone is. Only spawn works on macOS and with other
+threads, and there a second process costs more than it saves (see lockstep.py): where this process cannot be forked (`can_fork`),
+it does all of the work itself.
 """
 
 from __future__ import annotations
@@ -21,21 +13,14 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Never, Self, TypeVar
-
-from fieldsid.runtime.pickling import dumps, loads
-
-T = TypeVar("T")
-R = TypeVar("R")
+from typing import Never, Self
 
 IS_WORKER = "FIELDSID_IS_WORKER"
 """What is set in the environment of a process that makes no copies of itself."""
 END_OF_ANSWER = b"end of answer"
 """The last bytes of a complete answer."""
-MAX_ITEMS = 256
-"""Largest number of items that are shared out: the number of an item is one byte."""
 PR_SET_PDEATHSIG = 1
 """The option of Linux's prctl(2) that names the signal a process gets when its parent ends."""
 
@@ -72,40 +57,13 @@ class Worker:
     def __exit__(self, error: object, *_more: object) -> None:
         if error is None and not self._has_died:
             self._stream.close()
-            _ending.append(self.process)
+            wait_later(self.process)
         else:
             self.kill()
 
 
 _ending: list[int] = []
 """Workers that have answered and whose end was not asked for; the system keeps a number of the last until this process ends."""
-
-
-def parallel_map(
-    function: Callable[[T], R], items: Sequence[T],
-    write: Callable[[dict[int, R]], bytes] = dumps, read: Callable[[bytes], dict[int, R]] = loads,
-) -> list[R]:  # fmt: skip
-    """Return function(item) of every item, in order; this process and a forked worker each take the next item left.
-
-    What the function changes is seen in one of the two processes only: all that matters must be in the value it returns. Values
-    come from the worker as the bytes of write, which read reads. Where the worker ends without an answer, its items are
-    evaluated here; an error of the function is raised here.
-    """
-    if not 1 < len(items) < MAX_ITEMS:
-        return [function(item) for item in items]
-    queue = job_queue(len(items))
-    try:
-        worker = fork_worker(lambda: write(dict(_taken(function, items, queue))))
-        if worker is None:
-            return [function(item) for item in items]
-        with worker:
-            done = dict(_taken(function, items, queue))
-            answer = worker.answer()
-    finally:
-        os.close(queue)
-    if answer is not None:
-        done |= read(answer)
-    return [done[i] if i in done else function(item) for i, item in enumerate(items)]
 
 
 def job_queue(count: int) -> int:
@@ -116,39 +74,51 @@ def job_queue(count: int) -> int:
     return source
 
 
-def _taken(function: Callable[[T], R], items: Sequence[T], queue: int) -> Iterator[tuple[int, R]]:
-    """Yield the places and values of the items that this process takes."""
-    while number := os.read(queue, 1):
-        yield number[0], function(items[number[0]])
-
-
 def fork_worker(work: Callable[[], bytes]) -> Worker | None:
     """Return a forked worker that does some work; None where this process cannot be forked.
 
     What the work changes is seen in the worker only; its output and its errors are seen nowhere. The worker ends with the process
     it was forked from, however that ends.
     """
-    if not can_fork():
-        return None
-    while _ending:
-        os.waitpid(_ending.pop(), 0)
-    parent = os.getpid()
     source, target = os.pipe()
-    try:
-        process = os.fork()
-    except OSError:  # where memory or processes are short
+    process = fork()
+    if process is None:
         os.close(source)
         os.close(target)
         return None
     if process == 0:
         os.close(source)
-        _work(work, target, parent)
+        _work(work, target)
     os.close(target)
     return Worker(process, source)
 
 
-def _work(work: Callable[[], bytes], target: int, parent: int) -> Never:
-    """Write the answer of the work and end the worker, without output and without what a process does at its end."""
+def fork() -> int | None:
+    """Copy this process, and return 0 in the worker, its number here; None where this process cannot be forked.
+
+    The worker has no output, and ends with this process. It must end by `os._exit`, whatever happens in it.
+    """
+    if not can_fork():
+        return None
+    while _ending:
+        os.waitpid(_ending.pop(), 0)
+    parent = os.getpid()
+    try:
+        process = os.fork()
+    except OSError:  # where memory or processes are short
+        return None
+    if process == 0:
+        _enter_worker(parent)
+    return process
+
+
+def wait_later(process: int) -> None:
+    """Have the end of a worker that ends waited for when the next one is forked."""
+    _ending.append(process)
+
+
+def _enter_worker(parent: int) -> None:
+    """Make this process a worker of its parent: without output, and with no workers of its own."""
     try:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:  # it ended before the signal was asked for
@@ -158,6 +128,13 @@ def _work(work: Callable[[], bytes], target: int, parent: int) -> Never:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
+    except BaseException:  # noqa: BLE001 - what it goes on to would be done twice
+        os._exit(1)
+
+
+def _work(work: Callable[[], bytes], target: int) -> Never:
+    """Write the answer of the work and end the worker, without what a process does at its end."""
+    try:
         answer = work()
         with os.fdopen(target, "wb") as stream:
             stream.write(answer + END_OF_ANSWER)

@@ -14,7 +14,7 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
-from fieldsid.runtime.worker_pool import parallel_map
+from fieldsid.runtime.lockstep import parallel_map
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import PROPORTIONAL, Wish, check_wish, design_gains
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at

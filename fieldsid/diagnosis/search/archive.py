@@ -16,14 +16,16 @@ Names = frozenset[str]
 class Progress:
     """What was done under one set of assumptions, by set of effects.
 
-    The spec that stands for it; whether it was expanded; the log evidence at which variants of its effects were tried; and the
-    specs that were fitted without each of their effects. The lowest error over the floor after each expansion.
+    The spec that stands for it; whether it was expanded; the log evidence at which variants of its effects were tried; the specs
+    that were fitted without each of their effects, and those whose effects were exchanged. The lowest error over the floor after
+    each expansion.
     """
 
     standing: dict[Names, ModelSpec] = field(default_factory=dict)
     expanded: set[Names] = field(default_factory=set)
     evidence_at_variants: dict[tuple[Names, Names], float] = field(default_factory=dict)
     thinned: set[ModelSpec] = field(default_factory=set)
+    exchanged: set[ModelSpec] = field(default_factory=set)
     lowest_errors: list[float] = field(default_factory=list)
 
 

@@ -107,9 +107,11 @@ class MoveEvaluation(SearchState):
         names = [n for n, free in known.items() if free and len(n) == len(key) + 1 and key < n and n not in self.tried]
 
         def fit_all(name: frozenset[str]) -> ScoredModel:
+            found = dict[frozenset[str], ScoredModel]()
             for free in known[name]:
-                self._fit_child(parent, free.problem, free.x, next(e for e in free.effects if e.name not in key))
-            return self.tried[name].evaluate_errors()
+                effect = next(e for e in free.effects if e.name not in key)
+                self._keep(self._fit_child(parent, free.problem, free.x, effect), found)
+            return found[name].evaluate_errors()
 
         self.tried.update(zip(names, self.parallel.map(fit_all, names), strict=True))
 
@@ -124,13 +126,16 @@ class MoveEvaluation(SearchState):
 
         def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel, list[FittedProblem], list[int]]:
             key = frozenset((*parent.names, group[0].screened.effect.name))
-            later = []
+            found = {key: self.tried[key]} if key in self.tried else {}
+            free, later = list(self.tried.free_runs.fits.get(key, ())), list[int]()
             for i, move in enumerate(group):
-                if every or key not in self.tried or not is_redundant_start(move, parent, self.tried[key]):
-                    self._evaluate_move(parent, move, rival)
+                if every or not found or not is_redundant_start(move, parent, found[key]):
+                    start, flown = self._start_of(parent, move)
+                    free += flown
+                    self._keep(self._fit_child(parent, move.screened.problem, start, move.screened.effect, rival), found)
                 else:
                     later.append(i)
-            return self.tried[key].evaluate_errors(), self.tried.free_runs.fits.get(key, []), later
+            return found[key].evaluate_errors(fitted=True), free, later
 
         left = []
         for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
@@ -139,22 +144,23 @@ class MoveEvaluation(SearchState):
             left += [group[i] for i in later]
         return left
 
-    def _evaluate_move(self, parent: ScoredModel, move: SearchMove, rival: float) -> None:
-        """Fit the model that a move leads to, and keep it where it has more evidence."""
-        screened, start = move.screened, move.screened.start
+    def _start_of(self, parent: ScoredModel, move: SearchMove) -> tuple[FloatArray, list[FittedProblem]]:
+        """Return where the model that a move leads to is fitted from, and its output-error fit where that is made first."""
+        screened = move.screened
         self.report("+".join((*parent.names, screened.effect.name)))
-        if move.by_output_error:
-            free = fit_output_error(screened.problem, start, parent.likelihood_fit.fitted.weights)
-            self.tried.free_runs.fits.setdefault(frozenset(free.names), []).append(free)
-            start = free.x
-        self._fit_child(parent, screened.problem, start, screened.effect, rival)
+        if not move.by_output_error:
+            return screened.start, []
+        free = fit_output_error(screened.problem, screened.start, parent.likelihood_fit.fitted.weights)
+        return free.x, [free]
 
-    def _fit_child(self, parent: ScoredModel, p: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf) -> None:
+    def _fit_child(
+        self, parent: ScoredModel, p: Problem, start: FloatArray, effect: Effect, rival: float = -np.inf
+    ) -> LikelihoodFit:  # fmt: skip
         """Fit by maximum likelihood from a start, and from the equivalent solution that has the same response at one speed."""
         ml_fit = fit_maximum_likelihood(
             p, start, parent.likelihood_fit.noise, self.resolution_floor, self.noise_kind, rival=rival
         )
-        self._keep(prefer_smaller_equivalent(ml_fit, effect))
+        return prefer_smaller_equivalent(ml_fit, effect)
 
     def _refit_from_best_child(self, key: frozenset[str]) -> None:
         """Fit a model again from its best child's parameters: the cost may have several local minima.

@@ -142,7 +142,7 @@ class Search(MoveEvaluation):
 
     def _exchange_leaders(self) -> None:
         """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn."""
-        exchanged = set[ModelSpec]()
+        exchanged = self.tried.progress.exchanged
         while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged:
             exchanged.add(spec)
             self._exchange_for_variants(best)
@@ -366,14 +366,11 @@ class Search(MoveEvaluation):
         if before is not None and any(e not in before.effects for e in problem.layout.effects):
             # in its variants the others' numbers may be far from those without it
             starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
+        found = {} if before is None else {frozenset(before.names): before}
         for start in starts:
-            kept = self._keep(
-                fit_maximum_likelihood(problem, start, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
-            )
-        key = frozenset(kept.names)
-        if kept is not before:
-            self.tried[key] = prefer_output_error(kept, self.floor)
-        return self.tried[key]
+            ml_fit = fit_maximum_likelihood(problem, start, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+            kept = self._keep(ml_fit, found)
+        return kept if kept is before else prefer_output_error(kept, self.floor)
 
 
 def _better_optimum(known: ScoredModel, h: ScoredModel) -> ScoredModel:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +20,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, Fitt
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search.archive import Archive
+from fieldsid.diagnosis.search.archive import Archive, Names
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.model_spec import Assumptions
 from fieldsid.diagnosis.search.speed_law_search import (
@@ -89,7 +89,12 @@ class SearchState:
         both = (*self.records, *self.validation)
         self.resolution_floor = self.floor = white_noise_floor(both)
         self.budget = Budget(len(both), np.inf) if self.thorough else Budget(len(both))
-        self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations)
+        self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations, self._place)
+
+    def _place(self) -> int:
+        """Return a number that is equal in two searches that have come to the same place."""
+        evidences = ((k, h.log_evidence if np.isfinite(h.log_evidence) else None) for k, h in self.tried.items())
+        return hash((self.budget.evaluations.count, self.tried.assumptions, tuple(evidences)))
 
     @property
     def noise_kind(self) -> str:
@@ -156,14 +161,16 @@ class SearchState:
         others = {name: h.with_own_moment(told) for name, h in self.tried.items() if h.own_moment != told}
         self.tried.update(others)
 
-    def _keep(self, ml_fit: LikelihoodFit) -> ScoredModel:
-        """Keep a fit where it has more evidence than the one known of its effects.
+    def _keep(self, ml_fit: LikelihoodFit, among: MutableMapping[Names, ScoredModel] | None = None) -> ScoredModel:
+        """Keep a fit where it has more evidence than the one known of its effects, and return that of these effects.
 
         The likelier one may validate worse: where two optima are about as likely after the training runs, as an event's at two
-        times, the validation runs decide.
+        times, the validation runs decide. `among` models of its own a function that is mapped keeps it: what it changes here is
+        seen in one process only.
         """
+        tried = self.tried if among is None else among
         key = frozenset(ml_fit.fitted.names)
-        known, cost = self.tried.get(key), bic_penalty(ml_fit, self.validation)
+        known, cost = tried.get(key), bic_penalty(ml_fit, self.validation)
         lead = (
             np.inf
             if known is None
@@ -171,8 +178,8 @@ class SearchState:
         )
         if lead > -RIVAL_LOG_ODDS and abs(lead) > SAME_OPTIMUM:
             found = score_model(ml_fit, self.validation)
-            self.tried[key] = found if known is None or found.log_evidence > known.log_evidence else known
-        return self.tried[key]
+            tried[key] = found if known is None or found.log_evidence > known.log_evidence else known
+        return tried[key]
 
     def _children(self, key: frozenset[str]) -> list[ScoredModel]:
         """Return the models of one effect more that were tried, the best first."""

@@ -19,7 +19,7 @@ from fieldsid.planning.design.leg import Leg
 from fieldsid.planning.flight.excitation import Excitation, Window
 from fieldsid.planning.safety.envelope import Envelope, check_room, check_speeds
 from fieldsid.planning.specify.accuracy_goals import accuracy_goals_text
-from fieldsid.runtime.worker_pool import parallel_map
+from fieldsid.runtime.lockstep import parallel_map
 
 SHORTEST_WINDOW_S = 15.0
 MOST_PASSES = 40

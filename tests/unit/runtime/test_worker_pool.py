@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from fieldsid.runtime import worker_pool
-from fieldsid.runtime.worker_pool import can_fork, fork_worker, parallel_map
+from fieldsid.runtime.worker_pool import can_fork, fork_worker
 
 
 def answer_of(work):
@@ -81,39 +81,6 @@ def in_time(is_so, seconds):
     while not (done := is_so()) and time.monotonic() < end:
         time.sleep(0.01)
     return done
-
-
-@pytest.mark.forks
-@pytest.mark.parametrize("which", ["worker", "parent"])
-def test_an_error_of_the_function_is_raised_and_leaves_no_process(which):
-    here = os.getpid()
-
-    def fails(item):
-        if (os.getpid() == here) is (which == "parent"):
-            return 1 // 0
-        time.sleep(0.05)
-        return item
-
-    if which == "parent":
-        with pytest.raises(ZeroDivisionError):
-            parallel_map(fails, range(8))
-    else:  # what the worker died of is done here, where it does not fail
-        assert parallel_map(fails, range(8)) == list(range(8))
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
-
-
-@pytest.mark.forks
-def test_what_a_worker_died_of_is_done_here():
-    here = os.getpid()
-
-    def dies_elsewhere(item):
-        if os.getpid() != here:
-            os._exit(9)
-        time.sleep(0.01)
-        return item
-
-    assert parallel_map(dies_elsewhere, range(12)) == list(range(12))
 
 
 @pytest.mark.forks
