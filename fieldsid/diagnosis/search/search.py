@@ -141,9 +141,12 @@ class Search(MoveEvaluation):
         return alike and len(self.known) < len(h.names) <= len(best.names) and self.admissible(h)
 
     def _exchange_leaders(self) -> None:
-        """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn."""
+        """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
+
+        That goes on as long as the budget lasts: what leads after an exchange differs from what led before it by less each time.
+        """
         exchanged = self.tried.progress.exchanged
-        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged:
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (not exchanged or self.may_go_on()):
             exchanged.add(spec)
             self._exchange_for_variants(best)
             self._exchange_for_lookalikes(self._most_evident())
