@@ -62,10 +62,15 @@ class KernelInputs:
 def fin_path(record: Record, effects: Sequence[Effect], values: Values, commanded: FinPath | None = None) -> FinPath:
     """Return the fin angle over the intervals after the actuator effects, in their order, of the log's or another command."""
     path = record.commanded if commanded is None else commanded
-    for effect in sorted((e for e in effects if e.fin is not None), key=lambda e: e.order):
+    for effect in in_order(effects):
         if effect.fin is not None:
             path = effect.fin(path, values, record)
     return path
+
+
+def in_order(effects: Sequence[Effect]) -> list[Effect]:
+    """Return the actuator effects in the order that the command goes through them."""
+    return sorted((e for e in effects if e.fin is not None), key=attrgetter("order"))
 
 
 def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:

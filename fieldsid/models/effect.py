@@ -123,11 +123,6 @@ class Terms:
     damping: FloatArray | None = None
     cross_factor: FloatArray | None = None
 
-    @property
-    def has_factors(self) -> bool:
-        """Whether any part is a factor."""
-        return not (self.damping_factor is None and self.authority_factor is None and self.cross_factor is None)
-
     def beside(self, other: Terms) -> Terms:
         """Return the parts of two effects together: the products of the factors, the sums of the additions."""
         return Terms(*(_joined(getattr(self, part), getattr(other, part), how) for part, how in TERM_PARTS.items()))

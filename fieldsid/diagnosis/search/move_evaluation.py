@@ -9,6 +9,7 @@ import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import (
     gains_any_evidence,
+    gains_evidence,
     gains_training_evidence,
     is_accepted,
     leaves_error,
@@ -198,12 +199,12 @@ class MoveEvaluation(SearchState):
     def _try_laws_and_variants(self, key: frozenset[str], names: Sequence[frozenset[str]], *, every: bool = False) -> None:
         """Try another speed law and other variants of the effects for some children, kept where they have more evidence.
 
-        Where no child gains evidence and the parent's error is large, or with `every`, all children are tried: the missing effect
-        may be any of them in another variant.
+        Where no child gains evidence over all runs and the parent's error is large, or with `every`, all children are tried: the
+        missing effect may be any of them in another variant, whatever follows the training runs alone.
         """
         parent = self.tried[key]
         lost = every or (
-            self.error_ratio(parent) > MISSING_ERROR_RATIO and not any(gains_any_evidence(parent, self.tried[n]) for n in names)
+            self.error_ratio(parent) > MISSING_ERROR_RATIO and not any(gains_evidence(parent, self.tried[n]) for n in names)
         )
         names = [frozenset(c.names) for c in self._children(key)] if lost else names
         # forms of what the parent has were tried on it: the best child tries them again, and the one that goes on

@@ -51,6 +51,7 @@ class Search(MoveEvaluation):
         self._exchange_leaders()
         if self.leaves_visible_error():
             self._vary_states_in_series()
+            self._expand()
             self._exchange_leaders()
         found = self.best_admissible()
         nothing = frozenset(found.names) == self.root  # the textbook variants may all be screened out

@@ -17,20 +17,17 @@ from fieldsid.dynamics.assemble import (
     combined_core,
     combined_terms,
     constants_of,
-    cross_factor_of,
-    cross_input_of,
-    damping_of,
     fin_path,
+    in_order,
     integrate_record,
     measured,
-    moments_of,
     scaled_fin,
 )
 from fieldsid.dynamics.assemble import DAMPING as OF_DAMPING
 from fieldsid.dynamics.assemble import STIFFNESS as OF_STIFFNESS
 from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout
 from fieldsid.models.axis import NAMES
-from fieldsid.models.effect import Core, Effect, Motion, Terms, Values, over_intervals
+from fieldsid.models.effect import TERM_PARTS, Core, Effect, Motion, Terms, Values, over_intervals
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import over_reference
@@ -70,6 +67,8 @@ class Sensitivities:
     arrays: KernelInputs
     others: dict[str, Terms] = field(default_factory=dict, init=False, repr=False)
     """The terms of all effects but one, by its name, as far as they were asked for."""
+    paths: dict[str, FinPath] = field(default_factory=dict, init=False, repr=False)
+    """The fin's path before one of the effects, by its name, as far as it was asked for."""
 
     def integrate(self, slots: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Return motion (n, 3) before the sensor, and a stack (1 + P, 2, n): room for a residual, and the sensitivities."""
@@ -250,12 +249,10 @@ class Sensitivities:
             return {MOMENT[0]: (1.0, slope[:-1]), MOMENT[1]: (1.0, slope[1:])}, None
         step = coefficient.step
         high, low = min(self.values[name] + step, coefficient.high), max(self.values[name] - step, coefficient.low)
-        ends = [self.values | {name: value} for value in (high, low)]
-        above, below = (self._drives_of_effect(owner, values) for values in ends)
+        ends = (self.values | {name: high}, self.values | {name: low})
         width = high - low
-        changes = {place: value - below[place] for place, value in above.items()}
         drives: dict[int, tuple[float, FloatArray | None]] = {
-            place: (1.0 / width, c) if isinstance(c, np.ndarray) else (c / width, None) for place, c in changes.items()
+            place: (1.0 / width, change) for place, change in self._changes(owner, *ends).items()
         }
         if owner.core is None:
             return drives, None
@@ -265,30 +262,59 @@ class Sensitivities:
             drives[CROSS_INPUT] = ((up.cross_fin - down.cross_fin) / width, self.arrays.fin.mean)
         return drives, (constants_of(up) - constants_of(down)) / width
 
-    def _drives_of_effect(self, owner: Effect, values: Values) -> dict[int, FloatArray | float]:
-        """Return what an effect changes of the drives outside of its core, by their place, at these values; up to a constant."""
-        record, drives = self.record, dict[int, FloatArray | float]()
-        own = None if owner.terms is None else owner.terms(values, record)
-        moves_fin = owner.fin is not None
-        if moves_fin or (own is not None and own.has_factors):
-            fin = fin_path(record, self.layout.effects, values) if moves_fin else self.arrays.fin
-            terms = self.arrays.terms if own is None else self._terms_beside(owner).beside(own)
-            drives[MOMENT[0]], drives[MOMENT[1]] = moments_of(self.base, fin, terms)
-            if moves_fin:
-                drives[CROSS_INPUT] = cross_input_of(fin, self.arrays.core)
-            if own is not None:
-                drives[OF_DAMPING], drives[CROSS_FACTOR] = damping_of(self.base, terms), cross_factor_of(terms)
-        elif own is not None:
-            if own.moment is not None:
-                drives[MOMENT[0]], drives[MOMENT[1]] = own.moment[:-1], own.moment[1:]
-            if own.damping is not None:
-                drives[OF_DAMPING] = over_intervals(own.damping)
+    def _changes(self, owner: Effect, above: Values, below: Values) -> dict[int, FloatArray]:
+        """Return what an effect changes of the drives outside of its core from the one values to the other, (n-1,) by place."""
+        record = self.record
+        if owner.fin is not None:
+            return self._changes_of_fin(*(self._path_behind(owner, values) for values in (above, below)))
+        changes = (
+            {} if owner.terms is None else self._changes_of_terms(owner, owner.terms(above, record), owner.terms(below, record))
+        )
         if owner.moment is not None:
             path = integrate_record(record, self.arrays, self.start)
-            moment = owner.moment(Motion(path[:, 0], path[:, 1]), values, record)
+            motion = Motion(path[:, 0], path[:, 1])
+            moment = owner.moment(motion, above, record) - owner.moment(motion, below, record)
             for place, side in zip(MOMENT, (moment[:-1], moment[1:]), strict=True):
-                drives[place] = side + drives[place] if place in drives else side
-        return drives
+                changes[place] = side + changes[place] if place in changes else side
+        return changes
+
+    def _path_behind(self, owner: Effect, values: Values) -> FinPath:
+        """Return the fin's path with an actuator effect's numbers at other values; what comes before it is computed once."""
+        chain = in_order(self.layout.effects)
+        place = chain.index(owner)
+        if owner.name not in self.paths:
+            self.paths[owner.name] = fin_path(self.record, chain[:place], self.values)
+        return fin_path(self.record, chain[place:], values, self.paths[owner.name])
+
+    def _changes_of_fin(self, above: FinPath, below: FinPath) -> dict[int, FloatArray]:
+        b, terms, core = self.base.authority, self.arrays.terms, self.arrays.core
+        sides = zip(MOMENT, scaled_fin(above, terms), scaled_fin(below, terms), strict=True)
+        changes = {place: b * (up - down) for place, up, down in sides}
+        if core.cross_fin != 0.0:
+            changes[CROSS_INPUT] = core.cross_fin * (above.mean - below.mean)
+        return changes
+
+    def _changes_of_terms(self, owner: Effect, above: Terms, below: Terms) -> dict[int, FloatArray]:
+        changes, base, fin = dict[int, FloatArray](), self.base, self.arrays.fin
+        change = _change_beside(above, below, self._terms_beside(owner))
+
+        def add(place: int, by: FloatArray) -> None:
+            changes[place] = changes[place] + by if place in changes else by
+
+        if (factor := change.authority_factor) is not None:
+            held = base.trim if base.trim_of_fin else 0.0
+            add(MOMENT[0], (base.authority * fin.start + held) * factor[:-1])
+            add(MOMENT[1], (base.authority * fin.end + held) * factor[1:])
+        if (moment := change.moment) is not None:
+            add(MOMENT[0], moment[:-1])
+            add(MOMENT[1], moment[1:])
+        if change.damping_factor is not None:
+            add(OF_DAMPING, base.damping * over_intervals(change.damping_factor))
+        if change.damping is not None:
+            add(OF_DAMPING, over_intervals(change.damping))
+        if change.cross_factor is not None:
+            add(CROSS_FACTOR, over_intervals(change.cross_factor))
+        return changes
 
     def _terms_beside(self, owner: Effect) -> Terms:
         """Return the terms of all effects but one, computed once."""
@@ -332,6 +358,18 @@ class Sensitivities:
                 measured(_moved(motion, direction, step), self.record, sensors, self.values), shown, step
             )
         return out
+
+
+def _change_beside(above: Terms, below: Terms, beside: Terms) -> Terms:
+    """Return the change of each part from one effect's terms to others of it, the factors times those of the effects beside."""
+    changes: dict[str, FloatArray] = {}
+    for part, how in TERM_PARTS.items():
+        up, down, other = (getattr(terms, part) for terms in (above, below, beside))
+        if up is not None or down is not None:
+            is_factor = how is np.multiply
+            change = (float(is_factor) if up is None else up) - (float(is_factor) if down is None else down)
+            changes[part] = np.asarray(change * other if is_factor and other is not None else change)
+    return Terms(**changes)
 
 
 def _difference_quotient(plus: Motion, minus: Motion, step: float) -> FloatArray:

@@ -176,7 +176,7 @@ def test_a_speed_over_ground_is_taken_through_the_water_where_a_heading_is_measu
     log, current = record(faster=True), pick_effect("current")
     values = {"current_north": 0.3, "current_east": -0.2}
     plain = current.terms(values, log)
-    assert not plain.has_factors
+    assert (plain.authority_factor, plain.damping_factor, plain.cross_factor) == (None, None, None)
     heading, seen = np.linspace(0.0, 5.0, len(log)), np.ones(len(log), bool)
     seen[40:60] = False
     turned = replace(log, angle=np.where(seen, heading, np.nan), angle_ok=seen)
