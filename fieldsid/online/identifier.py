@@ -91,7 +91,7 @@ class OnlineIdentifier:
         self._filter: SampleFilter | None = None
         self._by_rate = by_rate
         self._first_time = nan
-        self._window = np.full((NOISE_WINDOW, 3), nan)
+        self._window = np.full((NOISE_WINDOW, 4), nan)
         self._contradiction: str | None = None
         self._seen, self._noise = 0, (MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S)
         self._speed_sum, self._speeds = 0.0, 0
@@ -121,7 +121,7 @@ class OnlineIdentifier:
         before = fed.counts["repeated"] + fed.counts["late"]
         used = fed.push(time, fin, angle, rate, is_held=fin_is_held)
         if fed.counts["repeated"] + fed.counts["late"] == before and isfinite(time):
-            self._hear(time, angle, rate)
+            self._hear(time, angle, rate, fin)
         return used
 
     @property
@@ -212,28 +212,28 @@ class OnlineIdentifier:
     def _new_filter(self) -> SampleFilter:
         return SampleFilter(stiff=self._stiff, by_rate=bool(self._by_rate), **self._settings)
 
-    def _hear(self, time: float, angle: float, rate: float) -> None:
+    def _hear(self, time: float, angle: float, rate: float, fin: float) -> None:
         """Keep a sample for the noise of the sensors, and learn that now and then."""
         unwrapped = self._filter.newest_angle if self._filter is not None and isfinite(angle) else nan
-        self._window[self._seen % NOISE_WINDOW] = time, unwrapped, rate
+        self._window[self._seen % NOISE_WINDOW] = time, unwrapped, rate, fin
         self._seen += 1
         if self._seen % NOISE_EVERY == 0:
             self._contradiction = None
-            found = [white_noise_std(np.nan_to_num(c), np.isfinite(c)) for c in self._recent().T[1:]]
+            found = [white_noise_std(np.nan_to_num(c), np.isfinite(c)) for c in self._recent().T[1:3]]
             least = MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
             self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
 
     def _recent(self) -> FloatArray:
-        """Return time, angle and rate of the last samples, (NOISE_WINDOW, 3), NaN before the first."""
+        """Return time, angle, rate and fin of the last samples, (NOISE_WINDOW, 4), NaN before the first."""
         return np.roll(self._window, -(self._seen % NOISE_WINDOW), axis=0)
 
     def _contradicted(self) -> str:
-        """Return how angle and rate contradict each other, looked for once in NOISE_EVERY samples."""
+        """Return how angle and rate contradict each other, or are taken for the fin: looked for once in NOISE_EVERY samples."""
         if self._contradiction is None and self._seen >= NOISE_EVERY:
-            time, angle, rate = self._recent()[-self._seen :].T
+            time, angle, rate, fin = self._recent()[-self._seen :].T
             begun = int(np.flatnonzero(np.diff(time, prepend=inf) <= 0.0)[-1])  # where its clock last started again
             names, part = NAMES[self.axis], slice(begun, None)
-            run = Run("live", time[part], {names.angle: angle[part], names.rate: rate[part]})
+            run = Run("live", time[part], {names.angle: angle[part], names.rate: rate[part], names.fin: fin[part]})
             both = run.has(names.angle) and run.has(names.rate)
             self._contradiction = contradiction(run, names.angle, names.rate) if both else ""
         return self._contradiction or ""

@@ -188,6 +188,13 @@ def test_an_angle_and_a_rate_that_contradict_each_other_are_said_after_a_few_sec
     assert again.estimate().contradiction == told[-1]
 
 
+def test_a_heading_and_a_fin_in_each_others_place_are_said():
+    time, fin, angle, rate = flown(count=1200)
+    right, swapped = (fed(OnlineIdentifier("yaw"), (time, *pair, rate)) for pair in ((fin, angle), (angle, fin)))
+    assert right.estimate().contradiction == ""
+    assert "two columns are swapped" in swapped.estimate().contradiction
+
+
 def test_a_clock_that_starts_again_and_a_rate_that_is_missing_contradict_nothing():
     time, fin, angle, rate = (s.tolist() for s in flown(count=900))
     online = OnlineIdentifier("yaw")
