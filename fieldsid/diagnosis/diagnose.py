@@ -120,7 +120,7 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
         model = final_model(h)
         return model, as_flown(model, work.validation)
 
-    # at once, whatever the verdict will be: each sharing out costs a copy of the process
+    # at once, whatever the verdict will be: at the end of each sharing out one process waits for the other
     parts: list[Callable[[], Any]] = [
         partial(refitted, found),
         partial(residual_tests, ml_fit),

@@ -9,7 +9,7 @@ import pickle
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from io import BytesIO
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect, variant_of, with_variant
@@ -22,11 +22,10 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-class ParallelMap:
+class ParallelMap(Lockstep):
     """The objects that two processes share: records by their place, effects by their name, the counter of evaluations.
 
-    As a context it keeps its worker, see `Lockstep`; `state` is a number that is equal in two searches that have come to the same
-    place.
+    `state` is a number that is equal in two searches that have come to the same place.
     """
 
     def __init__(
@@ -35,14 +34,7 @@ class ParallelMap:
     ) -> None:  # fmt: skip
         self.records, self.evaluations = tuple(records), evaluations or EvaluationCounter()
         self.effects = {e.name: e for e in effects}
-        self._lockstep = Lockstep(self.dumps, self.loads, state)
-
-    def __enter__(self) -> Self:
-        self._lockstep.__enter__()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._lockstep.__exit__(*error)
+        super().__init__(self.dumps, self.loads, state)
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
         """Return a function of every item as `Lockstep.map` does, and count the evaluations of each, whoever has done them."""
@@ -54,7 +46,7 @@ class ParallelMap:
             used, self.evaluations.count = self.evaluations.count - before, before
             return value, used
 
-        done = self._lockstep.map(counted, items)
+        done = super().map(counted, items)
         self.evaluations.add(sum(used for _, used in done))
         return [value for value, _ in done]
 

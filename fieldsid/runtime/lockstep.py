@@ -4,6 +4,10 @@ A worker that is forked for one map costs a copy of this process's page tables, 
 A search of a few seconds has thirty maps: its worker is forked at the first of them and kept. It goes through what is between the
 maps itself, and at each takes items as this process does. What both have worked out is exchanged, and read by both from the same
 bytes, so that both hold equal values and come to the same next map; a worker that has not come there ends, and another is forked.
+
+On three cases of the second bank, two processes of a worker for each map took 4.6 to 5.4 s of processor time and 120,000 to
+146,000 page faults where one process alone took 3.5 to 4.0 s; with the worker kept they take 4.2 to 4.9 s and 17,000 to
+20,000.
 """
 
 from __future__ import annotations

@@ -178,12 +178,9 @@ class ScoredModel:
         """Return the root mean square over training and validation runs of the error over a noise floor."""
         return float(np.sqrt(np.mean([run.over(floor) ** 2 for run in self.errors.runs])))
 
-    def evaluate_errors(self, *, fitted: bool = False) -> ScoredModel:
-        """Return itself with the selection errors computed, so that the process that fitted it computes them too.
-
-        `fitted`: the errors on the training runs as well.
-        """
-        _ = self.errors if fitted else self.selection_errors
+    def evaluate_errors(self) -> ScoredModel:
+        """Return itself with its errors computed, so that the process that fitted it computes them too."""
+        _ = self.errors
         return self
 
     @property

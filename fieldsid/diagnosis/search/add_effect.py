@@ -82,7 +82,7 @@ def add_effect(
         else [(_output_error_linearisation(parent), True), (_likelihood_linearisation(parent), False)]
     )
     left = mechanisms(left)
-    # both screens at once, then all that is to be followed at once: each sharing out costs a copy of the process
+    # both screens at once, then all that is to be followed: at the end of each sharing out one process waits for the other
     asked = [(linearisation, effect) for linearisation, _ in grounds for effect in left]
     points = parallel.map(lambda of: _best_points(*of), asked)
     steps: list[_PendingMove] = []

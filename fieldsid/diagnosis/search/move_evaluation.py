@@ -136,7 +136,7 @@ class MoveEvaluation(SearchState):
                     self._keep(self._fit_child(parent, move.screened.problem, start, move.screened.effect, rival), found)
                 else:
                     later.append(i)
-            return found[key].evaluate_errors(fitted=True), free, later
+            return found[key].evaluate_errors(), free, later
 
         left = []
         for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
@@ -192,7 +192,7 @@ class MoveEvaluation(SearchState):
 
         def flown(child: ScoredModel) -> ScoredModel:
             free = self.tried.free_runs.fits.get(frozenset(child.names), ())
-            return prefer_output_error(child, self.floor, parent, free).evaluate_errors(fitted=True)
+            return prefer_output_error(child, self.floor, parent, free).evaluate_errors()
 
         self.tried.update({frozenset(child.names): child for child in self.parallel.map(flown, children)})
 

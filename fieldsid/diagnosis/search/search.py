@@ -117,7 +117,7 @@ class Search(MoveEvaluation):
             problem = here.problem.with_effects([*best.effects, *(e for e in others[i].effects if e.name not in best.names)])
             start = carry_parameters(problem.layout, here.vector, there.fitted.vector)
             ml_fit = fit_maximum_likelihood(problem, start, there.noise, self.resolution_floor, self.noise_kind)
-            return prefer_output_error(score_model(ml_fit, self.validation), self.floor).evaluate_errors(fitted=True)
+            return prefer_output_error(score_model(ml_fit, self.validation), self.floor).evaluate_errors()
 
         return self.parallel.map(join, range(len(others)))
 
@@ -292,7 +292,7 @@ class Search(MoveEvaluation):
             self._keep(ml_fit)
         new = [h for key, h in self.tried.items() if h is not before.get(key)]
         found = [h for h in new if h.likelihood_fit.log_likelihood > rival]
-        flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(fitted=True), found)
+        flown = self.parallel.map(lambda h: prefer_output_error(h, self.floor).evaluate_errors(), found)
         for h, known in ((h, before.get(frozenset(h.names))) for h in flown):
             self.tried[frozenset(h.names)] = h if known is None else _better_optimum(known, h)
 
@@ -322,7 +322,7 @@ class Search(MoveEvaluation):
             return False
         self.tried.progress.thinned.add(spec)
         effects = [e for e in h.effects if e.name not in self.known]
-        less = self.parallel.map(lambda gone: self._drop_effect(h, gone).evaluate_errors(fitted=True), effects)
+        less = self.parallel.map(lambda gone: self._drop_effect(h, gone).evaluate_errors(), effects)
         self.tried.update({frozenset(w.names): w for w in less})
         return True
 

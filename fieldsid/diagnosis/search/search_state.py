@@ -192,7 +192,7 @@ class SearchState:
         def better(name: frozenset[str]) -> ScoredModel:
             known = self.tried[name]
             other = other_speed_law(known, self.resolution_floor, self.noise_kind, asks_for_more=leaves_error(known, self.floor))
-            return known if other is None else prefer_output_error(other, self.floor).evaluate_errors(fitted=True)
+            return known if other is None else prefer_output_error(other, self.floor).evaluate_errors()
 
         self.tried.update(zip(names, self.parallel.map(better, names), strict=True))
 

@@ -63,7 +63,7 @@ class FormSearch:
         while left:
             best = zip(left, self._best_variants([asked[i] for i in left]), strict=True)
             likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
-            formed = self.parallel.map(lambda of: prefer_output_error(of[1], self.floor).evaluate_errors(fitted=True), likely)
+            formed = self.parallel.map(lambda of: prefer_output_error(of[1], self.floor).evaluate_errors(), likely)
             taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if keeps_error(asked[i].model, variant)}
             for i, variant in taken.items():
                 asked[i] = replace(asked[i], model=variant)

@@ -274,8 +274,7 @@ class Sensitivities:
             path = integrate_record(record, self.arrays, self.start)
             motion = Motion(path[:, 0], path[:, 1])
             moment = owner.moment(motion, above, record) - owner.moment(motion, below, record)
-            for place, side in zip(MOMENT, (moment[:-1], moment[1:]), strict=True):
-                changes[place] = side + changes[place] if place in changes else side
+            _add_moment(changes, moment)
         return changes
 
     def _path_behind(self, owner: Effect, values: Values) -> FinPath:
@@ -297,23 +296,18 @@ class Sensitivities:
     def _changes_of_terms(self, owner: Effect, above: Terms, below: Terms) -> dict[int, FloatArray]:
         changes, base, fin = dict[int, FloatArray](), self.base, self.arrays.fin
         change = _change_beside(above, below, self._terms_beside(owner))
-
-        def add(place: int, by: FloatArray) -> None:
-            changes[place] = changes[place] + by if place in changes else by
-
         if (factor := change.authority_factor) is not None:
             held = base.trim if base.trim_of_fin else 0.0
-            add(MOMENT[0], (base.authority * fin.start + held) * factor[:-1])
-            add(MOMENT[1], (base.authority * fin.end + held) * factor[1:])
-        if (moment := change.moment) is not None:
-            add(MOMENT[0], moment[:-1])
-            add(MOMENT[1], moment[1:])
+            changes[MOMENT[0]] = (base.authority * fin.start + held) * factor[:-1]
+            changes[MOMENT[1]] = (base.authority * fin.end + held) * factor[1:]
+        if change.moment is not None:
+            _add_moment(changes, change.moment)
         if change.damping_factor is not None:
-            add(OF_DAMPING, base.damping * over_intervals(change.damping_factor))
+            _add(changes, OF_DAMPING, base.damping * over_intervals(change.damping_factor))
         if change.damping is not None:
-            add(OF_DAMPING, over_intervals(change.damping))
+            _add(changes, OF_DAMPING, over_intervals(change.damping))
         if change.cross_factor is not None:
-            add(CROSS_FACTOR, over_intervals(change.cross_factor))
+            changes[CROSS_FACTOR] = over_intervals(change.cross_factor)
         return changes
 
     def _terms_beside(self, owner: Effect) -> Terms:
@@ -358,6 +352,16 @@ class Sensitivities:
                 measured(_moved(motion, direction, step), self.record, sensors, self.values), shown, step
             )
         return out
+
+
+def _add_moment(changes: dict[int, FloatArray], moment: FloatArray) -> None:
+    """Add the change of a moment at the samples (n,) to those of the drives, at both ends of each interval."""
+    for place, side in zip(MOMENT, (moment[:-1], moment[1:]), strict=True):
+        _add(changes, place, side)
+
+
+def _add(changes: dict[int, FloatArray], place: int, change: FloatArray) -> None:
+    changes[place] = changes[place] + change if place in changes else change
 
 
 def _change_beside(above: Terms, below: Terms, beside: Terms) -> Terms:
