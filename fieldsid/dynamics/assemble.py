@@ -70,7 +70,8 @@ def fin_path(record: Record, effects: Sequence[Effect], values: Values, commande
 
 def in_order(effects: Sequence[Effect]) -> list[Effect]:
     """Return the actuator effects in the order that the command goes through them."""
-    return sorted((e for e in effects if e.fin is not None), key=attrgetter("order"))
+    own = [e for e in effects if e.fin is not None]
+    return own if len(own) < 2 else sorted(own, key=attrgetter("order"))
 
 
 def combined_terms(record: Record, effects: Sequence[Effect], values: Values) -> Terms:

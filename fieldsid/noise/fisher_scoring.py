@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.models.record import Record
-from fieldsid.noise.innovations import kalman_filter
+from fieldsid.noise.innovations import filter_of, kalman_filter
 from fieldsid.noise.kalman.full_batched import LANES, full_filter_batched
 from fieldsid.noise.noise_kinds import IS_STANDARD_DEVIATION
 from fieldsid.numerics.arrays import FloatArray
@@ -91,12 +91,12 @@ def _moved(
     record: Record, a: float, k: float, noise: FloatArray, place: npt.NDArray[np.int64], residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return innovations and their spreads (P, 2, n) with each of the noise's numbers moved but the first."""
-    series = np.ascontiguousarray(residual[None])
+    series, kalman = np.ascontiguousarray(residual[None]), filter_of(noise)
     standardised, innovation_std = np.empty((place.size, 1, *residual.shape)), np.empty((place.size, *residual.shape))
-    for row, p in enumerate(place[1:], 1):
+    for row, p in enumerate(place.tolist()[1:], 1):
         moved = noise.copy()
         moved[p] *= STEP_FACTOR
-        kalman_filter(record.nominal_steps, record.ok, a, k, moved, series, standardised[row], innovation_std[row])
+        kalman(record.nominal_steps, record.ok, a, k, moved, series, standardised[row], innovation_std[row])
     return standardised[:, 0], innovation_std
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.noise.noise_kinds import NOISE_KINDS
+from fieldsid.noise.noise_kinds import NOISE_KINDS, Filter
 from fieldsid.numerics.arrays import FloatArray
 
 FILTERS = tuple((kind.filter, kind.absent) for kind in NOISE_KINDS.values())
@@ -26,7 +26,13 @@ def kalman_filter(
     spreads: FloatArray,
 ) -> float:
     """Do what `innovations` does, and fill spreads (2, n) with their standard deviations, one where not measured."""
-    return next(f for f, absent in FILTERS if not any(noise[i] for i in absent))(steps, ok, a, k, noise, series, out, spreads)
+    return filter_of(noise)(steps, ok, a, k, noise, series, out, spreads)
+
+
+def filter_of(noise: FloatArray) -> Filter:
+    """Return the filter of the first kind that holds all of a noise vector (7,)."""
+    sizes = noise.tolist()
+    return next(f for f, absent in FILTERS if not any(sizes[i] for i in absent))
 
 
 def innovations(

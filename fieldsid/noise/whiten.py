@@ -9,6 +9,8 @@ A constant moment of the run's own is whitened after it (moment_response.py).
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 
 from fieldsid.models.model import Noise
@@ -18,13 +20,14 @@ from fieldsid.noise.moment_response import base_responses, without_common_moment
 from fieldsid.noise.noise_kinds import NOISE_FIELDS
 from fieldsid.numerics.arrays import FloatArray
 
+_FIELDS = attrgetter(*NOISE_FIELDS)
 MIN_DAMPING_1_S = 1e-3
 """Damping in 1/s of the base through which noise acts, at least: a residual does not grow where nonlinear damping holds it."""
 
 
 def noise_vector(noise: Noise) -> FloatArray:
     """Return the stationary part of a noise record as the vector the filter takes, (7,)."""
-    return np.array([getattr(noise, name) for name in NOISE_FIELDS])
+    return np.array(_FIELDS(noise))
 
 
 def is_white(noise: Noise) -> bool:

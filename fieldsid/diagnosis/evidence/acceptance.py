@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fieldsid.diagnosis.evidence.likelihood_fit import measured_count
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.thresholds import (
@@ -108,6 +109,19 @@ def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence on the training runs alone, enough to be tried further."""
     gain = with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()
     return bool(gain > with_.trial_penalty - without.trial_penalty)
+
+
+def lacks(h: ScoredModel, best: ScoredModel) -> float:
+    """Return the log evidence that one model lacks to another, or what it lacks on the training runs alone in proportion to all.
+
+    The least of the two: what follows the training runs as the other does will mostly follow the validation runs as well.
+    """
+    records = h.likelihood_fit.fitted.problem.records
+    share = measured_count(records) / measured_count((*records, *h.validation))
+    on_training = (
+        best.log_likelihood_by_run.sum() - h.log_likelihood_by_run.sum() - best.complexity_penalty + h.complexity_penalty
+    )
+    return min(best.log_evidence - h.log_evidence, float(on_training) / share)
 
 
 def worst_error(h: ScoredModel, floor: Noise) -> float:

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, fit_output_error, measured_count
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, LikelihoodFit, fit_output_error, measured_count
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, price_of_runs
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
@@ -77,9 +77,9 @@ def add_effect(
     if not np.isfinite(parent.likelihood_fit.log_likelihood):
         return []
     grounds = (
-        [(_likelihood_linearisation(parent), False)]
+        [(likelihood_linearisation(parent), False)]
         if flown
-        else [(_output_error_linearisation(parent), True), (_likelihood_linearisation(parent), False)]
+        else [(_output_error_linearisation(parent), True), (likelihood_linearisation(parent), False)]
     )
     left = mechanisms(left)
     # both screens at once, then all that is to be followed: at the end of each sharing out one process waits for the other
@@ -140,6 +140,12 @@ def first_few(ranked: Sequence[T], most: int | None, effect: Callable[[T], Effec
     return list(ranked[:end])
 
 
+def may_gain(parent: ScoredModel, linearisation: Linearisation, effect: Effect) -> bool:
+    """Whether an effect may gain a model log evidence enough, to first order at the best of its scan points."""
+    predicted = screen_points(linearisation, effect)[0].predicted_cost
+    return linearisation.cost - predicted > _least_cost_fall(parent, effect, 0.0)
+
+
 def _least_cost_fall(parent: ScoredModel, effect: Effect, behind: float) -> float:
     """Return the fall of the training runs' whitened cost below which an effect cannot gain log evidence enough.
 
@@ -175,16 +181,15 @@ def by_effect(found: Sequence[SearchMove]) -> list[list[SearchMove]]:
     return list(groups.values())
 
 
-def is_redundant_start(move: SearchMove, parent: ScoredModel, known: ScoredModel) -> bool:
+def is_redundant_start(move: SearchMove, parent: ScoredModel, known: LikelihoodFit) -> bool:
     """Whether another start of the same model has reached the cost this move predicts, with its events at similar times."""
-    fitted, cost = known.likelihood_fit.fitted, move.screened.predicted_cost
+    fitted, cost = known.fitted, move.screened.predicted_cost
     if fitted.problem.layout.names == move.screened.problem.layout.names and _starts_apart(move.screened, fitted.x):
         return False
     if move.by_output_error:
         return cost_of(fitted.problem, fitted.x, move.linearisation.noise) < (1.0 + MIN_OUTPUT_ERROR_COST_SHARE) * cost
     return (
-        known.likelihood_fit.log_likelihood - parent.likelihood_fit.log_likelihood
-        > 0.5 * (move.linearisation.cost - cost) - MIN_LIKELIHOOD_GAIN
+        known.log_likelihood - parent.likelihood_fit.log_likelihood > 0.5 * (move.linearisation.cost - cost) - MIN_LIKELIHOOD_GAIN
     )
 
 
@@ -203,7 +208,8 @@ def _output_error_linearisation(parent: ScoredModel) -> Linearisation:
     return linearise_at(free_run.problem, free_run.x, free_run.weights)
 
 
-def _likelihood_linearisation(parent: ScoredModel) -> Linearisation:
+def likelihood_linearisation(parent: ScoredModel) -> Linearisation:
+    """Return the linearisation of a model at its maximum-likelihood fit, under the noise of that."""
     fitted = parent.likelihood_fit.fitted
     return linearise_at(fitted.problem, fitted.x, parent.likelihood_fit.noise)
 

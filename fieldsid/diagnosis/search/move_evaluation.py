@@ -24,7 +24,8 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
     fit_output_error,
     prefer_smaller_equivalent,
 )
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.evidence.predictive_density import most_log_density
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
 from fieldsid.diagnosis.search.add_effect import (
     MAX_EFFECTS_AT_BASE,
     MAX_EFFECTS_LATER,
@@ -36,7 +37,7 @@ from fieldsid.diagnosis.search.add_effect import (
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
@@ -117,33 +118,49 @@ class MoveEvaluation(SearchState):
         self.tried.update(zip(names, self.parallel.map(fit_all, names), strict=True))
 
     def _evaluate_moves(
-        self, parent: ScoredModel, groups: Sequence[Sequence[SearchMove]], *, every: bool = False
+        self, parent: ScoredModel, groups: Sequence[Sequence[SearchMove]], *, every: bool = False, near: ScoredModel | None = None
     ) -> list[SearchMove]:
         """Evaluate the moves of each effect; return those left out because an earlier start has reached their predicted cost.
 
         `every` leaves none out. All moves are compared with the same rival, so that the result does not depend on their order.
+        What cannot come near a model is not kept, where one is given.
         """
         rival = max((h.likelihood_fit.log_likelihood for h in self._children(frozenset(parent.names))), default=-np.inf)
 
-        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel, list[FittedProblem], list[int]]:
+        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[FittedProblem], list[int]]:
             key = frozenset((*parent.names, group[0].screened.effect.name))
             found = {key: self.tried[key]} if key in self.tried else {}
             free, later = list(self.tried.free_runs.fits.get(key, ())), list[int]()
+            fits = [h.likelihood_fit for h in found.values()]
             for i, move in enumerate(group):
-                if every or not found or not is_redundant_start(move, parent, found[key]):
+                if every or not fits or not is_redundant_start(move, parent, max(fits, key=lambda f: f.log_likelihood)):
                     start, flown = self._start_of(parent, move)
                     free += flown
-                    self._keep(self._fit_child(parent, move.screened.problem, start, move.screened.effect, rival), found)
+                    fits.append(self._fit_child(parent, move.screened.problem, start, move.screened.effect, rival))
+                    if near is None or self._may_come_near(near, fits[-1]):
+                        self._keep(fits[-1], found)
                 else:
                     later.append(i)
-            return found[key].evaluate_errors(), free, later
+            return found[key].evaluate_errors() if found else None, free, later
 
         left = []
         for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
-            key = frozenset(found.names)
-            self.tried[key], self.tried.free_runs.fits[key] = found, free
+            key = frozenset((*parent.names, group[0].screened.effect.name))
+            self.tried.free_runs.fits[key] = free
+            if found is not None:
+                self.tried[key] = found
             left += [group[i] for i in later]
         return left
+
+    def _may_come_near(self, h: ScoredModel, ml_fit: LikelihoodFit) -> bool:
+        """Whether a fit may come near a model by log evidence, if it left nothing of the validation runs but the noise.
+
+        Nor more than the model leaves; by chance it may leave less, which counts as much as a model near it lacks.
+        """
+        unseen = max(most_log_density(self.validation, self.floor), float(h.validation_log_density.sum()))
+        most, least = ml_fit.log_likelihood + unseen, h.log_evidence - 2.0 * ALTERNATIVE_LOG_ODDS
+        # the penalty, none of which is below nothing, asks for a linearisation
+        return most > least and most - bic_penalty(ml_fit, self.validation) > least
 
     def _start_of(self, parent: ScoredModel, move: SearchMove) -> tuple[FloatArray, list[FittedProblem]]:
         """Return where the model that a move leads to is fitted from, and its output-error fit where that is made first."""

@@ -9,21 +9,16 @@ from itertools import chain
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, leaves_error, lowers_error, worst_error
+from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, lacks, leaves_error, lowers_error, worst_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
-from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, add_effect, by_effect
+from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, add_effect, by_effect, likelihood_linearisation, may_gain
 from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MoveEvaluation
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import (
-    ALTERNATIVE_LOG_ODDS,
-    MAX_ERROR_RATIO,
-    MISSING_ERROR_RATIO,
-    RIVAL_LOG_ODDS,
-)
+from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect, Stage, with_variant
@@ -106,15 +101,16 @@ class Search(MoveEvaluation):
     def _joined(self, best: ScoredModel, others: Sequence[ScoredModel]) -> list[ScoredModel]:
         """Return a model with what each of others has besides, fitted from their numbers.
 
-        Itself where that set was tried, or comes before in the list.
+        Itself where that set was tried, or comes before in the list, and where one effect more promises no log evidence.
         """
-        sets = [frozenset((*best.names, *h.names)) for h in others]
+        sets, linearisation = [frozenset((*best.names, *h.names)) for h in others], likelihood_linearisation(best)
 
         def join(i: int) -> ScoredModel:
-            if sets[i] in self.tried or sets[i] in sets[:i]:
-                return best
             here, there = best.likelihood_fit.fitted, others[i].likelihood_fit
-            problem = here.problem.with_effects([*best.effects, *(e for e in others[i].effects if e.name not in best.names)])
+            new = [e for e in others[i].effects if e.name not in best.names]
+            if sets[i] in self.tried or sets[i] in sets[:i] or (len(new) == 1 and not may_gain(best, linearisation, *new)):
+                return best
+            problem = here.problem.with_effects([*best.effects, *new])
             start = carry_parameters(problem.layout, here.vector, there.fitted.vector)
             ml_fit = fit_maximum_likelihood(problem, start, there.noise, self.resolution_floor, self.noise_kind)
             return prefer_output_error(score_model(ml_fit, self.validation), self.floor).evaluate_errors()
@@ -131,9 +127,13 @@ class Search(MoveEvaluation):
         for h in [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]:
             if self.may_go_on():
                 left = [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
-                behind = best.log_evidence - h.log_evidence - RIVAL_LOG_ODDS
-                moves = add_effect(h, left, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True, behind=max(behind, 0.0))
-                self._evaluate_moves(h, by_effect(moves))
+                self._add_to_rival(h, left, best)
+
+    def _add_to_rival(self, h: ScoredModel, effects: Sequence[Effect], best: ScoredModel) -> None:
+        """Add to a model the effects that, to first order, may bring it near the best by log evidence."""
+        behind = max(lacks(h, best) - RIVAL_LOG_ODDS, 0.0)
+        moves = add_effect(h, effects, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True, behind=behind)
+        self._evaluate_moves(h, by_effect(moves), near=best)
 
     def _predicts_as_well(self, h: ScoredModel, best: ScoredModel) -> bool:
         """Whether an accepted set of no more effects, some at least, leaves nothing missing on fitted nor on unseen runs."""
@@ -169,25 +169,32 @@ class Search(MoveEvaluation):
         self._try_variants(asked)
 
     def _exchange_for_lookalikes(self, best: ScoredModel) -> None:
-        """Try a model with each effect exchanged for what it may be mistaken for, from its numbers.
+        """Try a model with each effect exchanged for what it may be mistaken for.
 
-        The screens are of first order: where one stands for a lag of a sample, the lag itself may have passed none, or ended at a
-        worse optimum beside the others. And an effect in another variant may stand for its textbook's and one of those. What
-        comes so near that a variant could lead is tried in its variants.
+        Where one stands for a lag of a sample, the lag itself may have passed no screen of a model without what the others have
+        since added, or ended at a worse optimum. And an effect in another variant may stand for its textbook's and one of those,
+        which is fitted from its numbers. What comes so near that a variant could lead is tried in its variants.
         """
+        self._drop_each(best)
         for stands in (e for e in best.effects if e.name not in self.known):
             others = [e for e in best.effects if e is not stands]
             alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
-            sets = [others] if len(best.names) > len(self.known) + 1 else []
-            sets += [[*others, e] for e in self.catalogue if e.name == stands.name and stands.is_formed]
-            for effects in sets:
-                parent = self._moved(best, effects)
-                self._evaluate_moves(parent, by_effect(add_effect(parent, alike, None, self.parallel, anew=False, flown=True)))
-                keys = [frozenset((*parent.names, e.name)) for e in alike]
-                near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
-                self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
+            if len(best.names) > len(self.known) + 1:
+                self._add_to_rival(self.tried[frozenset(best.names) - {stands.name}], alike, best)
+                self._try_variants_near(best, others, alike)
+            for textbook in (e for e in self.catalogue if e.name == stands.name and stands.is_formed):
+                parent = self._moved(best, [*others, textbook])
+                moves = by_effect(add_effect(parent, alike, None, self.parallel, anew=False, flown=True))
+                self._evaluate_moves(parent, moves, near=best)
+                self._try_variants_near(best, parent.effects, alike)
             if stands.is_formed and len(others) == len(self.known):
                 self._fit_pairs([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
+
+    def _try_variants_near(self, best: ScoredModel, others: Sequence[Effect], alike: Sequence[Effect]) -> None:
+        """Try what comes near the best by log evidence, some effects and one more, with what it does not share in variants."""
+        keys = [frozenset((*(e.name for e in others), one.name)) for one in alike]
+        near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
+        self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:

@@ -44,8 +44,10 @@ def line_start(time: FloatArray, values: npt.NDArray[np.float64], noise: float) 
     """Return the value at time 0 of a line through samples (m,), and its standard error; None for too few of them."""
     if time.size < FEWEST_SAMPLES:
         return None
-    columns = np.column_stack([np.ones(time.size), time])
-    solved = np.linalg.lstsq(columns, values, rcond=None)[0]
-    left = values - columns @ solved
+    middle = float(time.mean())
+    off = time - middle
+    square = float(off @ off)
+    mean, slope = float(values.mean()), float(off @ values) / square
+    left = values - mean - slope * off
     spread = max(float(np.sqrt(left @ left / (time.size - 2))), noise)
-    return float(solved[0]), spread * float(np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0]))
+    return mean - slope * middle, spread * float(np.sqrt(1.0 / time.size + middle**2 / square))

@@ -135,7 +135,7 @@ def levenberg_marquardt(
     x[index] = np.clip(x[index], low, high)
     hill = _Objective(problem, noise, slots, dynamics_of(problem, x), prior, linear_white(problem, noise, slots))
     cost, normal, gradient = hill.linear(x)
-    done, count = False, 0
+    done, refused, count = False, False, 0
     while count < max_iterations and not done and np.isfinite(cost):
         count += 1
         step = bounded_step(normal, gradient, damping, x[index], low, high)
@@ -151,9 +151,10 @@ def levenberg_marquardt(
             # no step was refused: where so little is left to gain it is there, and nobody need look
             x, cost, done = trial, cost - expected, True
             break
-        # the first step is hardly ever refused: its equations come with its cost
-        new, equations = hill.at(trial, whole=count == 1 and expected > tolerance * cost)
-        if new < cost:
+        # a step is hardly ever refused where the last was not: its equations come with its cost
+        new, equations = hill.at(trial, whole=not refused and expected > tolerance * cost)
+        refused = not new < cost
+        if not refused:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
             x = trial
             damping = max(damping * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)

@@ -108,13 +108,13 @@ class _Step:
 
 def _step(problem: Problem, x: FloatArray, faster: float, floor: Noise) -> _Step | None:
     """Return the step to the best correction to first order; None where the motion diverges."""
-    record, shared = problem.records[0], problem.layout.shared
-    result = problem.linearise(x, 0)
+    record, shared, moves = problem.records[0], problem.layout.shared, _moves(problem, x)
+    result = problem.linearise(x, 0, [*np.flatnonzero(moves).tolist(), *range(shared, x.size)])
     if not np.isfinite(result.stack).all():
         return None
     slopes = np.zeros((x.size, *result.residual.shape))
     slopes[list(result.columns)] = result.sensitivity * record.ok
-    columns = np.concatenate([slopes[shared:], np.tensordot(_moves(problem, x), slopes[:shared], axes=1)[None]])
+    columns = np.concatenate([slopes[shared:], np.tensordot(moves, slopes[:shared], axes=1)[None]])
     weight = channel_weights(record, result.residual, floor)[:, None]
     flat, left = (columns * weight).reshape(columns.shape[0], -1), (result.residual * weight).ravel()
     gram, right = flat @ flat.T, flat @ left

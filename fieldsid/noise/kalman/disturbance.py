@@ -60,7 +60,7 @@ def disturbance_filter(
     steps: FloatArray, ok: npt.NDArray[np.bool_], a: float, k: float, noise: FloatArray,
     series: FloatArray, out: FloatArray, spreads: FloatArray,
 ) -> float:  # fmt: skip
-    """Do what `dispatch.kalman_filter` does, written out for the symmetric covariance; without a disturbance too."""
+    """Do what `innovations.kalman_filter` does, written out for the symmetric covariance; without a disturbance too."""
     n, log_sum, settled, i, last_h = steps.shape[0] + 1, 0.0, 0, 0, -1.0
     state, m = np.zeros((series.shape[0], 3)), np.empty((3, 5))
     c00, c01, c02, c11, c12, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, noise[2] ** 2

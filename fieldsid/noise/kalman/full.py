@@ -35,7 +35,7 @@ def full_filter(
     steps: FloatArray, ok: npt.NDArray[np.bool_], a: float, k: float, noise: FloatArray,
     series: FloatArray, out: FloatArray, spreads: FloatArray,
 ) -> float:  # fmt: skip
-    """Do what `dispatch.kalman_filter` does, written out for the symmetric covariance of all five states.
+    """Do what `innovations.kalman_filter` does, written out for the symmetric covariance of all five states.
 
     Sensor noise correlated over half a minute keeps the gains from becoming constant within a run: all time is spent in the
     general part.

@@ -14,7 +14,7 @@ from fieldsid.numerics.jit import jit
 def sensor_colour_filter(
     steps: FloatArray, ok: npt.NDArray[np.bool_], noise: FloatArray, series: FloatArray, out: FloatArray, spreads: FloatArray
 ) -> float:
-    """Do what `dispatch.kalman_filter` does where nothing moves but what the sensors show."""
+    """Do what `innovations.kalman_filter` does where nothing moves but what the sensors show."""
     n, log_sum = steps.shape[0] + 1, 0.0
     state = np.empty(series.shape[0])
     for ch in range(2):

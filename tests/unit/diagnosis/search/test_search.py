@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.diagnosis.evidence.acceptance import lacks
+from fieldsid.diagnosis.evidence.likelihood_fit import measured_count
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
-from fieldsid.diagnosis.search.add_effect import add_effect, by_effect, mechanisms
+from fieldsid.diagnosis.search.add_effect import add_effect, by_effect, likelihood_linearisation, may_gain, mechanisms
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
@@ -91,6 +93,7 @@ def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(
     made._grow_rivals()
     assert frozenset(["delay", "servo_lag"]) not in made.tried  # it lacks far more evidence than a small effect could bring
     monkeypatch.setattr(search, "RIVAL_LOG_ODDS", best.log_evidence - made.tried[frozenset(["delay"])].log_evidence)
+    monkeypatch.setattr(Search, "_may_come_near", lambda *_: True)
     made._grow_rivals()
     assert frozenset(["delay", "servo_lag"]) in made.tried
 
@@ -104,12 +107,47 @@ def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(mon
     made._evaluate_moves(base, by_effect(add_effect(base, both, None, made.parallel, anew=False, flown=True)))
     children = [made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias")]
     monkeypatch.setattr(search, "gains_any_evidence", lambda *_: True)
+    monkeypatch.setattr(search, "may_gain", lambda *_: True)  # there is no such bias
     monkeypatch.setattr(search, "leaves_error", lambda *_: not ends)
     made._join_children(children, base)
     joined = frozenset(["servo_lag", "gyro_bias"])
     assert (joined in made.tried) is not ends
     if not ends:
         assert made.tried[joined].model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
+
+
+@pytest.mark.parametrize("promises", [False, True])
+def test_what_promises_no_evidence_beside_the_best_is_not_joined_to_it(monkeypatch, promises):
+    made = search_for("servo_lag", "delay", "gyro_bias")
+    effects = all_effects(Axis.YAW)
+    base = made.base()
+    both = [effects[n] for n in ("servo_lag", "gyro_bias")]
+    made._evaluate_moves(base, by_effect(add_effect(base, both, None, made.parallel, anew=False, flown=True)))
+    lag, bias = (made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias"))
+    assert may_gain(base, likelihood_linearisation(base), lag.effects[0])
+    assert not may_gain(lag, likelihood_linearisation(lag), bias.effects[0])
+    monkeypatch.setattr(search, "may_gain", lambda *_: promises)
+    (joined,) = made._joined(lag, [bias])
+    assert (joined is lag) is not promises
+
+
+def test_a_model_lacks_no_more_evidence_than_on_the_training_runs_in_proportion(base):
+    h = base.base()
+    more = replace(h, validation_log_density=h.validation_log_density + 100.0)
+    assert lacks(h, more) == 0.0
+    both = replace(more, log_likelihood_by_run=h.log_likelihood_by_run + 10.0 / len(h.log_likelihood_by_run))
+    share = measured_count(base.records) / measured_count((*base.records, *base.validation))
+    assert lacks(h, both) == pytest.approx(10.0 / share)
+    assert lacks(both, h) == pytest.approx(-100.0 * len(h.validation_log_density) - 10.0)
+
+
+@pytest.mark.parametrize("behind", [0.0, 1e4])
+def test_what_cannot_come_near_a_model_is_not_kept(behind):
+    made = search_for("servo_lag", "delay")
+    base, lag = made.base(), all_effects(Axis.YAW)["servo_lag"]
+    moves = by_effect(add_effect(base, [lag], None, made.parallel, anew=False, flown=True))
+    made._evaluate_moves(base, moves, near=replace(base, complexity_penalty=base.complexity_penalty - behind))
+    assert (frozenset(["servo_lag"]) in made.tried) is (behind == 0.0)
 
 
 def test_models_without_children_are_joined_with_nothing(base):

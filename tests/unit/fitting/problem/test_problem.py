@@ -23,7 +23,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import effect_named, with_variant
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
-from fieldsid.numerics.gram_least_squares import gram_least_squares
+from fieldsid.numerics.gram_least_squares import SINGULAR_EIGENVALUE_SHARE, gram_least_squares, solve_normal_equations
 
 NOISE = Noise(0.005, 0.004)
 
@@ -157,6 +157,17 @@ def test_least_squares_by_products_are_those_of_the_rows_themselves():
     twice = gram_least_squares(columns, target)
     assert twice[3] == pytest.approx(twice[0])
     assert twice[4] == 0.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_normal_equations_are_solved_as_by_eigenvalues_however_dependent_the_columns(seed):
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((6, 300))
+    columns[4] = columns[0] - 2.0 * columns[1] + 10.0 ** (-seed / 2) * columns[4]
+    gram, right = columns @ columns.T, columns @ rng.standard_normal(300)
+    found, size = solve_normal_equations(gram, right), np.sqrt(np.diag(gram))
+    best = np.linalg.lstsq(gram / np.outer(size, size), right / size, rcond=SINGULAR_EIGENVALUE_SHARE)[0] / size
+    np.testing.assert_allclose(found @ columns, best @ columns, atol=1e-4)
 
 
 def test_a_hidden_state_that_is_not_driven_starts_at_zero():
