@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -80,9 +82,8 @@ class MoveEvaluation(SearchState):
 
     def _refine_children(self, key: frozenset[str]) -> None:
         """Fit a model again from its best child, its leading children by output error and under other laws and variants."""
-        if self.may_go_on():
-            self._refit_from_best_child(key)
-        self._prefer_output_error(key)
+        if self._prefer_output_error(key, refit=self.may_go_on()):
+            self._prefer_output_error(key, refit=False)
         if self.may_go_on():
             self._try_laws_and_variants(key, self._leading(key))
 
@@ -180,21 +181,21 @@ class MoveEvaluation(SearchState):
         )
         return prefer_smaller_equivalent(ml_fit, effect)
 
-    def _refit_from_best_child(self, key: frozenset[str]) -> None:
-        """Fit a model again from its best child's parameters: the cost may have several local minima.
+    def _takes_refit(self, key: frozenset[str], again: LikelihoodFit) -> bool:
+        """Keep a model fitted again from its best child's parameters where that has more evidence; return whether it has.
 
-        Where that has more evidence, the leading children are fitted again from the new parameters.
+        The cost may have several local minima. The leading children are then fitted again from the new parameters.
         """
-        child, parent = next(iter(self._children(key)), None), self.tried[key]
-        again = self._fit_from(parent, child) if child else parent.likelihood_fit
-        if again.log_likelihood > parent.likelihood_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
-            better = prefer_output_error(score_model(again, self.validation), self.floor)
-            if better.log_evidence > parent.log_evidence:
-                self.tried[key] = parent = better
-                for ml_fit in self.parallel.map(
-                    lambda child: self._fit_from(child, parent), self._children(key)[:LEADING_CHILDREN]
-                ):
-                    self._keep(ml_fit)
+        parent = self.tried[key]
+        if again.log_likelihood <= parent.likelihood_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
+            return False
+        better = prefer_output_error(score_model(again, self.validation), self.floor)
+        if better.log_evidence <= parent.log_evidence:
+            return False
+        self.tried[key] = better
+        for ml_fit in self.parallel.map(lambda child: self._fit_from(child, better), self._children(key)[:LEADING_CHILDREN]):
+            self._keep(ml_fit)
+        return True
 
     def _fit_from(self, h: ScoredModel, other: ScoredModel) -> LikelihoodFit:
         """Fit a model from another model's parameters where that has them, from its own elsewhere."""
@@ -202,16 +203,26 @@ class MoveEvaluation(SearchState):
         x = carry_parameters(here.problem.layout, there.vector, here.vector)
         return fit_maximum_likelihood(here.problem, x, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
 
-    def _prefer_output_error(self, key: frozenset[str]) -> None:
-        """Give the leading children with more evidence than their parent their output-error fit, where that validates better."""
-        parent = self.tried[key]
-        children = [c for c in self._children(key)[:LEADING_CHILDREN] if c.log_evidence > parent.log_evidence]
+    def _prefer_output_error(self, key: frozenset[str], *, refit: bool) -> bool:
+        """Give the leading children with more evidence than their parent their output-error fit, where that validates better.
+
+        `refit`: beside that the parent is fitted again from the best child. Returns whether it was better so: then the children
+        are those before their output-error fits.
+        """
+        parent, leading = self.tried[key], self._children(key)[:LEADING_CHILDREN]
 
         def flown(child: ScoredModel) -> ScoredModel:
             free = self.tried.free_runs.fits.get(frozenset(child.names), ())
             return prefer_output_error(child, self.floor, parent, free).evaluate_errors()
 
-        self.tried.update({frozenset(child.names): child for child in self.parallel.map(flown, children)})
+        jobs: list[Callable[[], Any]] = [partial(self._fit_from, parent, child) for child in leading[:1] if refit]
+        again = len(jobs)
+        jobs += [partial(flown, child) for child in leading if child.log_evidence > parent.log_evidence]
+        done = self.parallel.map(lambda job: job(), jobs)
+        if again and self._takes_refit(key, done[0]):
+            return True
+        self.tried.update({frozenset(child.names): child for child in done[again:]})
+        return False
 
     def _try_laws_and_variants(self, key: frozenset[str], names: Sequence[frozenset[str]], *, every: bool = False) -> None:
         """Try another speed law and other variants of the effects for some children, kept where they have more evidence.

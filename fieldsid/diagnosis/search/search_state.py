@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,6 +49,15 @@ SAME_OPTIMUM = 1e-3
 """Log likelihood within which two fits of the same effects have ended at the same optimum."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """The log evidence of each accepted set at a floor, assumptions and models, kept so that no other has their identity."""
+
+    at: tuple[object, ...]
+    models: tuple[ScoredModel, ...]
+    evidences: Mapping[Names, float]
+
+
 @dataclass(slots=True)
 class SearchState:
     """Everything tried so far on one set of runs, by the set of effects; known effects are part of its base."""
@@ -83,6 +92,8 @@ class SearchState:
     parallel: ParallelMap = field(init=False)
 
     budget: Budget = field(init=False)
+
+    _sums: _Sums | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Compare models down to the sensors' noise until the error of the base model is known."""
@@ -244,13 +255,17 @@ class SearchState:
         """Return the fitted models that lack one of a model's effects."""
         return [w for _, w in self._without_each(h)]
 
-    def evidences(self) -> dict[frozenset[str], float]:
+    def evidences(self) -> Mapping[frozenset[str], float]:
         """Return the log evidence of each accepted set: log sum exp over the models whose accepted effects are that set."""
-        sums: dict[frozenset[str], float] = {}
-        for h in self.ranked():
-            core = self.core_of(h)
-            sums[core] = float(np.logaddexp(sums.get(core, -np.inf), h.log_evidence))
-        return sums
+        models = tuple(self.tried.values())
+        at = (self.floor, self.tried.assumptions, *map(id, models))
+        if self._sums is None or self._sums.at != at:
+            sums: dict[frozenset[str], float] = {}
+            for h in self.ranked():
+                core = self.core_of(h)
+                sums[core] = float(np.logaddexp(sums.get(core, -np.inf), h.log_evidence))
+            self._sums = _Sums(at, models, sums)
+        return self._sums.evidences
 
     def admissible(self, h: ScoredModel) -> bool:
         """Whether every effect of a model is accepted."""

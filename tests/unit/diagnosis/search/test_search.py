@@ -211,7 +211,7 @@ def test_an_end_that_a_child_has_led_to_is_kept_where_unseen_runs_agree(base, ot
     monkeypatch.setattr(type(base), "_fit_from", lambda *_of: fits)
     patch(monkeypatch, "prefer_output_error", lambda h, *_more: h)
     monkeypatch.setattr(type(base), "_keep", lambda _self, judged: judged)
-    base._refit_from_best_child(base.root)
+    assert base._takes_refit(base.root, fits) == kept
     assert (base.tried[base.root] is not before) == kept
     base.tried[base.root] = before
 
