@@ -118,10 +118,8 @@ def lacks(h: ScoredModel, best: ScoredModel) -> float:
     """
     records = h.likelihood_fit.fitted.problem.records
     share = measured_count(records) / measured_count((*records, *h.validation))
-    on_training = (
-        best.log_likelihood_by_run.sum() - h.log_likelihood_by_run.sum() - best.complexity_penalty + h.complexity_penalty
-    )
-    return min(best.log_evidence - h.log_evidence, float(on_training) / share)
+    mine, its = (float(of.log_likelihood_by_run.sum()) - of.complexity_penalty for of in (h, best))
+    return min(best.log_evidence - h.log_evidence, (its - mine) / share)
 
 
 def worst_error(h: ScoredModel, floor: Noise) -> float:
