@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import measured_count
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.thresholds import (
@@ -116,10 +115,8 @@ def lacks(h: ScoredModel, best: ScoredModel) -> float:
 
     The least of the two: what follows the training runs as the other does will mostly follow the validation runs as well.
     """
-    records = h.likelihood_fit.fitted.problem.records
-    share = measured_count(records) / measured_count((*records, *h.validation))
     mine, its = (float(of.log_likelihood_by_run.sum()) - of.complexity_penalty for of in (h, best))
-    return min(best.log_evidence - h.log_evidence, (its - mine) / share)
+    return min(best.log_evidence - h.log_evidence, (its - mine) / h.training_share)
 
 
 def worst_error(h: ScoredModel, floor: Noise) -> float:

@@ -199,6 +199,12 @@ class ScoredModel:
         return self.likelihood_fit.fitted.names
 
     @property
+    def training_share(self) -> float:
+        """The share of all measured values that the training runs have."""
+        records = self.likelihood_fit.fitted.problem.records
+        return measured_count(records) / measured_count((*records, *self.validation))
+
+    @property
     def trial_penalty(self) -> float:
         """The complexity penalty with the prior log odds once: what is worth trying need not be worth naming."""
         return self.complexity_penalty - (EVIDENCE_TEMPERATURE - 1.0) * ALTERNATIVE_LOG_ODDS * len(self.names)

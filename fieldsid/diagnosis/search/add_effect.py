@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, LikelihoodFit, fit_output_error, measured_count
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, LikelihoodFit, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, price_of_runs
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
@@ -152,10 +152,8 @@ def _least_cost_fall(parent: ScoredModel, effect: Effect, behind: float) -> floa
     That is the prior odds against one and the price of the numbers it has of each run's own; validation runs gain in proportion.
     """
     records = parent.likelihood_fit.fitted.problem.records
-    every = (*records, *parent.validation)
-    asked = ALTERNATIVE_LOG_ODDS + price_of_runs(effect, every) + behind
-    share = measured_count(records) / measured_count(every)
-    return max(MIN_WHITENED_COST_FALL, 2.0 * asked * share / MAX_FIRST_ORDER_SHORTFALL)
+    asked = ALTERNATIVE_LOG_ODDS + price_of_runs(effect, (*records, *parent.validation)) + behind
+    return max(MIN_WHITENED_COST_FALL, 2.0 * asked * parent.training_share / MAX_FIRST_ORDER_SHORTFALL)
 
 
 def _matters(move: SearchMove) -> bool:

@@ -39,6 +39,14 @@ def search_for(*names):
     return Search(*records, Axis.YAW, catalogue)
 
 
+def with_children(*names):
+    """A search for a lag, a dead time and a bias with its base and the children of some of them."""
+    made, effects = search_for("servo_lag", "delay", "gyro_bias"), all_effects(Axis.YAW)
+    base, asked = made.base(), [effects[n] for n in names]
+    made._evaluate_moves(base, by_effect(add_effect(base, asked, None, made.parallel, anew=False, flown=True)))
+    return made, base, [made.tried[frozenset([n])] for n in names]
+
+
 @pytest.fixture(scope="module")
 def base():
     """A search with its base judged."""
@@ -80,12 +88,7 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
 
 
 def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(monkeypatch):
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    effects = all_effects(Axis.YAW)
-    base = made.base()
-    moves = add_effect(base, [effects["servo_lag"], effects["delay"]], None, made.parallel, anew=False, flown=True)
-    made._evaluate_moves(base, by_effect(moves))
-    best = made.tried[frozenset(["servo_lag"])]
+    made, base, (best, _) = with_children("servo_lag", "delay")
     monkeypatch.setattr(Search, "_most_evident", lambda _self: best)
     monkeypatch.setattr(search, "MISSING_ERROR_RATIO", 20.0)  # a dead time leaves more than that of so slow a servo
     assert made._predicts_as_well(made.tried[frozenset(["delay"])], best)
@@ -100,12 +103,7 @@ def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(
 
 @pytest.mark.parametrize("ends", [False, True])
 def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(monkeypatch, ends):
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    effects = all_effects(Axis.YAW)
-    base = made.base()
-    both = [effects[n] for n in ("servo_lag", "gyro_bias")]
-    made._evaluate_moves(base, by_effect(add_effect(base, both, None, made.parallel, anew=False, flown=True)))
-    children = [made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias")]
+    made, base, children = with_children("servo_lag", "gyro_bias")
     monkeypatch.setattr(search, "gains_any_evidence", lambda *_: True)
     monkeypatch.setattr(search, "may_gain", lambda *_: True)  # there is no such bias
     monkeypatch.setattr(search, "leaves_error", lambda *_: not ends)
@@ -118,12 +116,7 @@ def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(mon
 
 @pytest.mark.parametrize("promises", [False, True])
 def test_what_promises_no_evidence_beside_the_best_is_not_joined_to_it(monkeypatch, promises):
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    effects = all_effects(Axis.YAW)
-    base = made.base()
-    both = [effects[n] for n in ("servo_lag", "gyro_bias")]
-    made._evaluate_moves(base, by_effect(add_effect(base, both, None, made.parallel, anew=False, flown=True)))
-    lag, bias = (made.tried[frozenset([n])] for n in ("servo_lag", "gyro_bias"))
+    made, base, (lag, bias) = with_children("servo_lag", "gyro_bias")
     assert may_gain(base, likelihood_linearisation(base), lag.effects[0])
     assert not may_gain(lag, likelihood_linearisation(lag), bias.effects[0])
     monkeypatch.setattr(search, "may_gain", lambda *_: promises)
