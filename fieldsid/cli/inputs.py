@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fieldsid.logs.channels import ChannelMap
     from fieldsid.logs.run import Run
     from fieldsid.logs.several.sifting import Refused
+    from fieldsid.models.axis import Axis
 
 STDIN = Path("-")
 READING = ("pandas", "pyarrow")
@@ -82,6 +83,14 @@ def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> 
 
     own = dict(zip(paths, names_apart([stem_of(path) for path in paths], paths), strict=True))
     return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
+
+
+def axis_of(runs: Sequence[Run]) -> Axis:
+    """Return the axis that runs excite; raises what `excited_axis` does."""
+    from fieldsid.logs.segments import excited_axis
+    from fieldsid.models.axis import Axis
+
+    return Axis(excited_axis(runs))
 
 
 def read_run(path: Path, *, mapping: Path | None = None) -> Run:

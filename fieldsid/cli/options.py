@@ -30,6 +30,10 @@ ValidateRuns = Annotated[
     ),
 ]
 AxisOption = Annotated[Axis, typer.Option("--axis", help="The plane to identify.")]
+ExcitedAxis = Annotated[
+    Axis | None,
+    typer.Option("--axis", help="The plane to identify; may be left out where the runs excite one alone.", show_default=False),
+]
 MappingFile = Annotated[
     Path | None,
     typer.Option(

@@ -7,11 +7,12 @@ above four times the fin's usual activity.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.errors import DataError
+from fieldsid.errors import DataError, UsageError
 from fieldsid.logs.run import Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
@@ -59,6 +60,29 @@ def is_excited(run: Run, axis: str) -> bool:
     """Whether a run has a fin for an axis (`yaw` or `pitch`) that leaves its trim."""
     signal = _fin_of(run, axis)
     return signal is not None and bool(_away(*_seen(run, signal))[0].any())
+
+
+def excited_axis(runs: Sequence[Run]) -> str:
+    """Return the axis (`yaw` or `pitch`) that runs excite.
+
+    Raises UsageError where they excite both or none, DataError where they have no fin for either.
+    """
+    if not any(_fin_of(run, axis) for run in runs for axis in _FINS):
+        raise DataError(
+            "no run has a fin signal",
+            found=", ".join(sorted({k for run in runs for k in run.signals if run.has(k)})) or "no signals",
+            hint="map `rudder_rad` or `elevator_rad` on import",
+        )
+    excited = {axis: [run.name for run in runs if is_excited(run, axis)] for axis in _FINS}
+    found = [axis for axis, names in excited.items() if names]
+    if len(found) == 1:
+        return found[0]
+    seen = ", ".join(f"{axis} in {len(names)} of {len(runs)}" for axis, names in excited.items())
+    raise UsageError(
+        "the runs excite both axes, and one is identified at a time" if found else "no fin of the runs leaves its trim",
+        found=f"a fin clearly away from its trim: {seen}",
+        hint="write `--axis yaw` or `--axis pitch`" + ("" if found else ", or fly an excitation: `sysid plan`"),
+    )
 
 
 def may_show(run: Run, axis: str) -> bool:

@@ -28,6 +28,13 @@ def test_the_numbers_of_a_known_vehicle_come_back_within_their_intervals(run_cli
         assert low < found["value"] < high
 
 
+@pytest.mark.parametrize("axis", list(Axis))
+def test_the_axis_may_be_left_out_where_the_run_excites_one_alone(run_cli, tmp_path, axis):
+    run = trial.flown(tmp_path, axis)
+    asked, told = (run_cli("identify", run, *axis_given, "--json").json for axis_given in ((), ("--axis", axis)))
+    assert (asked["axis"], asked["fits"]) == (told["axis"], told["fits"])
+
+
 def test_the_fin_offset_follows_from_trim_and_authority(run_cli, tmp_path):
     (fit,) = run_cli("identify", trial.flown(tmp_path), "--axis", "yaw", "--json").json["fits"]
     p = fit["parameters"]

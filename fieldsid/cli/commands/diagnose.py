@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.console import emit, table
-from fieldsid.cli.options import AxisOption, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
+from fieldsid.cli.options import ExcitedAxis, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.voice import shown_in, shown_words
@@ -39,7 +39,7 @@ Thorough = Annotated[
 def command(
     context: typer.Context,
     runs: RunFiles,
-    axis: AxisOption,
+    axis: ExcitedAxis = None,
     validate: ValidateRuns = None,
     model: KnownModel = None,
     mapping: MappingFile = None,
@@ -57,7 +57,7 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import files_of, read_groups
+    from fieldsid.cli.inputs import axis_of, files_of, read_groups
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
 
@@ -67,6 +67,7 @@ def command(
     skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
     held = partial(check_effects, [(model, known)] if model and known else [])
     training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
+    axis = known.axis if known else axis or axis_of(training)
     from fieldsid.diagnosis import diagnose
     from fieldsid.models.definition import NONE
 
@@ -86,13 +87,13 @@ def command(
     return result
 
 
-def _known(path: Path | None, axis: Axis) -> Model | None:
+def _known(path: Path | None, axis: Axis | None) -> Model | None:
     if path is None:
         return None
     from fieldsid.models.model import load_model
 
     model = load_model(path)
-    if model.axis is not axis:
+    if axis is not None and model.axis is not axis:
         raise UsageError(
             f"`{path}` is a {model.axis.value} model", found=f"--axis {axis.value}", hint=f"write `--axis {model.axis.value}`"
         )

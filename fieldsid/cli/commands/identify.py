@@ -12,8 +12,8 @@ import typer
 
 from fieldsid.cli.console import alike, emit, progress, table
 from fieldsid.cli.options import (
-    AxisOption,
     EffectNames,
+    ExcitedAxis,
     Figures,
     Force,
     FromS,
@@ -52,7 +52,7 @@ MOST_DRAWN = 6
 def command(
     context: typer.Context,
     runs: RunFiles,
-    axis: AxisOption,
+    axis: ExcitedAxis = None,
     method: Method = "auto",
     effects: EffectNames = None,
     joint: Joint = False,
@@ -76,12 +76,13 @@ def command(
 
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
-    from fieldsid.cli.inputs import files_of, read_runs
+    from fieldsid.cli.inputs import axis_of, files_of, read_runs
     from fieldsid.cli.skipped_logs import Skips
 
     refuse_closed(output)
     skips, ready = Skips(), partial(get_ready, "fieldsid.fitting.identify")
     known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready, refused=skips.skip)
+    axis = axis or axis_of(known)
     from fieldsid.fitting.identify import check_joint, identify
     from fieldsid.fitting.problem.estimator import Options
     from fieldsid.vehicle import find_vehicle, load_vehicle

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fieldsid.errors import DataError
+from fieldsid.errors import DataError, UsageError
 from fieldsid.logs import Run, segment
-from fieldsid.logs.segments import may_show
+from fieldsid.logs.segments import excited_axis, may_show
 
 TIME = 0.05 * np.arange(1200)
 
@@ -86,3 +86,26 @@ def test_every_pulse_lies_inside_its_segment(at, length, size, trim, side):
     found = segment(run(fin), "yaw")
     assert found.start_s <= at
     assert found.end_s >= min(at + length, TIME[-1]) - 0.06
+
+
+@pytest.mark.parametrize("axis", ["yaw", "pitch"])
+def test_the_axis_that_runs_excite_is_that_whose_fin_leaves_its_trim(axis):
+    moved = {"yaw": "rudder_rad", "pitch": "elevator_rad"}
+    fins = {fin: pulses() if of == axis else 0.004 * np.sin(3 * TIME) for of, fin in moved.items()}
+    assert excited_axis([Run("r", TIME, fins), run(0.0 * TIME)]) == axis
+
+
+@pytest.mark.parametrize(
+    ("signals", "error", "found"),
+    [
+        ({"rudder_rad": pulses(), "elevator_rad": pulses()}, UsageError, "yaw in 1 of 1, pitch in 1 of 1"),
+        ({"rudder_rad": 0.0 * TIME}, UsageError, "yaw in 0 of 1, pitch in 0 of 1"),
+        ({"yaw_rad": pulses()}, DataError, "yaw_rad"),
+    ],
+    ids=["both", "neither", "no fin"],
+)
+def test_no_axis_is_guessed(signals, error, found):
+    with pytest.raises(error) as raised:
+        excited_axis([Run("r", TIME, signals)])
+    assert found in raised.value.found
+    assert raised.value.hint
