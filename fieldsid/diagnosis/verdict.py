@@ -21,6 +21,7 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import (
+    CERTAIN_P_VALUE,
     EQUAL_ERROR_RATIO,
     EVIDENCE_TEMPERATURE,
     FAR_ERROR_RATIO,
@@ -54,8 +55,9 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     `sufficient` asks for training and validation errors within SUFFICIENT_ERROR_RATIO; above it the verdict is `disturbed` where
     the innovations pass the tests of a disturbance, else `unexplained`. So it is where an effect that fits the training runs
     better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one, that
-    of all runs, than it leaves: a lag of a sample may be there, and is not what is missing. A moment of the water alone is named
-    where what is left beside it follows nothing that was measured: that of a hull's roll swings as a wave's does.
+    of all runs, than it leaves: a lag of a sample may be there, and is not what is missing. And so it is where an effect that
+    leaves a visible error has nothing to add for a rival by evidence. Where what is left surely follows something else that was
+    measured, a moment of the water is not named, as that of a hull's roll swings as a wave's does, nor what leaves a large error.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -67,16 +69,16 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
         return _unnamed(found, left, floor)
     visible = error > SUFFICIENT_ERROR_RATIO
     share = excess_share([was, fitted[0]], [now, fitted[1]], floor)
-    minor = error > MISSING_ERROR_RATIO and share < MAIN_EXPLAINED_SHARE and not search.is_noiseless
-    if visible and (minor or not now.mean < was.mean):
+    large = error > MISSING_ERROR_RATIO and not search.is_noiseless
+    minor = large and share < MAIN_EXPLAINED_SHARE
+    sums = search.evidences()
+    doubtful = sums[frozenset(found.names)] - sums.get(search.root, -np.inf) < RIVAL_LOG_ODDS
+    if visible and (minor or doubtful or not now.mean < was.mean):
         return _unnamed(found, left, floor)
-    asked = (
-        SHARES_TO_EXPLAIN
-        if error <= MISSING_ERROR_RATIO or search.is_noiseless
-        else (*SHARES_TO_EXPLAIN, *(SHARES_TO_EXPLAIN_MISSING if error <= FAR_ERROR_RATIO else SHARES_TO_EXPLAIN_FAR))
-    )
+    more = SHARES_TO_EXPLAIN_MISSING if error <= FAR_ERROR_RATIO else SHARES_TO_EXPLAIN_FAR
+    asked = (*SHARES_TO_EXPLAIN, *(more if large else ()))
     added = [e for e in found.effects if e.name not in search.known]
-    follows = 3.0 * left.signals < MIN_P_VALUE and all(e.is_of_the_water for e in added)
+    follows = 3.0 * left.signals < CERTAIN_P_VALUE and (large or any(e.is_of_the_water for e in added))
     if follows or (visible and any(left.p < p and share < enough for enough, p in asked)):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)

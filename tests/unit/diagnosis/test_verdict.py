@@ -21,7 +21,8 @@ def errors(ratio, runs=1):
 
 
 def judged(
-    monkeypatch, before, after, p, *, noiseless=False, settled=None, named=("servo_lag",), signals=1.0, fitted=None, runs=1
+    monkeypatch, before, after, p, *,
+    noiseless=False, settled=None, named=("servo_lag",), signals=1.0, fitted=None, runs=1, gain=50.0,
 ):  # fmt: skip
     """The word for errors over the floor before and after on one unseen run; `fitted` are those on `runs` training runs."""
     monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
@@ -44,10 +45,13 @@ def judged(
         validation=(),
         validation_errors=errors(after),
         own_moment=0.0,
-        log_evidence=50.0,
+        log_evidence=gain,
         unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
-    search = SimpleNamespace(floor=FLOOR, root=frozenset(), known=(), base=lambda: base, is_noiseless=noiseless)
+    sums = {frozenset(): 0.0, frozenset(named): gain}
+    search = SimpleNamespace(
+        floor=FLOOR, root=frozenset(), known=(), base=lambda: base, is_noiseless=noiseless, evidences=lambda: sums
+    )
     left = SimpleNamespace(p=p, dependence=p, signals=signals)
     return verdict.verdict_of(search, found, left, SimpleNamespace(noise=FLOOR)).word
 
@@ -84,11 +88,23 @@ def test_a_large_error_on_fitted_runs_is_one_that_is_left(monkeypatch):
 @pytest.mark.parametrize(
     ("named", "signals", "word"),
     [
-        (("wave",), 1e-6, "unexplained"), (("wave",), 0.3, "effect"), (("roll_coupling",), 1e-6, "effect"),
-        (("wave", "servo_lag"), 1e-6, "effect"),
+        (("wave",), 1e-6, "unexplained"), (("wave",), 1e-3, "effect"), (("roll_coupling",), 1e-6, "effect"),
+        (("wave", "servo_lag"), 1e-6, "unexplained"),
     ],
     ids=str,
 )  # fmt: skip
-def test_a_wave_alone_is_named_where_what_is_left_follows_no_measured_signal(monkeypatch, named, signals, word):
-    """Also where what is left is no larger than a sufficient model may leave."""
+def test_a_wave_is_named_where_what_is_left_does_not_surely_follow_a_measured_signal(monkeypatch, named, signals, word):
+    """Also where what is left is no larger than a sufficient model may leave: beside a true wave a model is not exact either."""
     assert judged(monkeypatch, 1.5, 1.1, 0.6, named=named, signals=signals) == word
+
+
+@pytest.mark.parametrize(
+    ("after", "noiseless", "word"), [(1.6, False, "unexplained"), (1.4, False, "effect"), (1.6, True, "effect")]
+)
+def test_what_leaves_a_large_error_that_surely_follows_a_signal_is_not_what_is_missing(monkeypatch, after, noiseless, word):
+    assert judged(monkeypatch, 3.9, after, 0.6, named=("roll_coupling",), signals=1e-6, noiseless=noiseless) == word
+
+
+@pytest.mark.parametrize(("gain", "after", "word"), [(2.0, 1.9, "disturbed"), (4.0, 1.9, "effect"), (2.0, 1.1, "effect")])
+def test_an_effect_that_is_hardly_likelier_than_none_must_end_the_visible_error(monkeypatch, gain, after, word):
+    assert judged(monkeypatch, 3.9, after, 0.6, gain=gain) == word
