@@ -106,8 +106,7 @@ def _keeps(before: Errors, now: Errors) -> bool:
 
 def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence on the training runs alone, enough to be tried further."""
-    gain = with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()
-    return bool(gain > with_.trial_penalty - without.trial_penalty)
+    return with_.log_likelihood - without.log_likelihood > with_.trial_penalty - without.trial_penalty
 
 
 def lacks(h: ScoredModel, best: ScoredModel) -> float:
@@ -115,8 +114,7 @@ def lacks(h: ScoredModel, best: ScoredModel) -> float:
 
     The least of the two: what follows the training runs as the other does will mostly follow the validation runs as well.
     """
-    mine, its = (float(of.log_likelihood_by_run.sum()) - of.complexity_penalty for of in (h, best))
-    return min(best.log_evidence - h.log_evidence, (its - mine) / h.training_share)
+    return min(best.log_evidence - h.log_evidence, (best.training_evidence - h.training_evidence) / h.training_share)
 
 
 def worst_error(h: ScoredModel, floor: Noise) -> float:
@@ -132,7 +130,7 @@ def leaves_error(h: ScoredModel, floor: Noise) -> bool:
 def gains_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence over all runs, whatever happens to the free-run error."""
     least = MIN_TRAINING_GAIN if _adds_numbers_of_runs(without, with_) else 0.0
-    learned = float(with_.log_likelihood_by_run.sum() - without.log_likelihood_by_run.sum()) > least
+    learned = with_.log_likelihood - without.log_likelihood > least
     return learned and with_.log_evidence > without.log_evidence
 
 

@@ -209,10 +209,20 @@ class ScoredModel:
         """The complexity penalty with the prior log odds once: what is worth trying need not be worth naming."""
         return self.complexity_penalty - (EVIDENCE_TEMPERATURE - 1.0) * ALTERNATIVE_LOG_ODDS * len(self.names)
 
+    @property
+    def log_likelihood(self) -> float:
+        """Log likelihood of the training runs."""
+        return float(self.log_likelihood_by_run.sum())
+
+    @property
+    def training_evidence(self) -> float:
+        """Log evidence of the training runs alone, up to a constant that all models share."""
+        return self.log_likelihood - self.complexity_penalty
+
     @cached_property
     def log_evidence(self) -> float:
         """Log evidence up to a constant that all models share."""
-        return float(self.log_likelihood_by_run.sum() + self.validation_log_density.sum() - self.complexity_penalty)
+        return self.training_evidence + float(self.validation_log_density.sum())
 
 
 def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredModel:

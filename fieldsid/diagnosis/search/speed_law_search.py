@@ -175,7 +175,7 @@ def _most_evident(tried: Collection[ScoredModel]) -> list[ScoredModel]:
     """Return the models with most evidence, over all runs and over the training runs; none where none was tried."""
     if not tried:
         return []
-    over_training = max(tried, key=lambda h: float(h.log_likelihood_by_run.sum()) - h.complexity_penalty)
+    over_training = max(tried, key=lambda h: h.training_evidence)
     return [max(tried, key=lambda h: h.log_evidence), over_training]
 
 

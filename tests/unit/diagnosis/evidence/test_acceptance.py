@@ -38,11 +38,10 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None, own_moment=0
     """
     errors = [Errors(FLOOR.angle * e, FLOOR.rate * e) for e in (over, train, over if settled is None else settled)]
     effects = tuple(effect_named(n) for n in names)
-    learned = np.array([0.25 * gain, 0.25 * gain])
     return SimpleNamespace(
         names=names,
         effects=effects,
-        log_likelihood_by_run=learned,
+        log_likelihood=0.5 * gain,
         log_evidence=gain,
         selection_errors=errors[0],
         train=errors[1],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from fieldsid.diagnosis.parallel_map import ParallelMap
@@ -21,8 +20,7 @@ def hypothesis(*names, score, fitted=0.0, error=1.0):
     return SimpleNamespace(
         names=names,
         log_evidence=score,
-        log_likelihood_by_run=np.array([fitted]),
-        complexity_penalty=0.0,
+        training_evidence=fitted,
         selection_errors=errors,
         unseen_errors=(errors,),
     )
