@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -24,6 +24,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
     LikelihoodFit,
     fit_maximum_likelihood,
     fit_output_error,
+    likelihood_at,
     prefer_smaller_equivalent,
 )
 from fieldsid.diagnosis.evidence.predictive_density import most_log_density
@@ -94,7 +95,7 @@ class MoveEvaluation(SearchState):
         or where the parent has effects and the child is near the floor or has a pair.
         """
         children = self._children(key)
-        best = sorted(children, key=lambda h: h.complexity_penalty - h.log_likelihood_by_run.sum())[:1]
+        best = sorted(children, key=lambda h: -h.training_evidence)[:1]
         names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:LEADING_CHILDREN], *best)))
         early = key == self.root or (
             len(key) < len(self.known) + TESTED_SUBSET_SIZE and any(self.error_ratio(h) > FAR_ERROR_RATIO for h in children[:1])
@@ -152,6 +153,22 @@ class MoveEvaluation(SearchState):
                 self.tried[key] = found
             left += [group[i] for i in later]
         return left
+
+    def _add_at(self, best: ScoredModel, others: Sequence[Effect], effects: Sequence[Effect]) -> None:
+        """Add each of some effects to others at the parameters of the best model."""
+        if effects:
+            parent = self._moved(best, others)
+            moves = by_effect(add_effect(parent, effects, None, self.parallel, anew=False, flown=True))
+            self._evaluate_moves(parent, moves, near=best)
+
+    @staticmethod
+    def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
+        """Return a model with other effects at the parameters of one that was fitted, itself not fitted, to add to."""
+        fitted = h.likelihood_fit.fitted
+        problem = fitted.problem.with_effects(effects)
+        x = carry_parameters(problem.layout, fitted.vector)
+        at = replace(h.likelihood_fit, fitted=FittedProblem(problem, x, fitted.weights))
+        return replace(h, likelihood_fit=replace(at, log_likelihood=likelihood_at(problem, x, at)))
 
     def _may_come_near(self, h: ScoredModel, ml_fit: LikelihoodFit) -> bool:
         """Whether a fit may come near a model by log evidence, if it left nothing of the validation runs but the noise.

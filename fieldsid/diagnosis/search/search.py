@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, lacks, leaves_error, lowers_error, worst_error
-from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, LikelihoodFit, fit_maximum_likelihood, likelihood_at
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
@@ -19,7 +19,7 @@ from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MoveEvaluation
 from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
-from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points
+from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points, shifts_time
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect, Stage, with_variant
 
@@ -39,12 +39,12 @@ class Search(MoveEvaluation):
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
         self._grow_rivals()
-        if self.leaves_visible_error():
+        if self.may_follow_leading():
             pairs = [*self._all_in_series(), *self._all_beside()]
             self._fit_pairs(pairs)
             self._join_pairs(pairs)
         self._exchange_leaders()
-        if self.leaves_visible_error():
+        if self.may_follow_leading():
             self._vary_states_in_series()
             self._expand()
             self._exchange_leaders()
@@ -147,7 +147,9 @@ class Search(MoveEvaluation):
         That goes on as long as the budget lasts: what leads after an exchange differs from what led before it by less each time.
         """
         exchanged = self.tried.progress.exchanged
-        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (not exchanged or self.may_go_on()):
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (
+            self.may_go_on() or (not exchanged and self.budget.remains_for_leading)
+        ):
             exchanged.add(spec)
             self._exchange_for_variants(best)
             self._exchange_for_lookalikes(self._most_evident())
@@ -172,8 +174,9 @@ class Search(MoveEvaluation):
         """Try a model with each effect exchanged for what it may be mistaken for.
 
         Where one stands for a lag of a sample, the lag itself may have passed no screen of a model without what the others have
-        since added, or ended at a worse optimum. And an effect in another variant may stand for its textbook's and one of those,
-        which is fitted from its numbers. What comes so near that a variant could lead is tried in its variants.
+        since added, or ended at a worse optimum. What shifts time for long is seen to no first order by a model without: it is
+        fitted from the other's numbers. So is an effect in another variant, which may stand for its textbook's and one of those.
+        What comes so near that a variant could lead is tried in its variants.
         """
         self._drop_each(best)
         for stands in (e for e in best.effects if e.name not in self.known):
@@ -181,12 +184,11 @@ class Search(MoveEvaluation):
             alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
             if len(best.names) > len(self.known) + 1:
                 self._add_to_rival(self.tried[frozenset(best.names) - {stands.name}], alike, best)
+                self._add_at(best, others, [e for e in alike if shifts_time(e)] if shifts_time(stands) else [])
                 self._try_variants_near(best, others, alike)
             for textbook in (e for e in self.catalogue if e.name == stands.name and stands.is_formed):
-                parent = self._moved(best, [*others, textbook])
-                moves = by_effect(add_effect(parent, alike, None, self.parallel, anew=False, flown=True))
-                self._evaluate_moves(parent, moves, near=best)
-                self._try_variants_near(best, parent.effects, alike)
+                self._add_at(best, [*others, textbook], alike)
+                self._try_variants_near(best, [*others, textbook], alike)
             if stands.is_formed and len(others) == len(self.known):
                 self._fit_pairs([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
 
@@ -195,15 +197,6 @@ class Search(MoveEvaluation):
         keys = [frozenset((*(e.name for e in others), one.name)) for one in alike]
         near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
         self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
-
-    @staticmethod
-    def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
-        """Return a model with other effects at the parameters of one that was fitted, itself not fitted, to add to."""
-        fitted = h.likelihood_fit.fitted
-        problem = fitted.problem.with_effects(effects)
-        x = carry_parameters(problem.layout, fitted.vector)
-        at = replace(h.likelihood_fit, fitted=FittedProblem(problem, x, fitted.weights))
-        return replace(h, likelihood_fit=replace(at, log_likelihood=likelihood_at(problem, x, at)))
 
     def _front(self, best: ScoredModel) -> list[ScoredModel]:
         """Return the models of accepted effects whose error is clearly below that of the one with the highest evidence."""
@@ -218,7 +211,7 @@ class Search(MoveEvaluation):
         if self.root not in self.tried.progress.expanded and (len(self.tried) == 1 or self.may_go_on()):
             return self.base()
         best = self._most_evident()
-        if self._is_expandable(best) and (self.may_go_on() or (self.leaves_visible_error() and self._gets_lower())):
+        if self._is_expandable(best) and (self.may_go_on() or (self.may_follow_leading() and self._gets_lower())):
             return best
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
 
@@ -314,8 +307,9 @@ class Search(MoveEvaluation):
         """
         best, fitted = self._most_evident(), self._fitted(pairs)
         gaining = [h for h in fitted if gains_any_evidence(self.base(), h) and not set(h.names) <= set(best.names)]
-        joined = self._joined(best, sorted(gaining, key=lambda h: -h.log_evidence)[:MAX_JOINED])
-        self.tried.update({frozenset(h.names): h for h in joined})
+        if gaining:
+            joined = self._joined(best, sorted(gaining, key=lambda h: -h.log_evidence)[:MAX_JOINED])
+            self.tried.update({frozenset(h.names): h for h in joined})
         self._drop_each(self._most_evident())
 
     def _drop_each(self, h: ScoredModel) -> bool:

@@ -142,8 +142,12 @@ class SearchState:
         return self.tried[self.root]
 
     def may_go_on(self, *, leading: bool = False) -> bool:
-        """Whether evaluations are left; with the model that leads the search goes on also while an error is visible."""
-        return (leading and self.leaves_visible_error()) or self.budget.remaining(self.leaves_unexplained)
+        """Whether evaluations are left; with the model that leads the search goes on for longer while an error is visible."""
+        return (leading and self.may_follow_leading()) or self.budget.remaining(self.leaves_unexplained)
+
+    def may_follow_leading(self) -> bool:
+        """Whether an error is visible and the search may go on from the model that leads, if from no other."""
+        return self.budget.remains_for_leading and self.leaves_visible_error()
 
     def leaves_visible_error(self) -> bool:
         """Whether the best accepted set leaves more than a sufficient model may, on fitted or on unseen runs."""

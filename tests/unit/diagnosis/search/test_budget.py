@@ -45,6 +45,16 @@ def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
     assert Budget(2, np.inf).remaining(lambda: False)
 
 
+def test_what_leads_is_not_followed_for_ever(monkeypatch):
+    made = a_search(thorough=False)
+    made.budget.most = made.budget.where_unexplained = 0.0
+    monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: True)
+    made.budget.evaluations.count = int(made.budget.in_all * made.budget.runs) - 1
+    assert made.may_go_on(leading=True)
+    made.budget.evaluations.add()
+    assert not made.may_go_on(leading=True)
+
+
 @pytest.mark.parametrize("visible", [True, False])
 def test_beyond_it_only_what_leads_is_expanded_and_only_while_an_error_is_visible(monkeypatch, visible):
     made = a_search(thorough=False)

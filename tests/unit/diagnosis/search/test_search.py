@@ -70,7 +70,10 @@ def other_ends(monkeypatch):
     return by
 
 
-def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch):
+@pytest.mark.parametrize("seen", [True, False], ids=["seen to first order", "too long for that"])
+def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch, seen):
+    if not seen:
+        monkeypatch.setattr(Search, "_add_to_rival", lambda *_: None)
     made = search_for("servo_lag", "delay", "gyro_bias")
     effects = all_effects(Axis.YAW)
     parent = made.base()
@@ -212,13 +215,12 @@ def test_an_end_that_a_child_has_led_to_is_kept_where_unseen_runs_agree(base, ot
 def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, monkeypatch):
     def model(names, *, error, evidence):
         errors = Errors(0.004 * error, 0.002 * error)
-        known = np.array([evidence])
         effects = tuple(all_effects(Axis.YAW)[n] for n in names)
         return SimpleNamespace(
             names=names,
             effects=effects,
             log_evidence=evidence,
-            log_likelihood_by_run=known,
+            log_likelihood=evidence,
             selection_errors=errors,
             train=errors,
             own_moment=0.0,
