@@ -79,12 +79,11 @@ def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise, least: float) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
-    Some run must have `least` times the floor, and on training or validation runs it must predict better, not equally well.
+    Some run must have `least` times the floor.
     """
     was, left = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in (before, now))
-    better = any(EQUAL_ERROR_RATIO * b.over(floor) < a.over(floor) for a, b in zip(before, now, strict=True))
     leaves = max(run.over(floor) for errors in before for run in errors.runs) > least
-    return better and leaves and was - left > MAIN_EXPLAINED_SHARE * was
+    return leaves and was - left > MAIN_EXPLAINED_SHARE * was
 
 
 def excess_share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:

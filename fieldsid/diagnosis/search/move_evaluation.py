@@ -170,6 +170,15 @@ class MoveEvaluation(SearchState):
         at = replace(h.likelihood_fit, fitted=FittedProblem(problem, x, fitted.weights))
         return replace(h, likelihood_fit=replace(at, log_likelihood=likelihood_at(problem, x, at)))
 
+    def _add_most_promising(self, h: ScoredModel) -> None:
+        """Add to a model that there are no evaluations to expand what promises most to first order.
+
+        Not what an effect of the model may be mistaken for: that takes a part of it, and is exchanged for it elsewhere.
+        """
+        alike = {n for e in h.effects for n in (e.name, *e.mistaken_for)}
+        left = [e for e in self.catalogue if e.name not in alike and frozenset((*h.names, e.name)) not in self.tried]
+        self._evaluate_moves(h, by_effect(add_effect(h, left, MAX_PROMISING, self.parallel, anew=False, flown=True)))
+
     def _may_come_near(self, h: ScoredModel, ml_fit: LikelihoodFit) -> bool:
         """Whether a fit may come near a model by log evidence, if it left nothing of the validation runs but the noise.
 
@@ -262,6 +271,11 @@ class MoveEvaluation(SearchState):
 
 LEADING_CHILDREN = 3
 """Best children whose left-out moves are evaluated too, and which may take their output-error fit."""
+
+
+MAX_PROMISING = 2
+"""Effects that are added to the model found where no evaluations are left to expand it: of five effects that were injected into
+36 hulls of other hands and missed, two were the first of that order and one the second."""
 
 
 TESTED_SUBSET_SIZE = 2

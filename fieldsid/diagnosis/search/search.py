@@ -61,6 +61,8 @@ class Search(MoveEvaluation):
             )
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
+        if self._is_expandable(leading := self._most_evident()):
+            self._add_most_promising(leading)
         self._lift_under_other_trim_law()
         while True:
             self.share_own_moments()

@@ -104,6 +104,28 @@ def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(
     assert frozenset(["delay", "servo_lag"]) in made.tried
 
 
+def test_what_was_not_expanded_is_fitted_with_what_promises_most():
+    made = search_for("servo_lag", "delay", "gyro_bias")
+    made._add_most_promising(made.base())
+    assert frozenset(["servo_lag"]) in made.tried
+    assert frozenset(["gyro_bias"]) not in made.tried  # there is none
+
+
+def test_beside_an_effect_nothing_is_added_that_it_may_be_mistaken_for():
+    made, _, (delayed,) = with_children("delay")
+    made._add_most_promising(delayed)
+    assert frozenset(["delay", "servo_lag"]) not in made.tried
+
+
+@pytest.mark.parametrize("expanded", [False, True])
+def test_that_is_done_where_the_model_found_was_not_expanded(monkeypatch, expanded):
+    added = []
+    monkeypatch.setattr(Search, "_add_most_promising", lambda _self, h: added.append(h.names))
+    monkeypatch.setattr(Search, "_is_expandable", lambda _self, h: not expanded and h.names == ("servo_lag",))
+    search_for("servo_lag").best()
+    assert added == ([] if expanded else [("servo_lag",)])
+
+
 @pytest.mark.parametrize("ends", [False, True])
 def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(monkeypatch, ends):
     made, base, children = with_children("servo_lag", "gyro_bias")
