@@ -13,6 +13,7 @@ from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     MAX_ERROR_RATIO,
     MAX_VALIDATION_ERROR_RATIO,
+    MIN_P_VALUE,
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.diagnosis.verdict import Verdict, excess_explained, names_added, worsens
@@ -61,7 +62,7 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
         beside = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
         return f"what is left, {base}, is for the most part {_disturbance(noise)}; {beside}"
     if verdict.word == "unexplained":
-        return _unexplained(search, found, left, floor)
+        return _unexplained(search, found, left, floor, noise)
     names = " and ".join(verdict.effects)
     says = "; ".join(_says(found, n) for n in verdict.effects)
     fall = _fall(search, found, floor, runs)
@@ -72,19 +73,23 @@ def headline(search: Search, verdict: Verdict, found: ScoredModel, left: Residua
     return f"{names} ({says}): {fall}"
 
 
-def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise) -> str:
-    """Return what is missing and no effect of the catalogue explains: its size, what takes a part of it, where it is."""
+def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
+    """Return what is missing and no effect of the catalogue explains: its size, what takes a part of it, where it is largest.
+
+    What it moves with is said where a test says so, and that it may be a disturbance where none speaks against one.
+    """
     worse = validation_error_ratio(search.base(), search.floor)
     lowers = found.selection_errors.mean < search.base().selection_errors.mean
     partly = f", {sized(search, found, floor)} with {' and '.join(names_added(search, found))}" if lowers else ""
-    where = (
-        f"most of {'what is left' if lowers else 'it'} in {left.worst_run} at {left.worst_start_s:.0f}-{left.worst_end_s:.0f} s "
-        f"({left.worst_ratio:.1f} x the average), it moves with {left.moves_with}"
-    )
+    when = f"{left.worst_start_s:.0f}-{left.worst_end_s:.0f} s ({left.worst_ratio:.1f} x the average)"
+    where = f"{'what is left' if lowers else 'it'} is largest in {left.worst_run} at {when}"
+    follows = f" and moves with {left.moves_with}" if 3.0 * left.dependence < MIN_P_VALUE else ""
+    passes = left.p >= MIN_P_VALUE and noise.disturbance > DISTURBED
+    calm = f"; the tests do not tell it from {_disturbance(noise)}" if passes else ""
     unseen = f"; unseen runs are {worse:.1f} times worse than the fitted ones" if worse > MAX_VALIDATION_ERROR_RATIO else ""
     return (
-        f"no effect of the catalogue explains what is missing: error {sized(search, search.base(), floor)}{partly}, {where}"
-        f"{unseen}{_would_end(search, found, floor)}"
+        f"no effect of the catalogue explains what is missing: error {sized(search, search.base(), floor)}{partly}; "
+        f"{where}{follows}{calm}{unseen}{_would_end(search, found, floor)}"
     )
 
 

@@ -151,15 +151,16 @@ def test_a_disturbance_beside_small_effects_does_not_say_that_none_is_there():
     assert beside.endswith("; servo_lag may be there besides, and leaves 1.75 x the noise floor")
 
 
-def unexplained(base, found, *others):
-    """What is said where none of these models explains enough."""
+def unexplained(base, found, *others, p=1e-9, noise=FLOOR):
+    """What is said where none of these models explains enough, and the tests give that p."""
     for h in (base, found, *others):
         h.train, h.validation, h.validation_errors = h.errors.train, (None,), h.errors.validation
     shown = {frozenset(h.names): h.log_evidence for h in (base, found, *others)}
     search = _search(base)
     search.root, search.evidences, search.ranked = frozenset(), lambda: shown, lambda: [found, *others]
-    left = SimpleNamespace(worst_run="r0", worst_start_s=4.2, worst_end_s=6.1, worst_ratio=2.4, moves_with="rate")
-    return headline(search, Verdict("unexplained", ()), found, left, FLOOR, FLOOR)
+    where = {"worst_run": "r0", "worst_start_s": 4.2, "worst_end_s": 6.1, "worst_ratio": 2.4, "moves_with": "rate"}
+    left = SimpleNamespace(p=p, dependence=p, **where)
+    return headline(search, Verdict("unexplained", ()), found, left, FLOOR, noise)
 
 
 def test_the_unexplained_says_what_takes_a_part_of_it_and_which_larger_set_would_end_it():
@@ -170,7 +171,7 @@ def test_the_unexplained_says_what_takes_a_part_of_it_and_which_larger_set_would
     said = unexplained(base, part, misses, ends)
     assert said == (
         "no effect of the catalogue explains what is missing: error 1.50 x the noise floor, 1.30 x the noise floor with "
-        "quadratic_damping, most of what is left in r0 at 4-6 s (2.4 x the average), it moves with rate; "
+        "quadratic_damping; what is left is largest in r0 at 4-6 s (2.4 x the average) and moves with rate; "
         "quadratic_damping+trim_drift leaves 1.08 x the noise floor, but is 12 log units less likely"
     )
     assert "less likely" not in unexplained(base, part, misses)
@@ -181,6 +182,14 @@ def test_the_unexplained_says_nothing_of_what_raises_the_error_or_is_less_likely
     wave = _made("wave", train=(1.2,), unseen=(1.9,), score=30.0)
     ends = _made("wave", "trim_drift", train=(1.03,), unseen=(1.08,), score=-2.0)
     assert unexplained(base, wave, ends).startswith(
-        "no effect of the catalogue explains what is missing: error 1.50 x the noise floor, most of it in r0"
+        "no effect of the catalogue explains what is missing: error 1.50 x the noise floor; it is largest in r0"
     )
     assert "trim_drift" not in unexplained(base, wave, ends)
+
+
+@pytest.mark.parametrize(("p", "moves", "passes"), [(1e-9, True, False), (0.0065, True, False), (0.5, False, True)])
+def test_the_unexplained_moves_with_something_only_where_a_test_says_so(p, moves, passes):
+    base, part = _made(train=(5.4,), unseen=(5.1,), score=0.0), _made("stall", train=(4.4,), unseen=(3.1,), score=565.0)
+    said = unexplained(base, part, p=p, noise=Noise(0.004, 0.002, disturbance=0.0023, disturbance_time=4.4))
+    assert ("moves with rate" in said) is moves
+    assert ("the tests do not tell it from a disturbance moment of 0.0023 rad/s^2" in said) is passes
