@@ -29,12 +29,21 @@ def own_effects() -> None:
         add_user_effects(OWN_EFFECTS)
 
 
-def axis_of(axis: Axis | str) -> Axis:
-    """Return an axis by its name; raises UsageError."""
+def axis_of(axis: Axis | str | None) -> Axis | None:
+    """Return an axis by its name, None for None; raises UsageError."""
+    if axis is None:
+        return None
     known = [a.value for a in Axis]
     if axis not in known:
         raise UsageError(f"there is no axis {axis!r}", found=", ".join(known), hint=near(str(axis), known))
     return Axis(axis)
+
+
+def axis_excited(runs: Sequence[Run]) -> Axis:
+    """Return the axis that runs excite; raises what `excited_axis` does."""
+    from fieldsid.logs.segments import excited_axis
+
+    return Axis(excited_axis(runs, written='give `axis="yaw"` or `axis="pitch"`'))
 
 
 def names_of(names: str | Iterable[str]) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fieldsid.errors import UsageError
-from fieldsid.face.arguments import File, axis_of, names_of, own_effects, vehicle_of
+from fieldsid.face.arguments import File, axis_excited, axis_of, names_of, own_effects, vehicle_of
 from fieldsid.face.models import AnyModel, model_of
 from fieldsid.face.runs import Logs, runs_mapped
 from fieldsid.face.several import Several
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def identify(
     runs: Logs,
-    axis: Axis | str,
+    axis: Axis | str | None = None,
     *,
     method: str = "auto",
     effects: str | Iterable[str] = (),
@@ -38,18 +38,20 @@ def identify(
 ) -> Several[Fit]:
     """Return the fit of the yaw or pitch model to each run, or a single one to all of them when joint.
 
-    Of each run the part is used that excites the axis; all of it when `whole`, or between start and end in s. bandwidth: that of
-    the state-variable filter in rad/s. forgetting: the factor of `svf_rls`. Raises DataError for runs that do not allow the fit,
-    UsageError for a method or effect that cannot do what is asked, and as `load` does.
+    axis: by default the one that the runs excite. Of each run the part is used that excites it; all of it when `whole`, or
+    between start and end in s. bandwidth: that of the state-variable filter in rad/s. forgetting: the factor of `svf_rls`. Raises
+    DataError for runs that do not allow the fit, UsageError for a method or effect that cannot do what is asked or runs that
+    excite both axes or none, and as `load` does.
     """
     from fieldsid.fitting.identify import identify as fit_runs
     from fieldsid.fitting.problem.estimator import Options
 
     own_effects()
+    plane, known = axis_of(axis), runs_mapped(runs, mapping, start, end)
     return Several(
         fit_runs(
-            runs_mapped(runs, mapping, start, end),
-            axis_of(axis),
+            known,
+            plane or axis_excited(known),
             method=method,
             effects=names_of(effects),
             joint=joint,
@@ -81,7 +83,7 @@ def compare(
 
 def diagnose(
     runs: Logs,
-    axis: Axis | str,
+    axis: Axis | str | None = None,
     *,
     validate: Logs = (),
     model: AnyModel | None = None,
@@ -90,17 +92,19 @@ def diagnose(
 ) -> Diagnosis:
     """Return which physical effect a model of the runs lacks, how sure that is, and what else it could be.
 
-    validate: runs that no fit sees; without them a part of the runs is held back. model: one whose effects are known already.
-    thorough: go on for as long as there is something to try. Raises DataError for a run that cannot be fitted, UsageError for a
-    model of the other axis, EffectError for an effect of the user's that fails, and as `load` does.
+    axis: by default the model's, or that which the runs excite. validate: runs that no fit sees; without them a part of the runs
+    is held back. model: one whose effects are known already. thorough: go on for as long as there is something to try. Raises
+    DataError for a run that cannot be fitted, UsageError for a model of the other axis or runs that excite both or none,
+    EffectError for an effect of the user's that fails, and as `load` does.
     """
     from fieldsid.diagnosis import diagnose as diagnose_runs
 
     own_effects()
     known, plane = None if model is None else model_of(model), axis_of(axis)
-    if known is not None and known.axis is not plane:
+    if known is not None and plane is not None and known.axis is not plane:
         raise UsageError(f"that is a {known.axis.value} model", found=f"axis {plane.value}", hint=f'write `"{known.axis.value}"`')
     learned, unseen = _both(runs, validate, mapping)
+    plane = known.axis if known else plane or axis_excited(learned)
     return diagnose_runs(learned, plane, unseen, known=() if known is None else known.effects, thorough=thorough)
 
 

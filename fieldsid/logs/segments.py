@@ -62,8 +62,8 @@ def is_excited(run: Run, axis: str) -> bool:
     return signal is not None and bool(_away(*_seen(run, signal))[0].any())
 
 
-def excited_axis(runs: Sequence[Run]) -> str:
-    """Return the axis (`yaw` or `pitch`) that runs excite.
+def excited_axis(runs: Sequence[Run], *, written: str) -> str:
+    """Return the axis (`yaw` or `pitch`) that runs excite; `written` says how one is chosen.
 
     Raises UsageError where they excite both or none, DataError where they have no fin for either.
     """
@@ -81,7 +81,7 @@ def excited_axis(runs: Sequence[Run]) -> str:
     raise UsageError(
         "the runs excite both axes, and one is identified at a time" if found else "no fin of the runs leaves its trim",
         found=f"a fin clearly away from its trim: {seen}",
-        hint="write `--axis yaw` or `--axis pitch`" + ("" if found else ", or fly an excitation: `sysid plan`"),
+        hint=written if found else f"{written}, or fly an excitation",
     )
 
 

@@ -128,7 +128,6 @@ def test_text_fits_eighty_columns_and_says_that_nothing_was_kept(run_cli, tmp_pa
         (["--axis", "yaw", "--effects", "servolag"], "did you mean `servo_lag`"),
         (["--axis", "yaw", "--effects", "roll_coupling"], "roll_coupling needs roll"),
         (["--axis", "yaw", "--from", "500"], "no samples between"),
-        ([], "missing option"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_with_a_hint(run_cli, tmp_path, arguments, says):

@@ -45,6 +45,11 @@ def test_identify_gives_the_fits_of_the_command(run_cli, inside):
     assert "+".join(fit.model.runs) == theirs["run"]
 
 
+def test_the_axis_is_that_which_the_runs_excite_where_none_is_given(inside):
+    (told,), (seen,) = (fs.identify("pulses_1.4.parquet", *axis) for axis in (("yaw",), ()))
+    assert (seen.model.axis, seen.model.values) == (told.model.axis, told.model.values)
+
+
 def test_tables_give_the_fit_of_their_files(inside):
     runs = fs.load("pulses_*.parquet")
     (of_files,) = fs.identify("pulses_*.parquet", "yaw", joint=True)
