@@ -85,7 +85,7 @@ def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> 
     return [replace(run, name=own[path]) for run, path in zip(runs, used, strict=True)]
 
 
-def axis_of(runs: Sequence[Run]) -> Axis:
+def axis_excited(runs: Sequence[Run]) -> Axis:
     """Return the axis that runs excite; raises what `excited_axis` does."""
     from fieldsid.logs.segments import excited_axis
     from fieldsid.models.axis import Axis

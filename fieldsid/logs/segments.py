@@ -73,11 +73,11 @@ def excited_axis(runs: Sequence[Run], *, written: str) -> str:
             found=", ".join(sorted({k for run in runs for k in run.signals if run.has(k)})) or "no signals",
             hint="map `rudder_rad` or `elevator_rad` on import",
         )
-    excited = {axis: [run.name for run in runs if is_excited(run, axis)] for axis in _FINS}
-    found = [axis for axis, names in excited.items() if names]
+    excited = {axis: sum(is_excited(run, axis) for run in runs) for axis in _FINS}
+    found = [axis for axis, count in excited.items() if count]
     if len(found) == 1:
         return found[0]
-    seen = ", ".join(f"{axis} in {len(names)} of {len(runs)}" for axis, names in excited.items())
+    seen = ", ".join(f"{axis} in {count} of {len(runs)}" for axis, count in excited.items())
     raise UsageError(
         "the runs excite both axes, and one is identified at a time" if found else "no fin of the runs leaves its trim",
         found=f"a fin clearly away from its trim: {seen}",

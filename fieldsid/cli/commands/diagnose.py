@@ -57,7 +57,7 @@ def command(
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
-    from fieldsid.cli.inputs import axis_of, files_of, read_groups
+    from fieldsid.cli.inputs import axis_excited, files_of, read_groups
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
 
@@ -67,7 +67,7 @@ def command(
     skips, ready = Skips(), partial(get_ready, "fieldsid.diagnosis")
     held = partial(check_effects, [(model, known)] if model and known else [])
     training, unseen = read_groups([runs, validate or []], mapping=mapping, check=held, meanwhile=ready, refused=skips.skip)
-    axis = known.axis if known else axis or axis_of(training)
+    axis = known.axis if known else axis or axis_excited(training)
     from fieldsid.diagnosis import diagnose
     from fieldsid.models.definition import NONE
 

@@ -76,13 +76,13 @@ def command(
 
     Example: sysid identify runs/*.parquet --axis yaw -o models/
     """
-    from fieldsid.cli.inputs import axis_of, files_of, read_runs
+    from fieldsid.cli.inputs import axis_excited, files_of, read_runs
     from fieldsid.cli.skipped_logs import Skips
 
     refuse_closed(output)
     skips, ready = Skips(), partial(get_ready, "fieldsid.fitting.identify")
     known = read_runs(runs, mapping=mapping, start=start, end=end, meanwhile=ready, refused=skips.skip)
-    axis = axis or axis_of(known)
+    axis = axis or axis_excited(known)
     from fieldsid.fitting.identify import check_joint, identify
     from fieldsid.fitting.problem.estimator import Options
     from fieldsid.vehicle import find_vehicle, load_vehicle

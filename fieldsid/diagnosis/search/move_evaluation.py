@@ -70,8 +70,8 @@ class MoveEvaluation(SearchState):
             self.tried.free_runs.screened.add(key)
             later = self._evaluate_moves(parent, by_effect(found))
             if only_validation_shows(parent, self.floor):
-                untried = [e for e in left if frozenset((*key, e.name)) not in self.tried]
-                self._evaluate_moves(parent, by_effect(moves_of_all_runs(parent, untried, self.parallel)), every=True)
+                moves = moves_of_all_runs(parent, self._untried(parent), self.parallel)
+                self._evaluate_moves(parent, by_effect(moves), every=True)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
             self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
             self._refine_children(key)
@@ -154,12 +154,21 @@ class MoveEvaluation(SearchState):
             left += [group[i] for i in later]
         return left
 
+    def _untried(self, h: ScoredModel) -> list[Effect]:
+        """Return the effects of the catalogue that were not tried beside those of a model."""
+        return [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
+
+    def _try_added(
+        self, h: ScoredModel, effects: Sequence[Effect], most: int | None, *, near: ScoredModel | None = None, behind: float = 0.0
+    ) -> None:  # fmt: skip
+        """Fit a model with each of some effects that passes its likelihood's screen: see `add_effect` and `_evaluate_moves`."""
+        moves = add_effect(h, effects, most, self.parallel, anew=False, flown=True, behind=behind)
+        self._evaluate_moves(h, by_effect(moves), near=near)
+
     def _add_at(self, best: ScoredModel, others: Sequence[Effect], effects: Sequence[Effect]) -> None:
         """Add each of some effects to others at the parameters of the best model."""
         if effects:
-            parent = self._moved(best, others)
-            moves = by_effect(add_effect(parent, effects, None, self.parallel, anew=False, flown=True))
-            self._evaluate_moves(parent, moves, near=best)
+            self._try_added(self._moved(best, others), effects, None, near=best)
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
@@ -175,9 +184,8 @@ class MoveEvaluation(SearchState):
 
         Not what an effect of the model may be mistaken for: that takes a part of it, and is exchanged for it elsewhere.
         """
-        alike = {n for e in h.effects for n in (e.name, *e.mistaken_for)}
-        left = [e for e in self.catalogue if e.name not in alike and frozenset((*h.names, e.name)) not in self.tried]
-        self._evaluate_moves(h, by_effect(add_effect(h, left, MAX_PROMISING, self.parallel, anew=False, flown=True)))
+        alike = {n for e in h.effects for n in e.mistaken_for}
+        self._try_added(h, [e for e in self._untried(h) if e.name not in alike], MAX_PROMISING)
 
     def _may_come_near(self, h: ScoredModel, ml_fit: LikelihoodFit) -> bool:
         """Whether a fit may come near a model by log evidence, if it left nothing of the validation runs but the noise.

@@ -14,7 +14,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximu
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
-from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, add_effect, by_effect, likelihood_linearisation, may_gain
+from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, likelihood_linearisation, may_gain
 from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MoveEvaluation
 from fieldsid.diagnosis.search.variant_search import VariantRequest
@@ -55,10 +55,7 @@ class Search(MoveEvaluation):
             and self.may_go_on()
             and (nothing or residuals_reject(found.likelihood_fit, self.parallel))
         ):
-            untried = [e for e in self.catalogue if nothing and e.variants and self.root | {e.name} not in self.tried]
-            self._evaluate_moves(
-                self.base(), by_effect(add_effect(self.base(), untried, None, self.parallel, anew=False, flown=True))
-            )
+            self._try_added(self.base(), [e for e in self._untried(self.base()) if nothing and e.variants], None)
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
         if self._is_expandable(leading := self._most_evident()):
@@ -128,14 +125,12 @@ class Search(MoveEvaluation):
         best = self._most_evident()
         for h in [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]:
             if self.may_go_on():
-                left = [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
-                self._add_to_rival(h, left, best)
+                self._add_to_rival(h, self._untried(h), best)
 
     def _add_to_rival(self, h: ScoredModel, effects: Sequence[Effect], best: ScoredModel) -> None:
         """Add to a model the effects that, to first order, may bring it near the best by log evidence."""
         behind = max(lacks(h, best) - RIVAL_LOG_ODDS, 0.0)
-        moves = add_effect(h, effects, MAX_EFFECTS_LATER, self.parallel, anew=False, flown=True, behind=behind)
-        self._evaluate_moves(h, by_effect(moves), near=best)
+        self._try_added(h, effects, MAX_EFFECTS_LATER, near=best, behind=behind)
 
     def _predicts_as_well(self, h: ScoredModel, best: ScoredModel) -> bool:
         """Whether an accepted set of no more effects, some at least, leaves nothing missing on fitted nor on unseen runs."""
