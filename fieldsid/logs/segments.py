@@ -77,11 +77,17 @@ def excited_axis(runs: Sequence[Run], *, written: str) -> str:
     found = [axis for axis, count in excited.items() if count]
     if len(found) == 1:
         return found[0]
-    seen = ", ".join(f"{axis} in {count} of {len(runs)}" for axis, count in excited.items())
+    has_fin = {axis: any(_fin_of(run, axis) for run in runs) for axis in _FINS}
+    seen = ", ".join(
+        f"{axis} in {count} of {len(runs)}" if has_fin[axis] else f"no fin for {axis} (`{_FINS[axis][1]}`)"
+        for axis, count in excited.items()
+    )
+    lacking = next((_FINS[axis][1] for axis in _FINS if not has_fin[axis]), None)
+    otherwise = "or fly an excitation" if lacking is None else f"or map `{lacking}` on import"
     raise UsageError(
-        "the runs excite both axes, and one is identified at a time" if found else "no fin of the runs leaves its trim",
+        "the runs excite both axes, and one is identified at a time" if found else "no fin in the runs leaves its trim",
         found=f"a fin clearly away from its trim: {seen}",
-        hint=written if found else f"{written}, or fly an excitation",
+        hint=written if found else f"{written}, {otherwise}",
     )
 
 

@@ -35,6 +35,13 @@ def test_the_axis_may_be_left_out_where_the_run_excites_one_alone(run_cli, tmp_p
     assert (asked["axis"], asked["fits"]) == (told["axis"], told["fits"])
 
 
+def test_runs_that_excite_both_axes_are_refused_without_one(run_cli, tmp_path):
+    answer = run_cli("identify", *(trial.flown(tmp_path, axis, name=str(axis)) for axis in Axis))
+    assert answer.code == 2
+    assert "yaw in 1 of 2, pitch in 1 of 2" in answer.err
+    assert "--axis yaw" in answer.err
+
+
 def test_the_fin_offset_follows_from_trim_and_authority(run_cli, tmp_path):
     (fit,) = run_cli("identify", trial.flown(tmp_path), "--axis", "yaw", "--json").json["fits"]
     p = fit["parameters"]

@@ -99,13 +99,15 @@ def test_the_axis_that_runs_excite_is_that_whose_fin_leaves_its_trim(axis):
     ("signals", "error", "found"),
     [
         ({"rudder_rad": pulses(), "elevator_rad": pulses()}, UsageError, "yaw in 1 of 1, pitch in 1 of 1"),
-        ({"rudder_rad": 0.0 * TIME}, UsageError, "yaw in 0 of 1, pitch in 0 of 1"),
+        ({"rudder_rad": 0.0 * TIME, "elevator_rad": 0.0 * TIME}, UsageError, "yaw in 0 of 1, pitch in 0 of 1"),
+        ({"elevator_rad": 0.0 * TIME}, UsageError, "no fin for yaw (`rudder_rad`), pitch in 0 of 1"),
         ({"yaw_rad": pulses()}, DataError, "yaw_rad"),
     ],
-    ids=["both", "neither", "no fin"],
+    ids=["both", "neither", "one missing", "no fin"],
 )
 def test_no_axis_is_guessed(signals, error, found):
     with pytest.raises(error) as raised:
         excited_axis([Run("r", TIME, signals)], written="choose one")
     assert found in raised.value.found
     assert ("choose one" in str(raised.value.hint)) is (error is UsageError)
+    assert ("map `rudder_rad`" in str(raised.value.hint)) is ("rudder_rad" not in signals)
