@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.noise.noise_kinds import NOISE_KINDS, Filter
+from fieldsid.noise.noise_kinds import NOISE_KINDS, Filter, NoiseKind
 from fieldsid.numerics.arrays import FloatArray
 
-FILTERS = tuple((kind.filter, kind.absent) for kind in NOISE_KINDS.values())
+KINDS = tuple((kind, kind.absent) for kind in NOISE_KINDS.values())
 
 
 def kalman_filter(
@@ -31,8 +31,13 @@ def kalman_filter(
 
 def filter_of(noise: FloatArray) -> Filter:
     """Return the filter of the first kind that holds all of a noise vector (7,)."""
+    return kind_of(noise).filter
+
+
+def kind_of(noise: FloatArray) -> NoiseKind:
+    """Return the first kind that holds all of a noise vector (7,)."""
     sizes = noise.tolist()
-    return next(f for f, absent in FILTERS if not any(sizes[i] for i in absent))
+    return next(kind for kind, absent in KINDS if not any(sizes[i] for i in absent))
 
 
 def innovations(

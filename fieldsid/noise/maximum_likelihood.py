@@ -11,10 +11,11 @@ import numpy.typing as npt
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.fisher_scoring import information, innovations_of
-from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
+from fieldsid.noise.innovations import kind_of
+from fieldsid.noise.noise_kinds import LOG_MEDIANS, LOG_PRECISIONS, NOISE_FIELDS, NOISE_KINDS, NOISE_PARAMETERS
 from fieldsid.noise.secant_information import with_secants
 from fieldsid.noise.white_floor import MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S, white_noise_floor
-from fieldsid.noise.whiten import base_dynamics, whiten
+from fieldsid.noise.whiten import base_dynamics, noise_vector, whiten
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.bounded_lm_step import bounded_step
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
@@ -50,6 +51,13 @@ def log_likelihood(
     return total
 
 
+def log_prior(noise: Noise) -> float:
+    """Return the log prior density of a noise, up to a constant: of the numbers that its kind has, see `NoiseParameter.usual`."""
+    numbers = noise_vector(noise)
+    place = [i for i in map(NOISE_FIELDS.index, kind_of(numbers).fields) if LOG_PRECISIONS[i] > 0.0]
+    return -0.5 * float(LOG_PRECISIONS[place] @ (np.log(numbers[place]) - LOG_MEDIANS[place]) ** 2)
+
+
 def estimate_noise(
     records: Sequence[Record],
     dynamics: Sequence[tuple[float, float]],
@@ -60,6 +68,7 @@ def estimate_noise(
     floor: Noise | None = None,
     *,
     reinitialise: bool = True,
+    has_prior: bool = False,
     evaluations: EvaluationCounter | None = None,
 ) -> tuple[Noise, float]:
     """Return the noise of a family with the highest likelihood, and that log likelihood.
@@ -67,9 +76,10 @@ def estimate_noise(
     dynamics are (damping, stiffness) of each run's base model; start gives where the search begins; likelihood, of a
     noise vector (7,), is by default that of the residuals as they are; floor is what the white noise stays near, by
     default what the signals show of it; reinitialise: whether components that the start has almost none of begin at their
-    rough size; evaluations counts the runs filtered. Fisher scoring on the logarithms of the noise's numbers (Harvey 1989,
-    section 3.4.5); another likelihood gives its own gradient, the residuals' the information. Residuals of a motion without
-    bound have none: the start is returned, and minus infinity.
+    rough size; has_prior: whether the prior density counts with the likelihood, see `log_prior`; evaluations counts the runs
+    filtered. Fisher scoring on the logarithms of the noise's numbers (Harvey 1989, section 3.4.5); another likelihood gives
+    its own gradient, the residuals' the information. Residuals of a motion without bound have none: the start is returned,
+    and minus infinity.
     """
     if not all(np.isfinite(e).all() for e in residuals):
         return start, -np.inf
@@ -79,7 +89,8 @@ def estimate_noise(
     low, high = _bounds(names, floor, _resolution(records))
     place = np.array([NOISE_FIELDS.index(n) for n in names])
     known = np.array([p.absent for p in NOISE_PARAMETERS.values()])
-    slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, likelihood, evaluations or EvaluationCounter())
+    counted = evaluations or EvaluationCounter()
+    slope = _LogNoiseLikelihood(records, dynamics, residuals, known, place, has_prior, likelihood, counted)
     x = np.clip(np.log([max(rough.get(n, getattr(start, n)), BELOW_ANY_BOUND) for n in names]), low, high)
     value, score, fisher = slope.at(x)
     damping, secants, curvature = MIN_DAMPING, list[tuple[FloatArray, FloatArray]](), fisher
@@ -117,6 +128,7 @@ class _LogNoiseLikelihood:
     residuals: Sequence[FloatArray]
     known: FloatArray
     place: npt.NDArray[np.int64]
+    has_prior: bool
     likelihood: Callable[[FloatArray], float] | None
     evaluations: EvaluationCounter
 
@@ -134,7 +146,9 @@ class _LogNoiseLikelihood:
         count, noise = x.size, self.vector(x)
         runs = [(r, *base_dynamics(a, k), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)]
         here = [innovations_of(r, a, k, noise, self.place, e) for r, a, k, e in runs]
-        total = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
+        learned = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
+        off, precisions = x - LOG_MEDIANS[self.place], self.has_prior * LOG_PRECISIONS[self.place]
+        total = learned - 0.5 * float(precisions @ off**2)
         if not (np.isfinite(total) and total > least):
             return -np.inf, np.zeros(count), np.eye(count)
         parts = [information(r, a, k, noise, self.place, e, h) for (r, a, k, e), h in zip(runs, here, strict=True)]
@@ -142,8 +156,9 @@ class _LogNoiseLikelihood:
         score, fisher = np.sum([s for s, _ in parts], axis=0), np.sum([f for _, f in parts], axis=0)
         if self.likelihood is not None:
             score = np.array(
-                [(self.likelihood(self.vector(x + d)) - total) / GRADIENT_STEP for d in GRADIENT_STEP * np.eye(count)]
+                [(self.likelihood(self.vector(x + d)) - learned) / GRADIENT_STEP for d in GRADIENT_STEP * np.eye(count)]
             )
+        score, fisher = score - precisions * off, fisher + np.diag(precisions)
         known = np.isfinite(score).all() and np.isfinite(fisher).all()
         return (total, score, fisher) if known else (-np.inf, np.zeros(count), np.eye(count))
 

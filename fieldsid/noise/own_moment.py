@@ -18,7 +18,7 @@ import numpy as np
 
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood
+from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood, log_prior
 from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.whiten import base_dynamics, whiten
 from fieldsid.numerics.arrays import FloatArray
@@ -98,16 +98,17 @@ def estimate_noise_of_runs(
     start: Noise, floor: Noise, most: float, known: Sequence[MomentInformation] = (), *,
     reinitialise: bool = True, evaluations: EvaluationCounter | None = None,
 ) -> tuple[Noise, float]:  # fmt: skip
-    """Return the noise of a kind, each run's own moment with it, of the highest likelihood, and that log likelihood.
+    """Return the noise of a kind, each run's own moment with it, of the highest posterior density, and the log of that.
 
-    Arguments are those of `estimate_noise`; `most` is the largest standard deviation of the moments (rad/s^2), `known` what other
-    runs tell of theirs. Where the motion is without bound: the start, and minus infinity.
+    It is the likelihood times the prior density, each up to a constant. Arguments are those of `estimate_noise`; `most` is the
+    largest standard deviation of the moments (rad/s^2), `known` what other runs tell of theirs. Where the motion is without
+    bound: the start, and minus infinity.
     """
     noise, std = start, start.own_moment if len(records) + len(known) > 1 else 0.0
     for count in range(MAX_ROUNDS):
         left, again = _less_own_moments(records, dynamics, residuals, noise, std), reinitialise and count == 0
         noise, value = estimate_noise(
-            records, dynamics, left, noise_kind, noise, floor=floor, reinitialise=again, evaluations=evaluations
+            records, dynamics, left, noise_kind, noise, floor=floor, reinitialise=again, has_prior=True, evaluations=evaluations
         )
         if not np.isfinite(value):
             return start, -np.inf
@@ -115,7 +116,8 @@ def estimate_noise_of_runs(
         if last == std or min(last, std) * SAME_STD_RATIO > max(last, std):
             break
     noise = replace(noise, own_moment=std)
-    return noise, value if std == last == 0.0 else log_likelihood(records, dynamics, residuals, noise)
+    moved = not std == last == 0.0
+    return noise, log_likelihood(records, dynamics, residuals, noise) + log_prior(noise) if moved else value
 
 
 def _less_own_moments(

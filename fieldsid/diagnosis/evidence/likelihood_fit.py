@@ -24,7 +24,6 @@ from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.maximum_likelihood import log_likelihood
 from fieldsid.noise.own_moment import FIN_REPEATABILITY_RAD, MomentInformation, estimate_noise_of_runs, moment_information
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.rounding import nine_digits
@@ -66,7 +65,10 @@ class FittedProblem:
 
 @dataclass(frozen=True)
 class LikelihoodFit:
-    """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there."""
+    """A maximum-likelihood fit: generalised least squares under its own noise model, and the log likelihood there.
+
+    That holds the log prior density of the noise: a disturbance slower than any sea must not stand for what a model lacks.
+    """
 
     fitted: FittedProblem
     noise: Noise
@@ -171,12 +173,6 @@ def exchange_penalty(ml_fit: LikelihoodFit) -> float:
 def likelihood_at(problem: Problem, x: FloatArray, ml_fit: LikelihoodFit) -> float:
     """Return the log likelihood of other parameters of a model, under the likeliest noise of its kind for these parameters."""
     return _noise_at(problem, x, ml_fit.noise, ml_fit.floor, ml_fit.noise_kind)[1]
-
-
-def likelihood_by_run(problem: Problem, x: FloatArray, noise: Noise) -> FloatArray:
-    """Return each run's log likelihood, (R,)."""
-    residuals, dynamics = residuals_of(problem, x), dynamics_of(problem, x)
-    return np.array([log_likelihood([r], [d], [e], noise) for r, d, e in zip(problem.records, dynamics, residuals, strict=True)])
 
 
 def measured_count(records: Sequence[Record]) -> int:

@@ -25,7 +25,6 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
     fit_output_error,
     largest_own_moment,
     likelihood_at,
-    likelihood_by_run,
     measured_count,
 )
 from fieldsid.diagnosis.evidence.predictive_density import ValidationRun, log_predictive_density, parameter_jacobian
@@ -52,7 +51,7 @@ FREE_RUNS = ("training_runs", "validation_runs", "settled_runs", "errors_by_mome
 
 @dataclass(frozen=True)
 class ScoredModel:
-    """A maximum-likelihood fit with its log likelihood by run, predictive density, penalty, and validation fits.
+    """A maximum-likelihood fit with its predictive density, penalty, and validation fits.
 
     `own_moment` (rad/s^2) is the standard deviation of the moment that each run, of training and validation, has of its own, the
     mean of its disturbance in it.
@@ -61,7 +60,6 @@ class ScoredModel:
     """
 
     likelihood_fit: LikelihoodFit
-    log_likelihood_by_run: FloatArray
     validation_log_density: FloatArray
     complexity_penalty: float
     validation: tuple[Record, ...]
@@ -212,7 +210,7 @@ class ScoredModel:
     @property
     def log_likelihood(self) -> float:
         """Log likelihood of the training runs."""
-        return float(self.log_likelihood_by_run.sum())
+        return self.likelihood_fit.log_likelihood
 
     @property
     def training_evidence(self) -> float:
@@ -226,7 +224,7 @@ class ScoredModel:
 
 
 def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredModel:
-    """Return a maximum-likelihood fit with its log likelihood by training run and log predictive density by validation run."""
+    """Return a maximum-likelihood fit with its log predictive density by validation run."""
     problem, x = ml_fit.fitted.problem, ml_fit.fitted.x
     flown = validation_fits(bare_model(problem, x, ml_fit.noise), ml_fit.fitted, validation)
     density, settled, own_moment = validation_log_density(ml_fit, validation, flown)
@@ -234,7 +232,6 @@ def score_model(ml_fit: LikelihoodFit, validation: Sequence[Record]) -> ScoredMo
     own_moment = float(np.hypot(own_moment, disturbance_mean_std(ml_fit.noise, span)))
     return ScoredModel(
         ml_fit,
-        likelihood_by_run(problem, x, ml_fit.noise),
         density,
         bic_penalty(ml_fit, validation),
         tuple(validation),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from truth.noise import ar1
@@ -15,10 +17,11 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
-from fieldsid.noise.maximum_likelihood import estimate_noise
+from fieldsid.noise.maximum_likelihood import estimate_noise, log_likelihood, log_prior
+from fieldsid.noise.moment_response import base_responses
 from fieldsid.noise.noise_kinds import NOISE_FIELDS, NOISE_KINDS
 from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
-from fieldsid.noise.whiten import noise_vector
+from fieldsid.noise.whiten import base_dynamics, noise_vector
 from fieldsid.numerics.white_noise import white_noise_std
 
 SIGMA = 0.005
@@ -139,6 +142,38 @@ def test_a_search_that_wakes_nothing_loses_none_of_the_likelihood_it_begins_with
     again, still = estimate_noise(known.records, dynamics, [residual], "both", found, reinitialise=False)
     assert likelihood - 1e-6 <= still < likelihood + 0.3
     assert again.disturbance == pytest.approx(found.disturbance, rel=0.2, abs=1e-4)
+
+
+def test_a_prior_counts_with_the_likelihood_and_is_at_its_highest_where_the_search_ends():
+    known, x = problem(gust=0.03)
+    records, residual, dynamics = known.records, known.residual(x, 0)[0], [(TRUTH[0], 0.0)]
+    found, value = estimate_noise(records, dynamics, [residual], "disturbance", STARTS[0], has_prior=True)
+
+    def density(noise):
+        return log_likelihood(records, dynamics, [residual], noise) + log_prior(noise)
+
+    assert value == pytest.approx(density(found), abs=1e-9)
+    for name in NOISE_KINDS["disturbance"].fields:
+        for factor in (0.8, 1.25):
+            assert density(replace(found, **{name: getattr(found, name) * factor})) < value
+
+
+def test_what_drifts_through_a_whole_run_is_no_sea():
+    known, x = problem()
+    records, dynamics, time = known.records, [(TRUTH[0], 0.0)], known.records[0].time
+    base = base_responses(records[0].nominal_steps, *base_dynamics(*dynamics[0]))[0]
+    drift = known.residual(x, 0)[0] + 0.01 * base * time / time[-1]
+    (plain, likelihood), (found, density) = (
+        estimate_noise(records, dynamics, [drift], "disturbance", STARTS[0], has_prior=p) for p in (False, True)
+    )
+    assert found.disturbance_time < 0.8 * plain.disturbance_time
+    assert density < likelihood - 1.0
+
+
+def test_the_number_of_a_noise_that_its_kind_does_not_have_has_no_prior():
+    assert log_prior(Noise(SIGMA, SIGMA)) == log_prior(Noise(SIGMA, SIGMA, coloured_angle=SIGMA, coloured_time=9.0)) == 0.0
+    assert log_prior(Noise(SIGMA, SIGMA, 0.01, 2.0)) == pytest.approx(0.0)
+    assert log_prior(Noise(SIGMA, SIGMA, 0.01, 8.0)) == pytest.approx(-2.0)  # two standard deviations
 
 
 def test_the_spread_of_a_noise_number_is_that_of_a_sample_variance():

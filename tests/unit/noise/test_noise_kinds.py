@@ -6,6 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from fieldsid.models.model import Noise
 from fieldsid.noise.innovations import innovations
@@ -35,3 +36,13 @@ def test_a_kind_is_filtered_as_the_noise_of_all_processes_without_the_others(nam
     there = np.array([max(v, 1e-9) for v in noise])
     assert logs == pytest.approx(full_filter(steps, ok, 0.7, 0.0, there, series, full, np.empty((2, 80))), rel=1e-6)
     np.testing.assert_allclose(own, full, rtol=1e-5, atol=1e-7)
+
+
+def test_ninety_five_of_a_hundred_lie_within_the_usual_limits_of_a_number():
+    for parameter in NOISE_PARAMETERS.values():
+        median, precision = parameter.log_prior
+        if parameter.usual is None:
+            assert precision == 0.0
+        else:
+            within = np.diff(norm.cdf(np.log(parameter.usual), median, precision**-0.5))
+            assert within == pytest.approx(0.95, abs=0.006)

@@ -121,7 +121,8 @@ def test_a_compiled_filter_gives_the_numbers_of_its_python_source(family, monkey
     for plain in (False, True):
         if plain:
             monkeypatch.setattr(noise_kinds, "sensor_colour_filter", plain_of(noise_kinds.sensor_colour_filter))
-            monkeypatch.setattr(innovations, "FILTERS", tuple((plain_of(f), absent) for f, absent in innovations.FILTERS))
+            kinds = tuple((replace(k, filter=plain_of(k.filter)), absent) for k, absent in innovations.KINDS)
+            monkeypatch.setattr(innovations, "KINDS", kinds)
         out, spreads = np.empty_like(series), np.empty((2, len(log)))
         found.append((kalman_filter(log.nominal_steps, log.ok, A, K, noise, series, out, spreads), out, spreads))
     for fast, slow in zip(*found, strict=True):

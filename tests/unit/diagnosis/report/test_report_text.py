@@ -24,18 +24,14 @@ def _errors(*over: float) -> Errors:
     return Errors(FLOOR.angle * mean, FLOOR.rate * mean, tuple(Errors(FLOOR.angle * e, FLOOR.rate * e) for e in over))
 
 
-def _made(*names: str, train: tuple[float, ...], unseen: tuple[float, ...], score: float, runs: tuple[float, ...] = ()):
-    """One with errors over the floor of its fitted and unseen runs, a log evidence, and that of its runs."""
+def _made(*names: str, train: tuple[float, ...], unseen: tuple[float, ...], score: float):
+    """One with errors over the floor of its fitted and unseen runs, and a log evidence."""
     pair = Pair(_errors(*train), _errors(*unseen))
-    likely = np.array(runs or [score / 2.0] * (len(train) + len(unseen)))
-    by_run, of_unseen = likely[: len(train)], likely[len(train) :]
     return SimpleNamespace(
         names=names,
         log_evidence=score,
         errors=pair,
         selection_errors=pair.validation,
-        log_likelihood_by_run=by_run,
-        validation_log_density=of_unseen,
     )
 
 
@@ -70,7 +66,7 @@ def test_errors_of_logs_without_noise_are_said_in_their_units():
 
 def test_runs_are_counted_by_the_error_that_the_sentence_is_about():
     base = _made(train=(90.0,), unseen=(145.0,), score=0.0)
-    h = _made("stall", train=(800.0,), unseen=(1922.0,), score=9.0, runs=(4.0, 5.0))
+    h = _made("stall", train=(800.0,), unseen=(1922.0,), score=9.0)
     said = evidence(_search(base), h, h.errors, FLOOR, h.log_evidence)
     assert "145.00 -> 1922.00" in said
     assert said.endswith("error lower on 0 of 2 runs")

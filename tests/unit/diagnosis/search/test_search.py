@@ -153,7 +153,8 @@ def test_a_model_lacks_no_more_evidence_than_on_the_training_runs_in_proportion(
     h = base.base()
     more = replace(h, validation_log_density=h.validation_log_density + 100.0)
     assert lacks(h, more) == 0.0
-    both = replace(more, log_likelihood_by_run=h.log_likelihood_by_run + 10.0 / len(h.log_likelihood_by_run))
+    fit = more.likelihood_fit
+    both = replace(more, likelihood_fit=replace(fit, log_likelihood=fit.log_likelihood + 10.0))
     share = measured_count(base.records) / measured_count((*base.records, *base.validation))
     assert lacks(h, both) == pytest.approx(10.0 / share)
     assert lacks(both, h) == pytest.approx(-100.0 * len(h.validation_log_density) - 10.0)
