@@ -43,6 +43,7 @@ def hypothesis(*names, gain=0.0, over=1.0, train=1.0, settled=None, own_moment=0
         effects=effects,
         log_likelihood=0.5 * gain,
         log_evidence=gain,
+        validation_log_density=np.array([0.5 * gain]),
         selection_errors=errors[0],
         train=errors[1],
         error_of_all_runs=lambda floor: float(np.hypot(errors[0].over(floor), errors[1].over(floor)) / 2**0.5),
@@ -128,6 +129,19 @@ def test_both_models_are_compared_with_the_moments_of_the_runs_own_that_the_more
     assert now.angle_rms_rad == pytest.approx(FLOOR.angle / 1.1)
     assert is_accepted(lacks, found)
     assert not is_accepted(found, lacks)
+
+
+@pytest.mark.parametrize(
+    ("gain", "train", "accepted"),
+    [
+        (50.0, 1.3, True),
+        (50.0, 1.1, False),  # no error is visible, of which a chance value could be a part
+        (-50.0, 1.3, False),
+    ],
+)
+def test_a_value_that_training_runs_leave_to_chance_is_judged_by_what_all_runs_tell(gain, train, accepted):
+    lacks, found = hypothesis(over=1.19, train=train, settled=1.11), hypothesis("gyro_bias", gain=gain, over=1.95, settled=1.03)
+    assert lowers_error(lacks, found, FLOOR) is accepted
 
 
 def test_numbers_of_every_runs_own_must_be_learned_on_the_runs_fitted_to():
