@@ -26,12 +26,15 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import is_white
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.numerics.bounded_lm_step import bounded_step
 from fieldsid.numerics.gram_least_squares import solve_normal_equations
 from fieldsid.rounding import nine_digits
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
 """Iterations for a run's nuisances, and the share of the sum of squares that an iteration must gain."""
+MAX_STEPPED_POINTS = 4
+"""Points of a scan that are stepped from: the two of least cost, and as many beside them."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -208,7 +211,8 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
     """Return starts with every per-run nuisance at the best points of its scan grid, and x itself, each once.
 
     The points are compared with the initial state that is best at each, to first order: a wrong point bends the start of a run,
-    and at that start the wrong point is the best.
+    and at that start the wrong point is the best. The best few are then compared where a step leads from them: an event beside an
+    edge of the fin has a minimum narrower than the grid, which no other basin leads to.
     """
     layout = problem.layout
     grids = {
@@ -243,7 +247,31 @@ def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
         left = left - step @ slopes
         scored.append((nine_digits(float(left @ left)), tuple(point), np.clip(trial, layout.low, layout.high)))
     scored.sort(key=lambda item: item[:2])
-    return [x, *(trial for _, _, trial in scored[:2] if not np.array_equal(trial, x))]
+    reach = np.full(x.size, np.inf)
+    reach[list(grids)] = [max(np.diff(grid), default=np.inf) for grid in grids.values()]
+    stepped = [(*_stepped(problem, trial, weight, reach), point) for _, point, trial in scored[:MAX_STEPPED_POINTS]]
+    likely = sorted(stepped, key=lambda item: (item[0], item[2]))
+    return [x, *(trial for cost, trial, _ in likely[:2] if np.isfinite(cost) and not np.array_equal(trial, x))]
+
+
+def _stepped(problem: Problem, x: FloatArray, weight: FloatArray, reach: FloatArray) -> tuple[float, FloatArray]:
+    """Return cost and vector that a Gauss-Newton step of a one-run problem's nuisances leads to, each moved within its reach."""
+    layout = problem.layout
+    own = range(layout.shared, x.size)
+    result = problem.linearise(x, 0, own)
+    stack = (result.stack * weight).reshape(result.stack.shape[0], -1)
+    if not np.isfinite(stack).all():
+        return np.inf, x
+    low, high = np.maximum(layout.low, x - reach)[own], np.minimum(layout.high, x + reach)[own]
+    step = bounded_step(stack[1:] @ stack[1:].T, stack[1:] @ stack[0], 0.0, x[own], low, high)
+    trial = x.copy()
+    trial[own] = np.clip(x[own] + step, low, high)
+    try:
+        left = problem.residual(trial, 0)[0] * weight
+    except EffectError:
+        return np.inf, x
+    cost = float(np.vdot(left, left))
+    return (nine_digits(cost), trial) if np.isfinite(cost) else (np.inf, x)
 
 
 def _layout_of_one(layout: ParameterLayout, run: int) -> ParameterLayout:
