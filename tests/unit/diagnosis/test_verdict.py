@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fieldsid.diagnosis import verdict
@@ -34,6 +35,7 @@ def judged(
         train_under=lambda _std: errors((fitted or (before, after))[0], runs),
         own_moment=0.0,
         log_evidence=0.0,
+        validation_log_density=np.zeros(1),
         unseen_under=lambda _std: (errors(before), errors(before)),
     )
     found = SimpleNamespace(
@@ -46,6 +48,7 @@ def judged(
         validation_errors=errors(after),
         own_moment=0.0,
         log_evidence=gain,
+        validation_log_density=np.zeros(1),
         unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
     sums = {frozenset(): 0.0, frozenset(named): gain}

@@ -244,6 +244,7 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out(base, m
             effects=effects,
             log_evidence=evidence,
             log_likelihood=evidence,
+            validation_log_density=np.zeros(1),
             selection_errors=errors,
             train=errors,
             own_moment=0.0,
