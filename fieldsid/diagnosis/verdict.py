@@ -114,19 +114,20 @@ def added_effects(search: Search, h: ScoredModel) -> tuple[str, ...]:
 
 
 def rivals_of(search: Search, found: ScoredModel) -> tuple[ScoredModel, ...]:
-    """Return the models that cannot be distinguished from the final one, of its size, or larger and ending a visible error."""
+    """Return the models that cannot be distinguished from the final one, of its size, or larger and ending a visible error.
+
+    Their free runs may differ, at numbers that the training runs leave open: the evidence has counted that.
+    """
     margin, sums = RIVAL_LOG_ODDS if len(search.records) > 1 else 2.0 * RIVAL_LOG_ODDS, search.evidences()
     best = sums[frozenset(found.names)]
 
-    def predicts(h: ScoredModel) -> bool:
+    def stands_for(h: ScoredModel) -> bool:
         if len(h.names) > len(found.names):
             return set(found.names) < set(h.names) and settles_error(found, h, search.floor)
-        alike = h.selection_errors.mean < EQUAL_ERROR_RATIO * found.selection_errors.mean
-        return len(h.names) == len(found.names) and alike
+        return len(h.names) == len(found.names)
 
-    return tuple(
-        h for h in search.ranked() if h is not found and best - sums.get(frozenset(h.names), -np.inf) < margin and predicts(h)
-    )
+    near = (h for h in search.ranked() if best - sums.get(frozenset(h.names), -np.inf) < margin)
+    return tuple(h for h in near if h is not found and stands_for(h))
 
 
 def excess_explained(search: Search, h: ScoredModel, floor: Noise | None = None) -> float:

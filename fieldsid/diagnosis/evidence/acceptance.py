@@ -54,22 +54,23 @@ def lowers_error(
 def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
     """Return the validation errors that two models are compared by.
 
-    They are those at the training runs' parameters or, where they are visible over a noise floor without the addition, those at
-    the parameters of all runs, whichever the addition lowers more: training runs may leave open what one validation run settles,
-    in either model. So they are where the training runs have a visible error without the addition and the validation runs are
-    likelier with it: its predictive density knows what is left open, as the deviation of a compass on headings not flown. Both
-    with moments of the runs' own of the size that the more evident of the two tells: the runs are the same, and what a model
-    lacks is no trim that differs from run to run.
+    They are those at the training runs' parameters or, where the validation runs are likelier with the addition, those at the
+    parameters of all runs, whichever the addition lowers more: training runs may leave open what one validation run settles, in
+    either model, as the deviation of a compass on headings not flown, and the predictive density knows what is left open. Over a
+    noise floor only where the validation runs at those parameters, or the training runs, have a visible error without the
+    addition. Both with moments of the runs' own of the size that the more evident of the two tells: the runs are the same, and
+    what a model lacks is no trim that differs from run to run.
     """
     std = common_own_moment(without, with_)
     first, *settled = zip(without.unseen_under(std), with_.unseen_under(std), strict=True)
-    likelier = float(with_.validation_log_density.sum()) > float(without.validation_log_density.sum())
+    if float(with_.validation_log_density.sum()) <= float(without.validation_log_density.sum()):
+        return first
+    train = without.train_under(std)
 
-    def counts(before: Errors) -> bool:
-        shown = (before, *([without.train_under(std)] if likelier else []))
-        return floor is None or any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in shown)
+    def is_visible(before: Errors) -> bool:
+        return floor is None or any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in (before, train))
 
-    return min((first, *(pair for pair in settled if counts(pair[0]))), key=lambda pair: pair[1].mean / pair[0].mean)
+    return min((first, *(pair for pair in settled if is_visible(pair[0]))), key=lambda pair: pair[1].mean / pair[0].mean)
 
 
 def fitted_errors(without: ScoredModel, with_: ScoredModel) -> tuple[Errors, Errors]:

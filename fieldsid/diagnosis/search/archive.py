@@ -17,8 +17,8 @@ class Progress:
     """What was done under one set of assumptions, by set of effects.
 
     The spec that stands for it; whether it was expanded; the log evidence at which variants of its effects were tried; the specs
-    that were fitted without each of their effects, and those whose effects were exchanged. The lowest error over the floor after
-    each expansion.
+    that were fitted without each of their effects, and those whose effects were exchanged; the log likelihood of the part that
+    its model was fitted again from. The lowest error over the floor after each expansion.
     """
 
     standing: dict[Names, ModelSpec] = field(default_factory=dict)
@@ -26,6 +26,7 @@ class Progress:
     evidence_at_variants: dict[tuple[Names, Names], float] = field(default_factory=dict)
     thinned: set[ModelSpec] = field(default_factory=set)
     exchanged: set[ModelSpec] = field(default_factory=set)
+    likelihood_of_part: dict[Names, float] = field(default_factory=dict)
     lowest_errors: list[float] = field(default_factory=list)
 
 

@@ -40,7 +40,13 @@ from fieldsid.diagnosis.search.add_effect import (
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, FAR_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
+from fieldsid.diagnosis.thresholds import (
+    ALTERNATIVE_LOG_ODDS,
+    FAR_ERROR_RATIO,
+    MAX_ERROR_RATIO,
+    MISSING_ERROR_RATIO,
+    RIVAL_LOG_ODDS,
+)
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
@@ -85,14 +91,14 @@ class MoveEvaluation(SearchState):
         """Fit a model again from its best child, its leading children by output error and under other laws and variants."""
         if self._prefer_output_error(key, refit=self.may_go_on()):
             self._prefer_output_error(key, refit=False)
-        if self.may_go_on():
+        if self.may_go_on(leading=True):
             self._try_laws_and_variants(key, self._leading(key))
 
     def _leading(self, key: frozenset[str]) -> list[frozenset[str]]:
         """Return the best children, and the one with most evidence on the training runs.
 
-        A wrong speed law may hide the last on the validation runs. Only the first and its rivals where it reaches the floor,
-        or where the parent has effects and the child is near the floor or has a pair.
+        A wrong speed law may hide the last on the validation runs. Only those that stay in question beside the first where it
+        reaches the floor, or where the parent has effects and the child is near the floor or has a pair.
         """
         children = self._children(key)
         best = sorted(children, key=lambda h: -h.training_evidence)[:1]
@@ -102,7 +108,18 @@ class MoveEvaluation(SearchState):
         )
         if early and any(leaves_error(h, self.floor) for h in children[:1]):
             return names
-        return [frozenset(h.names) for h in children if children[0].log_evidence - h.log_evidence < RIVAL_LOG_ODDS]
+        return [frozenset(h.names) for h in children if self._stays_in_question(h, children[0])]
+
+    def _stays_in_question(self, h: ScoredModel, best: ScoredModel) -> bool:
+        """Whether a model is a rival of its best sibling by log evidence, or leaves clearly less of fitted and of unseen runs.
+
+        Its evidence may be lower only because its effect is there in another variant: a hull's cross flow, whose drag is no
+        linear one, beside a dead band.
+        """
+        if best.log_evidence - h.log_evidence < RIVAL_LOG_ODDS:
+            return True
+        pairs = ((h.train, best.train), (h.selection_errors, best.selection_errors))
+        return leaves_error(best, self.floor) and all(mine.mean < MAX_ERROR_RATIO * other.mean for mine, other in pairs)
 
     def _fit_from_output_error(self, parent: ScoredModel) -> None:
         """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""
@@ -236,6 +253,27 @@ class MoveEvaluation(SearchState):
         here, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
         x = carry_parameters(here.problem.layout, there.vector, here.vector)
         return fit_maximum_likelihood(here.problem, x, other.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
+
+    def _fit_from_parts(self) -> None:
+        """Fit again from a part of its effects each model that is less likely than that part.
+
+        A model holds the optimum of each of its parts. One found since, beside other effects or in another order, it has missed.
+        """
+        known, missed = self.tried.progress.likelihood_of_part, list[tuple[ScoredModel, ScoredModel]]()
+        for h in self.tried.values():
+            part = max(self._parts(h), key=lambda part: part.log_likelihood, default=h)
+            least = max(h.log_likelihood, known.get(frozenset(h.names), -np.inf))
+            if part.log_likelihood > least + MIN_LIKELIHOOD_GAIN:
+                missed.append((h, part))
+        known.update((frozenset(h.names), part.log_likelihood) for h, part in missed)
+        for ml_fit in self.parallel.map(lambda pair: self._fit_from(*pair), missed):
+            self._keep(ml_fit)
+
+    def _parts(self, h: ScoredModel) -> list[ScoredModel]:
+        """Return the fitted models of one effect fewer that a model holds: the others in its variants, under its speed law."""
+        names = set(h.likelihood_fit.fitted.problem.layout.names)
+        less = ((w, w.likelihood_fit.fitted.problem.layout) for w in self._less(h))
+        return [w for w, layout in less if names > set(layout.names) and all(e in h.effects for e in layout.effects)]
 
     def _prefer_output_error(self, key: frozenset[str], *, refit: bool) -> bool:
         """Give the leading children with more evidence than their parent their output-error fit, where that validates better.

@@ -73,6 +73,7 @@ class Search(MoveEvaluation):
         while (leading := self._next_to_expand()) is not None:
             self._join_children(self.forward_step(leading), leading)
             self._drop_each(self._most_evident())
+            self._fit_from_parts()
             self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
             lowest = self.tried.progress.lowest_errors
@@ -96,6 +97,8 @@ class Search(MoveEvaluation):
             helped = next((i for i, h in enumerate(joined) if h.log_evidence > best.log_evidence), len(left) - 1)
             self.tried.update({frozenset(h.names): h for h in joined[: helped + 1]})
             best, left = max(best, joined[helped], key=lambda h: h.log_evidence), left[helped + 1 :]
+        if best is not children[0] and self.may_go_on(leading=True):
+            self._try_variants([VariantRequest(best)])
 
     def _joined(self, best: ScoredModel, others: Sequence[ScoredModel]) -> list[ScoredModel]:
         """Return a model with what each of others has besides, fitted from their numbers.

@@ -23,9 +23,12 @@ def errors(ratio, runs=1):
 
 def judged(
     monkeypatch, before, after, p, *,
-    noiseless=False, settled=None, named=("servo_lag",), signals=1.0, fitted=None, runs=1, gain=50.0,
+    noiseless=False, settled=None, named=("servo_lag",), signals=1.0, fitted=None, runs=1, gain=50.0, likelier=0.0,
 ):  # fmt: skip
-    """The word for errors over the floor before and after on one unseen run; `fitted` are those on `runs` training runs."""
+    """The word for errors over the floor before and after on one unseen run; `fitted` are those on `runs` training runs.
+
+    `likelier`: by how much the unseen run is with what is named.
+    """
     monkeypatch.setattr(verdict, "reported_noise_floor", lambda *_of: FLOOR)
     monkeypatch.setattr(verdict, "rivals_of", lambda *_of: ())
     monkeypatch.setattr(verdict, "added_effects", lambda *_of: named)
@@ -48,7 +51,7 @@ def judged(
         validation_errors=errors(after),
         own_moment=0.0,
         log_evidence=gain,
-        validation_log_density=np.zeros(1),
+        validation_log_density=np.full(1, likelier),
         unseen_under=lambda _std: (errors(after), errors(settled or after)),
     )
     sums = {frozenset(): 0.0, frozenset(named): gain}
@@ -73,9 +76,12 @@ def test_without_noise_no_floor_says_what_is_large(monkeypatch):
     assert judged(monkeypatch, 3.5, 3.3, 0.6, noiseless=True) == "effect"
 
 
-@pytest.mark.parametrize(("settled", "word"), [(1.1, "effect"), (12.0, "unexplained")])
-def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, word):
-    assert judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled, fitted=(1.0, 1.0)) == word
+@pytest.mark.parametrize(
+    ("settled", "likelier", "word"), [(1.1, 20.0, "effect"), (12.0, 20.0, "unexplained"), (1.1, -20.0, "unexplained")]
+)
+def test_an_error_that_the_fitted_runs_leave_open_counts_with_the_numbers_of_all_runs(monkeypatch, settled, likelier, word):
+    found = judged(monkeypatch, 7.0, 12.8, 1e-9, settled=settled, fitted=(1.0, 1.0), likelier=likelier)
+    assert found == word
 
 
 @pytest.mark.parametrize(("runs", "word"), [(1, "effect"), (2, "disturbed")])
@@ -111,3 +117,13 @@ def test_what_leaves_a_large_error_that_surely_follows_a_signal_is_not_what_is_m
 @pytest.mark.parametrize(("gain", "after", "word"), [(2.0, 1.9, "disturbed"), (4.0, 1.9, "effect"), (2.0, 1.1, "effect")])
 def test_an_effect_that_is_hardly_likelier_than_none_must_end_the_visible_error(monkeypatch, gain, after, word):
     assert judged(monkeypatch, 3.9, after, 0.6, gain=gain) == word
+
+
+def test_a_set_as_likely_is_a_rival_though_its_free_run_is_worse():
+    def model(name, evidence, error):
+        return SimpleNamespace(names=(name,), log_evidence=evidence, selection_errors=errors(error))
+
+    found, near, far = model("delay", 228.3, 1.17), model("servo_lag", 228.1, 1.30), model("clock_offset", 210.2, 1.29)
+    sums = {frozenset(h.names): h.log_evidence for h in (found, near, far)}
+    work = SimpleNamespace(records=(1, 2), floor=FLOOR, evidences=lambda: sums, ranked=lambda: [found, near, far])
+    assert verdict.rivals_of(work, found) == (near,)

@@ -11,13 +11,15 @@ import pytest
 
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.evidence.acceptance import lacks
-from fieldsid.diagnosis.evidence.likelihood_fit import measured_count
+from fieldsid.diagnosis.evidence.likelihood_fit import likelihood_at, measured_count
+from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
 from fieldsid.diagnosis.search.add_effect import add_effect, by_effect, likelihood_linearisation, may_gain, mechanisms
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
+from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import record_of
@@ -297,6 +299,39 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
         assert start["lag"] == pytest.approx(0.15)
         assert start["a22"] == pytest.approx(base.likelihood_model.values["a22"])
     assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
+
+
+def test_a_model_that_is_less_likely_than_a_part_of_it_is_fitted_again_from_there():
+    made, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
+    problem = lag.likelihood_fit.fitted.problem.with_effects([*lag.effects, *bias.effects])
+    both = frozenset(["servo_lag", "gyro_bias"])
+    # an end at which nothing lags, as if its optimum had been missed
+    far = carry_parameters(problem.layout, bias.likelihood_fit.fitted.vector, otherwise={"lag": 0.0})
+    missed = replace(lag.likelihood_fit, fitted=replace(lag.likelihood_fit.fitted, problem=problem, x=far))
+    missed = replace(missed, log_likelihood=likelihood_at(problem, far, lag.likelihood_fit))
+    made.tried[both] = score_model(missed, made.validation)
+    assert made.tried[both].log_likelihood < lag.log_likelihood - 10.0
+    assert {part.names for part in made._parts(made.tried[both])} == {("servo_lag",), ("gyro_bias",)}
+    made._fit_from_parts()
+    found = made.tried[both]
+    assert found.log_likelihood > lag.log_likelihood - 0.5
+    assert found.model.values["lag"] == pytest.approx(lag.model.values["lag"], rel=0.05)
+    made._fit_from_parts()  # that is done once
+    assert made.tried[both] is found
+
+
+@pytest.mark.parametrize(
+    ("evidence", "train", "unseen", "stays"),
+    [(-1.0, 2.0, 2.0, True), (-9.0, 2.0, 2.0, False), (-9.0, 1.7, 1.7, True), (-9.0, 1.7, 2.0, False), (-9.0, 2.0, 1.7, False)],
+)
+def test_a_child_stays_in_question_by_its_evidence_or_by_a_clearly_lower_error(evidence, train, unseen, stays):
+    def child(evidence, train, unseen):
+        errors = (Errors(0.004 * over, 0.002 * over) for over in (train, unseen))
+        return SimpleNamespace(log_evidence=evidence, **dict(zip(("train", "selection_errors"), errors, strict=True)))
+
+    work = SimpleNamespace(floor=Noise(0.004, 0.002))
+    best, other = child(0.0, 2.0, 2.0), child(evidence, train, unseen)
+    assert move_evaluation.MoveEvaluation._stays_in_question(work, other, best) is stays
 
 
 def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
