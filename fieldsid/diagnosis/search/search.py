@@ -260,13 +260,16 @@ class Search(MoveEvaluation):
         """Try the likeliest pair in series with its hidden state in other variants.
 
         Alone the state may gain nothing in one, as it takes up the actuator's response as well: a drift that the cross flow holds
-        shows beside a slow servo only.
+        shows beside a slow servo only. Then the pair is tried with what the leading model has, which was found without it.
         """
         if fitted := self._fitted(self._all_in_series()):
             best = max(fitted, key=lambda h: h.log_evidence)
             self._try_variants([VariantRequest(best, {e.name for e in best.effects if e.extra_states})])
-            if self.tried[key := frozenset(best.names)] is not best:
+            if (varied := self.tried[key := frozenset(best.names)]) is not best:
                 self.tried.progress.expanded.discard(key)  # what the textbook's leaves room for says nothing of the new one
+                leading = self._most_evident()
+                self._add_to_rival(varied, [e for e in leading.effects if e.name not in key], leading)
+                self._join_children(self._children(key), varied)
 
     def _fit_pairs(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
         """Fit an actuator and a hidden state of the hull together, from the base model's parameters and the state's scan points.

@@ -301,6 +301,35 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
     assert frozenset(["servo_lag", "sway_coupling"]) in made.tried
 
 
+@pytest.mark.parametrize("gains", [True, False])
+def test_a_pair_in_series_that_its_state_makes_likelier_is_tried_with_what_the_leading_model_has(monkeypatch, gains):
+    made, pair = search_for("servo_lag", "sway_coupling", "gyro_bias"), frozenset(["servo_lag", "sway_coupling"])
+    made.base()
+    made._evaluate_moves(
+        made.base(), by_effect(add_effect(made.base(), made.catalogue, None, made.parallel, anew=False, flown=True))
+    )
+    made._fit_pairs(made._all_in_series())
+    leading = made._moved(made._most_evident(), [e for e in made.catalogue if e.name in ("servo_lag", "gyro_bias")])
+    tried = []
+
+    def other_variant(self, asked):
+        (request,) = asked
+        assert (frozenset(request.model.names), request.effects) == (pair, {"sway_coupling"})
+        if gains:
+            self.tried[pair] = replace(request.model)
+
+    monkeypatch.setattr(Search, "_try_variants", other_variant)
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: leading)
+    monkeypatch.setattr(
+        Search, "_add_to_rival", lambda _self, h, effects, best: tried.append((h, [e.name for e in effects], best))
+    )
+    monkeypatch.setattr(Search, "_join_children", lambda _self, _children, parent: tried.append(parent))
+    made.tried.progress.expanded.add(pair)
+    made._vary_states_in_series()
+    assert tried == ([(made.tried[pair], ["gyro_bias"], leading), made.tried[pair]] if gains else [])
+    assert (pair in made.tried.progress.expanded) is not gains
+
+
 def test_a_model_that_is_less_likely_than_a_part_of_it_is_fitted_again_from_there():
     made, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
     problem = lag.likelihood_fit.fitted.problem.with_effects([*lag.effects, *bias.effects])
