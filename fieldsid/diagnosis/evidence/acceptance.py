@@ -111,6 +111,12 @@ def _keeps(before: Errors, now: Errors) -> bool:
     return bool(now.mean < EQUAL_ERROR_RATIO * before.mean)
 
 
+def errs_less(h: ScoredModel, other: ScoredModel, ratio: float) -> bool:
+    """Whether a model's errors on training and on validation runs are below a ratio of another's."""
+    pairs = ((h.train, other.train), (h.selection_errors, other.selection_errors))
+    return all(mine.mean < ratio * others.mean for mine, others in pairs)
+
+
 def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     """Whether an addition gains log evidence on the training runs alone, enough to be tried further."""
     return with_.log_likelihood - without.log_likelihood > with_.trial_penalty - without.trial_penalty

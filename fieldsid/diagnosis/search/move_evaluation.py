@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import (
+    errs_less,
     gains_any_evidence,
     gains_evidence,
     gains_training_evidence,
@@ -118,8 +119,7 @@ class MoveEvaluation(SearchState):
         """
         if best.log_evidence - h.log_evidence < RIVAL_LOG_ODDS:
             return True
-        pairs = ((h.train, best.train), (h.selection_errors, best.selection_errors))
-        return leaves_error(best, self.floor) and all(mine.mean < MAX_ERROR_RATIO * other.mean for mine, other in pairs)
+        return leaves_error(best, self.floor) and errs_less(h, best, MAX_ERROR_RATIO)
 
     def _fit_from_output_error(self, parent: ScoredModel) -> None:
         """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""

@@ -9,7 +9,7 @@ from itertools import chain
 
 import numpy as np
 
-from fieldsid.diagnosis.evidence.acceptance import gains_any_evidence, lacks, leaves_error, lowers_error, worst_error
+from fieldsid.diagnosis.evidence.acceptance import errs_less, gains_any_evidence, lacks, leaves_error, lowers_error, worst_error
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximum_likelihood
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
@@ -85,7 +85,7 @@ class Search(MoveEvaluation):
         """Add to the best of a model's children what others have added, where that helps alone or with it.
 
         Of several effects that are missing each may show beside the others only, and to expand one set after another costs many
-        times as much as a fit of what is at hand.
+        times as much as a fit of what is at hand. What was joined is tried in its variants, as the best of other children are.
         """
         best = next(iter(children), parent)
         if not (gains_any_evidence(parent, best) and leaves_error(best, self.floor)):
@@ -137,9 +137,9 @@ class Search(MoveEvaluation):
 
     def _predicts_as_well(self, h: ScoredModel, best: ScoredModel) -> bool:
         """Whether an accepted set of no more effects, some at least, leaves nothing missing on fitted nor on unseen runs."""
-        pairs = ((h.selection_errors, best.selection_errors), (h.train, best.train))
-        alike = all(mine.mean < MISSING_ERROR_RATIO * other.mean for mine, other in pairs)
-        return alike and len(self.known) < len(h.names) <= len(best.names) and self.admissible(h)
+        return (
+            errs_less(h, best, MISSING_ERROR_RATIO) and len(self.known) < len(h.names) <= len(best.names) and self.admissible(h)
+        )
 
     def _exchange_leaders(self) -> None:
         """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
