@@ -14,6 +14,7 @@ from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     EXPLAINED_ERROR_RATIO,
+    LEAST_EXPLAINED_SHARE,
     MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,
     MAX_VALIDATION_ERROR_RATIO,
@@ -87,11 +88,13 @@ def common_own_moment(without: ScoredModel, with_: ScoredModel) -> float:
 def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise, least: float) -> bool:
     """Whether an addition removes most of the squared error above a noise floor, of training and validation runs together.
 
-    Some run must have `least` times the floor.
+    And LEAST_EXPLAINED_SHARE of that of the validation runs: what leaves them as they were is no effect that all runs have. Some
+    run must have `least` times the floor.
     """
-    was, left = (sum(max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side) for side in (before, now))
+    was, left = (np.array([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side]) for side in (before, now))
     leaves = max(run.over(floor) for errors in before for run in errors.runs) > least
-    return leaves and was - left > MAIN_EXPLAINED_SHARE * was
+    shown = before[0].over(floor) <= EXPLAINED_ERROR_RATIO or was[0] - left[0] > LEAST_EXPLAINED_SHARE * was[0]
+    return bool(leaves and shown and was.sum() - left.sum() > MAIN_EXPLAINED_SHARE * was.sum())
 
 
 def excess_share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:

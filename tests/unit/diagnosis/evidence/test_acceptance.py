@@ -184,6 +184,8 @@ def test_an_effect_without_which_the_rest_promised_nothing_is_named_first():
         ((1.1, 1.04), (1.02, 1.0), 1.02, True),
         ((1.1, 1.04), (1.06, 1.03), 1.02, False),
         ((1.036, 1.033), (1.021, 1.013), 1.02, True),
+        ((1.03, 1.08), (1.027, 1.01), 1.02, False),  # unseen runs are left as they were
+        ((1.01, 1.08), (1.01, 1.01), 1.02, True),  # and here at the noise
         ((1.01, 1.01), (1.0, 1.0), 1.02, False),
     ],
 )
