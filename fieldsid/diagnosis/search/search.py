@@ -337,7 +337,7 @@ class Search(MoveEvaluation):
         that stands for coloured sensor noise lets the heading drift at no cost. The kind is asked of the most evident model, in
         whose residuals the least is missing. The best model is kept, fitted again.
         """
-        if not self.may_go_on(leading=True):
+        if not self.may_go_on():
             return False
         found = self.best_admissible()
         noise = partial(fit_other_noise, self._most_evident(), self.floor, self.tried.noise_kinds, self.parallel)

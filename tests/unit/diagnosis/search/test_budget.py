@@ -11,7 +11,7 @@ import pytest
 
 from fieldsid.diagnosis.diagnose import body_of, diagnose
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search import search_state
+from fieldsid.diagnosis.search import search, search_state
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
@@ -62,6 +62,19 @@ def test_beyond_it_only_what_leads_is_expanded_and_only_while_an_error_is_visibl
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
     assert made.may_go_on(leading=True) == visible
     assert not made.may_go_on()
+
+
+def test_beyond_it_nothing_begins_again_under_another_kind_of_noise(monkeypatch):
+    made, asked = a_search(thorough=False), []
+    made.base()
+    monkeypatch.setattr(search, "fit_other_noise", lambda *_of: asked.append("other"))
+    monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: True)
+    made._switch_noise_or_trim()
+    assert asked == ["other"]
+    made.budget.most = made.budget.where_unexplained = 0.0
+    assert made.may_go_on(leading=True)
+    assert not made._switch_noise_or_trim()
+    assert asked == ["other"]
 
 
 def test_what_a_copy_has_worked_out_counts():
