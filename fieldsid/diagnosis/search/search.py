@@ -367,17 +367,20 @@ class Search(MoveEvaluation):
 
     def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
         """Return a model without one of its effects, fitted from the parameters it has with it."""
-        fitted = h.likelihood_fit.fitted
+        fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
         problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
         starts = [carry_parameters(problem.layout, fitted.vector)]
+        # a hull that its sway alone holds straight runs away without it, and no descent begins there
+        of_base = carry_parameters(problem.layout, self.base().likelihood_fit.fitted.vector, fitted.vector)
+        if cost_of(problem, of_base, noise) < cost_of(problem, starts[0], noise):
+            starts.append(of_base)
         before = self.tried.get(frozenset(e.name for e in problem.layout.effects))
         if before is not None and any(e not in before.effects for e in problem.layout.effects):
             # in its variants the others' numbers may be far from those without it
             starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
         found = {} if before is None else {frozenset(before.names): before}
         for start in starts:
-            ml_fit = fit_maximum_likelihood(problem, start, h.likelihood_fit.noise, self.resolution_floor, self.noise_kind)
-            kept = self._keep(ml_fit, found)
+            kept = self._keep(fit_maximum_likelihood(problem, start, noise, self.resolution_floor, self.noise_kind), found)
         return kept if kept is before else prefer_output_error(kept, self.floor)
 
 

@@ -370,3 +370,18 @@ def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
         ["current_north", "current_east"],
     ]
     assert mechanisms([effects["crossflow_drag"]]) == [effects["crossflow_drag"]]
+
+
+def test_a_hull_that_its_sway_alone_holds_straight_is_left_without_it_from_the_base():
+    made = search_for("servo_lag", "sway_coupling")
+    base, (lag, sway) = made.base(), made.catalogue
+    problem = base.likelihood_fit.fitted.problem.with_effects([lag, sway])
+    held = {"a22": -3.0, "lag": 0.5, "cross_damping": 8.0, "cross_rate": 26.0}
+    x = carry_parameters(problem.layout, base.likelihood_fit.fitted.vector)
+    x[[problem.layout.names.index(name) for name in held]] = list(held.values())
+    at = replace(base.likelihood_fit, fitted=replace(base.likelihood_fit.fitted, problem=problem, x=x))
+    without = problem.with_effects([lag])
+    assert not np.isfinite(likelihood_at(without, carry_parameters(without.layout, at.fitted.vector), at))
+    left = made._drop_effect(replace(base, likelihood_fit=at), sway)
+    assert left.names == ("servo_lag",)
+    assert left.log_likelihood > base.log_likelihood + 100.0
