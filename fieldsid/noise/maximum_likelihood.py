@@ -54,8 +54,13 @@ def log_likelihood(
 def log_prior(noise: Noise) -> float:
     """Return the log prior density of a noise, up to a constant: of the numbers that its kind has, see `NoiseParameter.usual`."""
     numbers = noise_vector(noise)
-    place = [i for i in map(NOISE_FIELDS.index, kind_of(numbers).fields) if LOG_PRECISIONS[i] > 0.0]
-    return -0.5 * float(LOG_PRECISIONS[place] @ (np.log(numbers[place]) - LOG_MEDIANS[place]) ** 2)
+    place = np.array([i for i in map(NOISE_FIELDS.index, kind_of(numbers).fields) if LOG_PRECISIONS[i] > 0.0], dtype=np.int64)
+    return _log_prior_at(np.log(numbers[place]), place)
+
+
+def _log_prior_at(x: FloatArray, place: npt.NDArray[np.int64]) -> float:
+    """Return the log prior density, up to a constant, of logarithms x (P,) of the noise's numbers at `place` (P,)."""
+    return -0.5 * float(LOG_PRECISIONS[place] @ (x - LOG_MEDIANS[place]) ** 2)
 
 
 def estimate_noise(
@@ -147,8 +152,7 @@ class _LogNoiseLikelihood:
         runs = [(r, *base_dynamics(a, k), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)]
         here = [innovations_of(r, a, k, noise, self.place, e) for r, a, k, e in runs]
         learned = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
-        off, precisions = x - LOG_MEDIANS[self.place], self.has_prior * LOG_PRECISIONS[self.place]
-        total = learned - 0.5 * float(precisions @ off**2)
+        total = learned + self.has_prior * _log_prior_at(x, self.place)
         if not (np.isfinite(total) and total > least):
             return -np.inf, np.zeros(count), np.eye(count)
         parts = [information(r, a, k, noise, self.place, e, h) for (r, a, k, e), h in zip(runs, here, strict=True)]
@@ -158,7 +162,8 @@ class _LogNoiseLikelihood:
             score = np.array(
                 [(self.likelihood(self.vector(x + d)) - learned) / GRADIENT_STEP for d in GRADIENT_STEP * np.eye(count)]
             )
-        score, fisher = score - precisions * off, fisher + np.diag(precisions)
+        precisions = self.has_prior * LOG_PRECISIONS[self.place]
+        score, fisher = score - precisions * (x - LOG_MEDIANS[self.place]), fisher + np.diag(precisions)
         known = np.isfinite(score).all() and np.isfinite(fisher).all()
         return (total, score, fisher) if known else (-np.inf, np.zeros(count), np.eye(count))
 
