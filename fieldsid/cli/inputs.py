@@ -90,7 +90,7 @@ def axis_excited(runs: Sequence[Run]) -> Axis:
     from fieldsid.logs.segments import excited_axis
     from fieldsid.models.axis import Axis
 
-    return Axis(excited_axis(runs, written="write `--axis yaw` or `--axis pitch`"))
+    return Axis(excited_axis(runs, written="`--axis {axis}`"))
 
 
 def read_run(path: Path, *, mapping: Path | None = None) -> Run:

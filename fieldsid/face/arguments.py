@@ -43,7 +43,7 @@ def axis_excited(runs: Sequence[Run]) -> Axis:
     """Return the axis that runs excite; raises what `excited_axis` does."""
     from fieldsid.logs.segments import excited_axis
 
-    return Axis(excited_axis(runs, written='give `axis="yaw"` or `axis="pitch"`'))
+    return Axis(excited_axis(runs, written='`axis="{axis}"`'))
 
 
 def names_of(names: str | Iterable[str]) -> tuple[str, ...]:

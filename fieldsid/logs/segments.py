@@ -63,7 +63,7 @@ def is_excited(run: Run, axis: str) -> bool:
 
 
 def excited_axis(runs: Sequence[Run], *, written: str) -> str:
-    """Return the axis (`yaw` or `pitch`) that runs excite; `written` says how one is chosen.
+    """Return the axis (`yaw` or `pitch`) that runs excite; `written` is how one is chosen, `{axis}` in it.
 
     Raises UsageError where they excite both or none, DataError where they have no fin for either.
     """
@@ -84,10 +84,11 @@ def excited_axis(runs: Sequence[Run], *, written: str) -> str:
     )
     lacking = next((_FINS[axis][1] for axis in _FINS if not has_fin[axis]), None)
     otherwise = "or fly an excitation" if lacking is None else f"or map `{lacking}` on import"
+    choice = "write " + " or ".join(written.format(axis=axis) for axis in _FINS if has_fin[axis])
     raise UsageError(
         "the runs excite both axes, and one is identified at a time" if found else "no fin in the runs leaves its trim",
         found=f"a fin clearly away from its trim: {seen}",
-        hint=written if found else f"{written}, {otherwise}",
+        hint=choice if found else f"{choice}, {otherwise}",
     )
 
 

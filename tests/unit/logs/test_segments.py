@@ -107,7 +107,8 @@ def test_the_axis_that_runs_excite_is_that_whose_fin_leaves_its_trim(axis):
 )
 def test_no_axis_is_guessed(signals, error, found):
     with pytest.raises(error) as raised:
-        excited_axis([Run("r", TIME, signals)], written="choose one")
+        excited_axis([Run("r", TIME, signals)], written="`{axis}`")
     assert found in raised.value.found
-    assert ("choose one" in str(raised.value.hint)) is (error is UsageError)
+    assert ("write `" in str(raised.value.hint)) is (error is UsageError)
+    assert ("`yaw`" in str(raised.value.hint)) is ("rudder_rad" in signals)
     assert ("map `rudder_rad`" in str(raised.value.hint)) is ("rudder_rad" not in signals)
