@@ -12,6 +12,7 @@ import numpy as np
 from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, places
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
+from fieldsid.diagnosis.data.heading_span import shown_by_headings
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
@@ -69,23 +70,25 @@ def diagnose(
     notes = (*notes, *left_out([run for run, _ in (*fitted, *checked)], axis))
     effects, clashes = apart_from(all_effects(axis).values(), [effect_held(name, own) for name in known])
     notes = (*notes, *(Note("effect_left_out", f"not tried: {why}", {"effect": name}) for name, why in clashes.items()))
-    catalogue, skipped = applicable_effects(effects, [*learned, *unseen])
-    missing = [n for n in known if n in skipped]
+    catalogue, unlogged = applicable_effects(effects, [*learned, *unseen])
+    missing = [n for n in known if n in unlogged]
     if missing:
-        raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=skipped[missing[0]])
+        raise DataError(f"`{missing[0]}` is in the model but cannot be simulated on these runs", found=unlogged[missing[0]])
+    catalogue, narrow = shown_by_headings(catalogue, [*learned, *unseen], known)
+    told = partial(_diagnosis, unlogged=unlogged, skipped=unlogged | narrow, notes=notes)
     begin = partial(Search, learned, unseen, axis, catalogue, known, report, thorough=thorough)
     work = begin()
     with work.parallel:
         work.base()
         if not work.is_noiseless:
-            return _diagnosis(_best_result(work), skipped, notes)
+            return told(_best_result(work))
         found = noiseless_search(work, lambda h: excess_explained(work, h) > MAIN_EXPLAINED_SHARE)
         if found is not None and excess_explained(work, found) > MAIN_EXPLAINED_SHARE:
             ending = _search_result(work, found, found.likelihood_fit, Verdict("effect", added_effects(work, found)))
-            return _diagnosis(ending, skipped, notes)
+            return told(ending)
     again = begin()
     with again.parallel:
-        return _diagnosis(_best_result(again), skipped, notes)
+        return told(_best_result(again))
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +138,10 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
     return _SearchResult(work, found, ml_fit, left, verdict, (of_base, own), places, shown, errors)
 
 
-def _diagnosis(end: _SearchResult, skipped: Mapping[str, str], notes: tuple[Note, ...]) -> Diagnosis:
+def _diagnosis(
+    end: _SearchResult, unlogged: Mapping[str, str], skipped: Mapping[str, str], notes: tuple[Note, ...]
+) -> Diagnosis:  # fmt: skip
+    """Return a search's result as a diagnosis, with why effects were not tried, those whose signal was not logged apart."""
     work, found, verdict, base = end.work, end.found, end.verdict, end.work.base()
     named = found if verdict.word in ("effect", "undecided") else base
     (base_model, _), (model, flown) = end.models if named is found else (end.models[0], end.models[0])
@@ -153,7 +159,7 @@ def _diagnosis(end: _SearchResult, skipped: Mapping[str, str], notes: tuple[Note
         model=model,
         base_model=base_model,
         where=where,
-        next_maneuver=next_maneuver(work, verdict, found, skipped, floor),
+        next_maneuver=next_maneuver(work, verdict, found, unlogged, floor),
         skipped=skipped,
         notes=(
             *notes,

@@ -19,6 +19,10 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Terms, Values, Variant
 from fieldsid.models.record import Record
 
+HEADING_SPAN_RAD = 0.5 * np.pi
+"""Headings that show it: within a quarter of the compass its sine is a straight line to 3 % of its own size (rms over +-45 deg),
+a moment in proportion to the heading, as what a hull's slow sway leaves in a zig-zag is."""
+
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients; scale is the run's speed over the reference speed."""
@@ -60,6 +64,7 @@ EFFECT = Effect(
     excited_by=("turning_circle", "zigzag"),
     mistaken_for=("compass_deviation", "trim_drift", "wave", "asymmetric_fin"),
     source="Fossen 2011, section 8.3",
+    heading_span=HEADING_SPAN_RAD,
     core=core,
     terms=terms,
     variants=(

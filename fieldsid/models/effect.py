@@ -224,6 +224,7 @@ class Effect:
     `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     `is_of_the_water` marks a moment that knows nothing of the vehicle: what is left beside it follows no measured signal.
+    `heading_span` (rad) is what the runs' headings must span together for it to be told from what goes with the heading itself.
     `origin` says where the effect is defined, `definition` the same as a model keeps it; None where it is built in.
     """
 
@@ -252,6 +253,7 @@ class Effect:
     variants: tuple[Variant, ...] = ()
     log_prior_penalty: float = 0.0
     is_of_the_water: bool = False
+    heading_span: float = 0.0
     textbook: Effect | None = None
     stand_in: StandIn | None = None
     origin: str = field(default="built in")
