@@ -370,10 +370,9 @@ class Search(MoveEvaluation):
         fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
         problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
         starts = [carry_parameters(problem.layout, fitted.vector)]
-        # a hull that its sway alone holds straight runs away without it, and no descent begins there
-        of_base = carry_parameters(problem.layout, self.base().likelihood_fit.fitted.vector, fitted.vector)
-        if cost_of(problem, of_base, noise) < cost_of(problem, starts[0], noise):
-            starts.append(of_base)
+        if not np.isfinite(cost_of(problem, starts[0], noise)):
+            # a hull that its sway alone holds straight runs away without it, and no descent begins there
+            starts = [carry_parameters(problem.layout, self.base().likelihood_fit.fitted.vector, fitted.vector)]
         before = self.tried.get(frozenset(e.name for e in problem.layout.effects))
         if before is not None and any(e not in before.effects for e in problem.layout.effects):
             # in its variants the others' numbers may be far from those without it
