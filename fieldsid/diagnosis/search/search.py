@@ -366,7 +366,7 @@ class Search(MoveEvaluation):
         self.tried.update({frozenset(h.names): prefer_output_error(h, self.floor) for h in lawful})
 
     def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
-        """Return a model without one of its effects, fitted from the parameters it has with it."""
+        """Return a model without one of its effects, fitted from the parameters it has with it, the base's where they diverge."""
         fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
         problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
         starts = [carry_parameters(problem.layout, fitted.vector)]
