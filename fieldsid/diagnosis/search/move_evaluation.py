@@ -11,6 +11,7 @@ import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import (
     errs_less,
+    excess_share,
     gains_any_evidence,
     gains_evidence,
     gains_training_evidence,
@@ -44,9 +45,11 @@ from fieldsid.diagnosis.search.variant_search import VariantRequest
 from fieldsid.diagnosis.thresholds import (
     ALTERNATIVE_LOG_ODDS,
     FAR_ERROR_RATIO,
+    MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,
     MISSING_ERROR_RATIO,
     RIVAL_LOG_ODDS,
+    SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.problem.problem import Problem
@@ -108,7 +111,7 @@ class MoveEvaluation(SearchState):
             len(key) < len(self.known) + TESTED_SUBSET_SIZE and any(self.error_ratio(h) > FAR_ERROR_RATIO for h in children[:1])
         )
         if early and any(leaves_error(h, self.floor) for h in children[:1]):
-            return names
+            return [n for n in names if self._is_worth_refining(self.tried[n], children[0], self.tried[key])]
         return [frozenset(h.names) for h in children if self._stays_in_question(h, children[0])]
 
     def _stays_in_question(self, h: ScoredModel, best: ScoredModel) -> bool:
@@ -120,6 +123,17 @@ class MoveEvaluation(SearchState):
         if best.log_evidence - h.log_evidence < RIVAL_LOG_ODDS:
             return True
         return leaves_error(best, self.floor) and errs_less(h, best, MAX_ERROR_RATIO)
+
+    def _is_worth_refining(self, h: ScoredModel, best: ScoredModel, parent: ScoredModel) -> bool:
+        """Whether a child may come to lead its best sibling in another variant, under another law or by its output-error fit.
+
+        Any may where that leaves a visible error. Where it leaves none, what explains less of the parent's than it leaves is not
+        the effect that is missing, in whatever variant.
+        """
+        if worst_error(best, self.floor) > SUFFICIENT_ERROR_RATIO or self._stays_in_question(h, best):
+            return True
+        was, left = ((one.selection_errors, one.train) for one in (parent, h))
+        return excess_share(was, left, self.floor) >= MAIN_EXPLAINED_SHARE
 
     def _fit_from_output_error(self, parent: ScoredModel) -> None:
         """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""
@@ -278,8 +292,8 @@ class MoveEvaluation(SearchState):
     def _prefer_output_error(self, key: frozenset[str], *, refit: bool) -> bool:
         """Give the leading children with more evidence than their parent their output-error fit, where that validates better.
 
-        `refit`: beside that the parent is fitted again from the best child. Returns whether it was better so: then the children
-        are those before their output-error fits.
+        Only those that are worth it, see `_is_worth_refining`. `refit`: beside that the parent is fitted again from the best
+        child. Returns whether it was better so: then the children are those before their output-error fits.
         """
         parent, leading = self.tried[key], self._children(key)[:LEADING_CHILDREN]
 
@@ -289,7 +303,8 @@ class MoveEvaluation(SearchState):
 
         jobs: list[Callable[[], Any]] = [partial(self._fit_from, parent, child) for child in leading[:1] if refit]
         again = len(jobs)
-        jobs += [partial(flown, child) for child in leading if child.log_evidence > parent.log_evidence]
+        gaining = [child for child in leading if child.log_evidence > parent.log_evidence]
+        jobs += [partial(flown, child) for child in gaining if self._is_worth_refining(child, leading[0], parent)]
         done = self.parallel.map(lambda job: job(), jobs)
         if again and self._takes_refit(key, done[0]):
             return True

@@ -115,7 +115,9 @@ class Search(MoveEvaluation):
             problem = here.problem.with_effects([*best.effects, *new])
             start = carry_parameters(problem.layout, here.vector, there.fitted.vector)
             ml_fit = fit_maximum_likelihood(problem, start, there.noise, self.resolution_floor, self.noise_kind)
-            return prefer_output_error(score_model(ml_fit, self.validation), self.floor).evaluate_errors()
+            joined = score_model(ml_fit, self.validation)
+            leads = joined.log_evidence > best.log_evidence
+            return (prefer_output_error(joined, self.floor) if leads else joined).evaluate_errors()
 
         return self.parallel.map(join, range(len(others)))
 
@@ -171,7 +173,7 @@ class Search(MoveEvaluation):
         self._try_variants(asked)
 
     def _exchange_for_lookalikes(self, best: ScoredModel) -> None:
-        """Try a model with each effect exchanged for what it may be mistaken for.
+        """Try a model with each accepted effect exchanged for what it may be mistaken for.
 
         Where one stands for a lag of a sample, the lag itself may have passed no screen of a model without what the others have
         since added, or ended at a worse optimum. What shifts time for long is seen to no first order by a model without: it is
@@ -179,7 +181,8 @@ class Search(MoveEvaluation):
         What comes so near that a variant could lead is tried in its variants.
         """
         self._drop_each(best)
-        for stands in (e for e in best.effects if e.name not in self.known):
+        accepted = self.core_of(best) - self.root
+        for stands in (e for e in best.effects if e.name in accepted):
             others = [e for e in best.effects if e is not stands]
             alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
             if len(best.names) > len(self.known) + 1:
@@ -335,9 +338,10 @@ class Search(MoveEvaluation):
 
         A missing effect may have biased the first choice. Likelihoods compare only under one kind of noise, and a disturbance
         that stands for coloured sensor noise lets the heading drift at no cost. The kind is asked of the most evident model, in
-        whose residuals the least is missing. The best model is kept, fitted again.
+        whose residuals the least is missing. The best model is kept, fitted again. Both are asked once, whatever was spent: an
+        effect may stand for the other law of the trim.
         """
-        if not self.may_go_on():
+        if self.trim_laws.known and not self.may_go_on():
             return False
         found = self.best_admissible()
         noise = partial(fit_other_noise, self._most_evident(), self.floor, self.tried.noise_kinds, self.parallel)

@@ -99,7 +99,8 @@ class SearchState:
         """Compare models down to the sensors' noise until the error of the base model is known."""
         both = (*self.records, *self.validation)
         self.resolution_floor = self.floor = white_noise_floor(both)
-        self.budget = Budget(len(both), np.inf) if self.thorough else Budget(len(both))
+        length = float(np.mean([len(r) for r in both]))
+        self.budget = Budget(len(both), length, np.inf) if self.thorough else Budget(len(both), length)
         self.parallel = ParallelMap(both, self.catalogue, self.budget.evaluations, self._place)
 
     def _place(self) -> int:

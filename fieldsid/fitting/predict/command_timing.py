@@ -69,7 +69,7 @@ def command_timing(problem: Problem, x: FloatArray, floor: Noise) -> Record | No
     # under a noise of its own the shift is no less likely than under that of the times
     if not likelihood - run.likelihood_under(noise, shift)[0] > price:
         return None
-    return run.record_with(times) if likelihood - run.likelihood(shift)[0] > price else None
+    return run.record_with(times) if run.likelihood(shift, enough=likelihood - price)[0] < likelihood - price else None
 
 
 def jumps_of(record: Record) -> npt.NDArray[np.intp]:
@@ -173,8 +173,11 @@ class _CommandTiming:
             left = self._restarted(raw, weight)
         return times, left
 
-    def likelihood(self, residual: FloatArray) -> tuple[float, Noise]:
-        """Return the log likelihood of a residual (2, n) at its best start, under noise and disturbance of its own, and that."""
+    def likelihood(self, residual: FloatArray, *, enough: float = np.inf) -> tuple[float, Noise]:
+        """Return the log likelihood of a residual (2, n) at its best start, under noise and disturbance of its own, and that.
+
+        Noise and start are improved in turn, no further where the likelihood is `enough`.
+        """
         record, base = self.problem.records[0], self.problem.base_of(self.x, 0)
         noise, best = self.floor, (-np.inf, self.floor)
         for count in range(MAX_ALTERNATIONS):
@@ -185,7 +188,7 @@ class _CommandTiming:
             value, residual = self.likelihood_under(noise, residual)
             gained = value - best[0]
             best = max(best, (value, noise), key=lambda found: found[0])
-            if gained < MIN_SCORING_GAIN:
+            if gained < MIN_SCORING_GAIN or best[0] >= enough:
                 break
         return best
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib import import_module
+from math import ceil
 
 import hidden_lag
 import numpy as np
@@ -24,7 +25,7 @@ from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 def allow_nothing(monkeypatch):
     """Leave a search that is not thorough no evaluations."""
-    monkeypatch.setattr(search_state, "Budget", lambda runs, most=0.0: Budget(runs, most, 0.0))
+    monkeypatch.setattr(search_state, "Budget", lambda runs, samples, most=0.0: Budget(runs, samples, most, 0.0))
 
 
 RUNS, UNSEEN = hidden_lag.runs()
@@ -32,7 +33,7 @@ EFFECTS = all_effects(Axis.YAW)
 
 
 def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
-    allowance = Budget(2, 10.0, 15.0)
+    allowance = Budget(2, most=10.0, where_unexplained=15.0)
     allowance.evaluations.add(19)
     assert allowance.remaining(lambda: False)
     allowance.evaluations.add()
@@ -42,17 +43,24 @@ def test_what_is_asked_for_beyond_the_allowance_is_left_and_remembered():
     assert allowance.is_exhausted
     allowance.evaluations.add(10)
     assert not allowance.remaining(lambda: True)
-    assert Budget(2, np.inf).remaining(lambda: False)
+    assert Budget(2, most=np.inf).remaining(lambda: False)
 
 
 def test_what_leads_is_not_followed_for_ever(monkeypatch):
     made = a_search(thorough=False)
     made.budget.most = made.budget.where_unexplained = 0.0
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: True)
-    made.budget.evaluations.count = int(made.budget.in_all * made.budget.runs) - 1
+    made.budget.evaluations.count = ceil(made.budget.most_for_leading * made.budget.runs) - 1
     assert made.may_go_on(leading=True)
     made.budget.evaluations.add()
     assert not made.may_go_on(leading=True)
+
+
+def test_long_runs_are_followed_for_as_long_as_usual_ones_and_at_least_as_what_is_unexplained():
+    usual, long = (Budget(2, samples, where_unexplained=30.0, in_all=280.0) for samples in (1000, 3800))
+    assert usual.most_for_leading == 280.0
+    assert long.most_for_leading == 140.0
+    assert Budget(2, 1e9, where_unexplained=30.0, in_all=280.0).most_for_leading == 30.0
 
 
 @pytest.mark.parametrize("visible", [True, False])
@@ -75,6 +83,9 @@ def test_beyond_it_nothing_begins_again_under_another_kind_of_noise(monkeypatch)
     assert made.may_go_on(leading=True)
     assert not made._switch_noise_or_trim()
     assert asked == ["other"]
+    made.trim_laws.known.clear()  # nothing was asked yet: once it is, whatever was spent
+    made._switch_noise_or_trim()
+    assert asked == ["other", "other"]
 
 
 def test_what_a_copy_has_worked_out_counts():

@@ -49,6 +49,14 @@ def with_children(*names):
     return made, base, [made.tried[frozenset([n])] for n in names]
 
 
+def with_a_bias_after_a_delay():
+    """A search for a lag, a dead time and a bias that has fitted the dead time, then the bias with it, and the model of both."""
+    made, _, (parent,) = with_children("delay")
+    moves = add_effect(parent, [all_effects(Axis.YAW)["gyro_bias"]], None, made.parallel, anew=False, flown=True)
+    made._evaluate_moves(parent, by_effect(moves))
+    return made, made.tried[frozenset(["delay", "gyro_bias"])]
+
+
 @pytest.fixture(scope="module")
 def base():
     """A search with its base judged."""
@@ -76,13 +84,7 @@ def other_ends(monkeypatch):
 def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch, seen):
     if not seen:
         monkeypatch.setattr(Search, "_add_to_rival", lambda *_: None)
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    effects = all_effects(Axis.YAW)
-    parent = made.base()
-    for name in ("delay", "gyro_bias"):
-        moves = add_effect(parent, [effects[name]], None, made.parallel, anew=False, flown=True)
-        made._evaluate_moves(parent, by_effect(moves))
-        parent = made.tried[frozenset((*parent.names, name))]
+    made, parent = with_a_bias_after_a_delay()
     monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
     made.budget.most = made.budget.where_unexplained = 0.0  # what is named last is asked for whatever was spent before
@@ -90,6 +92,13 @@ def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_other
     lagged = made.tried[frozenset(["gyro_bias", "servo_lag"])]
     assert lagged.log_evidence > parent.log_evidence
     assert lagged.model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.2)
+
+
+def test_what_is_not_accepted_is_exchanged_for_nothing(monkeypatch):
+    made, parent = with_a_bias_after_a_delay()
+    monkeypatch.setattr(Search, "core_of", lambda *_: frozenset(["gyro_bias"]))
+    made._exchange_for_lookalikes(parent)
+    assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
 
 
 def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(monkeypatch):
@@ -128,12 +137,24 @@ def test_that_is_done_where_the_model_found_was_not_expanded(monkeypatch, expand
     assert added == ([] if expanded else [("servo_lag",)])
 
 
+@pytest.mark.parametrize("visible", [True, False])
+def test_beside_a_child_that_leaves_no_visible_error_one_that_explains_little_is_not_refined(monkeypatch, visible):
+    made, parent, (lag, delay, bias) = with_children("servo_lag", "delay", "gyro_bias")
+    monkeypatch.setattr(move_evaluation, "SUFFICIENT_ERROR_RATIO", 0.0 if visible else np.inf)
+    # a dead time explains little of so slow a servo
+    monkeypatch.setattr(move_evaluation, "excess_share", lambda _was, left, _floor: 0.6 if left[1] is delay.train else 0.4)
+    worth = [made._is_worth_refining(h, lag, parent) for h in (lag, delay, bias)]
+    assert worth == [True, True, visible]
+    assert made._leading(made.root) == [frozenset(h.names) for h, good in zip((lag, delay, bias), worth, strict=True) if good]
+
+
 @pytest.mark.parametrize("ends", [False, True])
 def test_the_best_of_a_models_children_is_fitted_with_what_others_have_added(monkeypatch, ends):
     made, base, children = with_children("servo_lag", "gyro_bias")
     monkeypatch.setattr(search, "gains_any_evidence", lambda *_: True)
     monkeypatch.setattr(search, "may_gain", lambda *_: True)  # there is no such bias
     monkeypatch.setattr(search, "leaves_error", lambda *_: not ends)
+    monkeypatch.setattr(search, "prefer_output_error", lambda h, _floor: pytest.fail(f"{h.names} gain nothing"))
     made._join_children(children, base)
     joined = frozenset(["servo_lag", "gyro_bias"])
     assert (joined in made.tried) is not ends
