@@ -27,8 +27,8 @@ diagnoses of hard cases of the second bank, of 480 to 3000 samples a run."""
 class Budget:
     """The evaluations of each run that a search may use, and whether a move was left out for lack of them.
 
-    `most` where what is found could stand, `where_unexplained` where it could not, and where the leading model goes on `in_all`, of
-    usual runs; `samples` is the mean length of the runs searched.
+    `most` where what is found could stand, `where_unexplained` where it could not, and where the leading model goes on `in_all`,
+    of usual runs; `samples` is the mean length of the runs searched.
     """
 
     runs: int

@@ -39,7 +39,7 @@ class Search(MoveEvaluation):
         """Return the accepted set of effects with the highest log evidence."""
         self._expand()
         self._grow_rivals()
-        if self.may_follow_leading():
+        if self.leaves_visible_error():
             pairs = [*self._all_in_series(), *self._all_beside()]
             self._fit_pairs(pairs)
             self._join_pairs(pairs)
@@ -146,12 +146,11 @@ class Search(MoveEvaluation):
     def _exchange_leaders(self) -> None:
         """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
 
-        That goes on as long as the budget lasts: what leads after an exchange differs from what led before it by less each time.
+        It is done once, and goes on as long as the budget lasts: what leads after an exchange differs from what led before it by
+        less each time.
         """
         exchanged = self.tried.progress.exchanged
-        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (
-            self.may_go_on() or (not exchanged and self.budget.remains_for_leading)
-        ):
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (not exchanged or self.may_go_on()):
             exchanged.add(spec)
             self._exchange_for_variants(best)
             self._exchange_for_lookalikes(self._most_evident())
