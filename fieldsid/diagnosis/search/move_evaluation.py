@@ -125,7 +125,7 @@ class MoveEvaluation(SearchState):
         return leaves_error(best, self.floor) and errs_less(h, best, MAX_ERROR_RATIO)
 
     def _is_worth_refining(self, h: ScoredModel, best: ScoredModel, parent: ScoredModel) -> bool:
-        """Whether a child may come to lead its best sibling in another variant, under another law or by its output-error fit.
+        """Whether a child may come to lead its best sibling in another variant or under another law.
 
         Any may where that leaves a visible error. Where it leaves none, what explains less of the parent's than it leaves is not
         the effect that is missing, in whatever variant.
@@ -292,8 +292,8 @@ class MoveEvaluation(SearchState):
     def _prefer_output_error(self, key: frozenset[str], *, refit: bool) -> bool:
         """Give the leading children with more evidence than their parent their output-error fit, where that validates better.
 
-        Only those that are worth it, see `_is_worth_refining`. `refit`: beside that the parent is fitted again from the best
-        child. Returns whether it was better so: then the children are those before their output-error fits.
+        `refit`: beside that the parent is fitted again from the best child. Returns whether it was better so: then the children
+        are those before their output-error fits.
         """
         parent, leading = self.tried[key], self._children(key)[:LEADING_CHILDREN]
 
@@ -303,8 +303,7 @@ class MoveEvaluation(SearchState):
 
         jobs: list[Callable[[], Any]] = [partial(self._fit_from, parent, child) for child in leading[:1] if refit]
         again = len(jobs)
-        gaining = [child for child in leading if child.log_evidence > parent.log_evidence]
-        jobs += [partial(flown, child) for child in gaining if self._is_worth_refining(child, leading[0], parent)]
+        jobs += [partial(flown, child) for child in leading if child.log_evidence > parent.log_evidence]
         done = self.parallel.map(lambda job: job(), jobs)
         if again and self._takes_refit(key, done[0]):
             return True
