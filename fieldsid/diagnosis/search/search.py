@@ -146,11 +146,11 @@ class Search(MoveEvaluation):
     def _exchange_leaders(self) -> None:
         """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
 
-        It is done once, and goes on as long as the budget lasts: what leads after an exchange differs from what led before it by
-        less each time.
+        It goes on as long as the budget lasts: what leads after an exchange differs from what led before it by less each time.
+        Twice it is done in any case, for what comes to lead by the first is no likelier than what it may itself be mistaken for.
         """
         exchanged = self.tried.progress.exchanged
-        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (not exchanged or self.may_go_on()):
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (len(exchanged) < 2 or self.may_go_on()):
             exchanged.add(spec)
             self._exchange_for_variants(best)
             self._exchange_for_lookalikes(self._most_evident())

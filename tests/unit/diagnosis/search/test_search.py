@@ -101,6 +101,18 @@ def test_what_is_not_accepted_is_exchanged_for_nothing(monkeypatch):
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
 
 
+def test_what_comes_to_lead_by_an_exchange_is_exchanged_in_its_turn_whatever_was_spent(monkeypatch):
+    made, _, leaders = with_children("delay", "servo_lag", "gyro_bias")
+    asked = []
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: leaders[min(len(asked), 2)])
+    monkeypatch.setattr(Search, "_exchange_for_lookalikes", lambda _self, h: asked.append(h.names))
+    for name in ("_exchange_for_variants", "_drop_each", "share_own_moments", "_expand"):
+        monkeypatch.setattr(Search, name, lambda *_: None)
+    made.budget.most = made.budget.where_unexplained = 0.0
+    made._exchange_leaders()
+    assert asked == [("delay",), ("servo_lag",)]
+
+
 def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(monkeypatch):
     made, base, (best, _) = with_children("servo_lag", "delay")
     monkeypatch.setattr(Search, "_most_evident", lambda _self: best)
