@@ -147,7 +147,7 @@ class Search(MoveEvaluation):
         """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
 
         It goes on as long as the budget lasts: what leads after an exchange differs from what led before it by less each time.
-        Twice it is done in any case, for what comes to lead by the first is no likelier than what it may itself be mistaken for.
+        Twice it is done in any case: what comes to lead by the first may itself be mistaken for something not yet tried.
         """
         exchanged = self.tried.progress.exchanged
         while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (len(exchanged) < 2 or self.may_go_on()):
