@@ -11,7 +11,6 @@ import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import (
     errs_less,
-    excess_share,
     gains_any_evidence,
     gains_evidence,
     gains_training_evidence,
@@ -132,8 +131,7 @@ class MoveEvaluation(SearchState):
         """
         if worst_error(best, self.floor) > SUFFICIENT_ERROR_RATIO or self._stays_in_question(h, best):
             return True
-        was, left = ((one.selection_errors, one.train) for one in (parent, h))
-        return excess_share(was, left, self.floor) >= MAIN_EXPLAINED_SHARE
+        return self.explained_share(parent, h) >= MAIN_EXPLAINED_SHARE
 
     def _fit_from_output_error(self, parent: ScoredModel) -> None:
         """Fit the children from the output-error fits found under another kind of noise: output error does not depend on it."""

@@ -159,9 +159,13 @@ class SearchState:
         base, best = self.base(), self.best_admissible()
         if worst_error(best, self.floor) > SUFFICIENT_ERROR_RATIO:
             return True
-        was, left = ((h.selection_errors, h.train) for h in (base, best))
         is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
-        return is_visible and excess_share(was, left, self.floor) < MIN_EXPLAINED_SHARE
+        return is_visible and self.explained_share(base, best) < MIN_EXPLAINED_SHARE
+
+    def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
+        """Return the share of what a model leaves above the noise, on fitted and on unseen runs, that another explains."""
+        was, left = ((one.selection_errors, one.train) for one in (before, h))
+        return excess_share(was, left, self.floor)
 
     def update_noise_floor(self, fitted: FittedProblem) -> None:
         """Lower the noise floor to what the third differences of a fit's residuals show, unless the log is noiseless."""

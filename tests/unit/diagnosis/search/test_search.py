@@ -154,7 +154,7 @@ def test_beside_a_child_that_leaves_no_visible_error_one_that_explains_little_is
     made, parent, (lag, delay, bias) = with_children("servo_lag", "delay", "gyro_bias")
     monkeypatch.setattr(move_evaluation, "SUFFICIENT_ERROR_RATIO", 0.0 if visible else np.inf)
     # a dead time explains little of so slow a servo
-    monkeypatch.setattr(move_evaluation, "excess_share", lambda _was, left, _floor: 0.6 if left[1] is delay.train else 0.4)
+    monkeypatch.setattr(Search, "explained_share", lambda _self, _before, h: 0.6 if h is delay else 0.4)
     worth = [made._is_worth_refining(h, lag, parent) for h in (lag, delay, bias)]
     assert worth == [True, True, visible]
     assert made._leading(made.root) == [frozenset(h.names) for h, good in zip((lag, delay, bias), worth, strict=True) if good]
