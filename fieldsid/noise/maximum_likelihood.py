@@ -104,16 +104,17 @@ def estimate_noise(
         moved = bounded_step(curvature, score, damping, x, np.maximum(low, x - MAX_LOG_STEP), np.minimum(high, x + MAX_LOG_STEP))
         if float(score @ moved) < MIN_SCORING_GAIN:
             break
-        trial = x + moved
-        new = slope.at(trial, value)
+        trial, enough = x + moved, value + MIN_SCORING_GAIN
+        new = slope.at(trial, enough)
+        if value < new[0] < enough:
+            x, value = trial, new[0]
+            break
         if new[0] > value:
             gained, expected, x = new[0] - value, float(score @ moved - 0.5 * moved @ curvature @ moved), trial
             secants = [*secants, (moved, score - new[1])][-x.size :]
             value, score, fisher = new
             curvature = with_secants(fisher, secants)
             damping = max(damping * _next_damping(gained / expected), MIN_DAMPING)
-            if gained < MIN_SCORING_GAIN:
-                break
         else:
             damping = max(damping, MIN_DAMPING_AFTER_REFUSAL) * 6.0
     return Noise(*slope.vector(x).tolist()), value
@@ -146,15 +147,15 @@ class _LogNoiseLikelihood:
     def at(self, x: FloatArray, least: float = -np.inf) -> tuple[float, FloatArray, FloatArray]:
         """Return log likelihood, score (P,) and information (P, P) at x (P,); minus infinity where it is no number.
 
-        Where the likelihood is not above `least`, score and information are not computed.
+        Where the likelihood is below `least`, score and information are not computed.
         """
         count, noise = x.size, self.vector(x)
         runs = [(r, *base_dynamics(a, k), e) for r, (a, k), e in zip(self.records, self.dynamics, self.residuals, strict=True)]
         here = [innovations_of(r, a, k, noise, self.place, e) for r, a, k, e in runs]
         learned = sum(h.likelihood for h in here) if self.likelihood is None else self.likelihood(noise)
         total = learned + self.has_prior * _log_prior_at(x, self.place)
-        if not (np.isfinite(total) and total > least):
-            return -np.inf, np.zeros(count), np.eye(count)
+        if not (np.isfinite(total) and total >= least):
+            return (total if np.isfinite(total) else -np.inf), np.zeros(count), np.eye(count)
         parts = [information(r, a, k, noise, self.place, e, h) for (r, a, k, e), h in zip(runs, here, strict=True)]
         self.evaluations.add(len(parts))
         score, fisher = np.sum([s for s, _ in parts], axis=0), np.sum([f for _, f in parts], axis=0)

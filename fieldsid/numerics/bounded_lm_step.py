@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from fieldsid.errors import DivergenceError
 from fieldsid.numerics.arrays import FloatArray
@@ -46,6 +47,9 @@ def bounded_step(
 
 
 def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    _, solution, failed = dposv(matrix, right)
+    if not failed:
+        return np.asarray(solution)
     try:
         return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError:

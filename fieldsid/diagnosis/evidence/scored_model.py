@@ -254,17 +254,11 @@ def validation_log_density(
     """Return what `log_predictive_density` does; without validation runs none, and the training runs' own moments."""
     if not validation:
         return np.zeros(0), [], ml_fit.noise.own_moment
-    runs = [
-        ValidationRun(
-            p,
-            x,
-            free_run_residual(p, x),
-            parameter_jacobian(ml_fit, p, r.speed),
-            speed_sensitivity(p, x, r.speed),
-            p.linearise(x, 0),
-        )
-        for (p, x), r in zip(flown, validation, strict=True)
-    ]
+    runs = []
+    for (p, x), r in zip(flown, validation, strict=True):
+        at = p.linearise(x, 0)
+        left = at.residual if np.isfinite(at.residual).all() else free_run_residual(p, x)
+        runs.append(ValidationRun(p, x, left, parameter_jacobian(ml_fit, p, r.speed), speed_sensitivity(p, x, r.speed), at))
     return log_predictive_density(ml_fit, runs, validation)
 
 

@@ -51,9 +51,9 @@ def _deciding(search: Search, rivals: list[ScoredModel]) -> dict[str, Any]:
     fin = min(max(float(np.max(np.abs(r.fin - np.median(r.fin)))) for r in search.records), LARGEST_FIN)
     speeds = [r.speed for r in search.records if np.isfinite(r.speed)]
     try:
-        found = separate(
-            [h.likelihood_model for h in rivals], Envelope(fin), speeds=(float(np.median(speeds)) if speeds else 1.0,), fast=True
-        )
+        speed = float(np.median(speeds)) if speeds else 1.0
+        models = [h.likelihood_model for h in rivals]
+        found = separate(models, Envelope(fin), speeds=(speed,), fast=True, mapped=search.parallel.map)
     except FieldsidError as error:
         # nothing inside the limits separates them: what the effects themselves declare is still worth flying
         return {**_declared(names), **command, "note": error.what}

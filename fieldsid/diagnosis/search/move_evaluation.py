@@ -31,12 +31,15 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
 from fieldsid.diagnosis.evidence.predictive_density import most_log_density
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
 from fieldsid.diagnosis.search.add_effect import (
+    FOREMOST_EFFECTS,
     MAX_EFFECTS_AT_BASE,
     MAX_EFFECTS_LATER,
+    Addition,
     SearchMove,
-    add_effect,
     by_effect,
+    foremost,
     is_redundant_start,
+    screen_additions,
 )
 from fieldsid.diagnosis.search.search_state import SearchState
 from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
@@ -65,26 +68,35 @@ class MoveEvaluation(SearchState):
         key = frozenset(parent.names)
         if key not in self.tried.progress.expanded:
             self.tried.progress.expanded.add(key)
-            most = MAX_EFFECTS_AT_BASE if key == self.root else MAX_EFFECTS_LATER
+            is_root, flown = key == self.root, key in self.tried.free_runs.screened or self._is_close(parent)
+            most = None if forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
             left = [e for e in self.catalogue if e.name not in key]
-            found = add_effect(
-                parent,
-                left,
-                None if forced else most,
-                self.parallel,
-                anew=key == self.root,
-                flown=key in self.tried.free_runs.screened or self._is_close(parent),
-            )
+            [found] = screen_additions([Addition(parent, left, most, flown, anew=is_root)], self.parallel)
             self._fit_from_output_error(parent)
             self.tried.free_runs.screened.add(key)
-            later = self._evaluate_moves(parent, by_effect(found))
+            groups = by_effect(found)
+            later = self._evaluate_moves(groups) if forced else self._evaluate_foremost(key, groups)
             if only_validation_shows(parent, self.floor):
                 moves = moves_of_all_runs(parent, self._untried(parent), self.parallel)
-                self._evaluate_moves(parent, by_effect(moves), every=True)
+                self._evaluate_moves(by_effect(moves), every=True)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
-            self._evaluate_moves(parent, by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
+            self._evaluate_moves(by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
             self._refine_children(key)
         return self._children(key)
+
+    def _evaluate_foremost(self, key: frozenset[str], groups: Sequence[Sequence[SearchMove]]) -> list[SearchMove]:
+        """Evaluate the moves of the effects that promise most, then those of the others.
+
+        Where the best child then leaves no visible error, of the others only what its effect may be mistaken for. Returns what
+        `_evaluate_moves` does.
+        """
+        first = foremost(groups, FOREMOST_EFFECTS)
+        later = self._evaluate_moves(first)
+        best = self._children(key)[:1]
+        explained = best if best and worst_error(best[0], self.floor) <= SUFFICIENT_ERROR_RATIO else []
+        alike = {n for h in explained for e in h.effects if e.name not in key for n in e.mistaken_for}
+        others = [group for group in groups if group not in first]
+        return later + self._evaluate_moves([g for g in others if not explained or g[0].screened.effect.name in alike])
 
     def _is_close(self, parent: ScoredModel) -> bool:
         """Whether a model's free run is so near the noise that to first order its likelihood shows whatever its free run does."""
@@ -148,27 +160,26 @@ class MoveEvaluation(SearchState):
 
         self.tried.update(zip(names, self.parallel.map(fit_all, names), strict=True))
 
-    def _evaluate_moves(
-        self, parent: ScoredModel, groups: Sequence[Sequence[SearchMove]], *, every: bool = False, near: ScoredModel | None = None
-    ) -> list[SearchMove]:
+    def _evaluate_moves(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
         """Evaluate the moves of each effect; return those left out because an earlier start has reached their predicted cost.
 
-        `every` leaves none out. All moves are compared with the same rival, so that the result does not depend on their order.
-        What cannot come near a model is not kept, where one is given.
+        `every` leaves none out. All moves of a parent are compared with the same rival, so that the result does not depend on
+        their order. What cannot come near a model is not kept, where one is given.
         """
-        rival = max((h.likelihood_fit.log_likelihood for h in self._children(frozenset(parent.names))), default=-np.inf)
+        parents = {frozenset(group[0].parent.names) for group in groups}
+        rivals = {p: max((h.log_likelihood for h in self._children(p)), default=-np.inf) for p in parents}
 
         def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[FittedProblem], list[int]]:
-            key = frozenset((*parent.names, group[0].screened.effect.name))
+            key, rival = group[0].names, rivals[frozenset(group[0].parent.names)]
             found = {key: self.tried[key]} if key in self.tried else {}
             free, later = list(self.tried.free_runs.fits.get(key, ())), list[int]()
             fits = [h.likelihood_fit for h in found.values()]
             for i, move in enumerate(group):
-                if every or not fits or not is_redundant_start(move, parent, max(fits, key=lambda f: f.log_likelihood)):
-                    start, flown = self._start_of(parent, move)
+                if every or not fits or not is_redundant_start(move, max(fits, key=lambda f: f.log_likelihood)):
+                    start, flown = self._start_of(move)
                     free += flown
-                    fits.append(self._fit_child(parent, move.screened.problem, start, move.screened.effect, rival))
-                    if near is None or self._may_come_near(near, fits[-1]):
+                    fits.append(self._fit_child(move.parent, move.screened.problem, start, move.screened.effect, rival))
+                    if move.asked.near is None or self._may_come_near(move.asked.near, fits[-1]):
                         self._keep(fits[-1], found)
                 else:
                     later.append(i)
@@ -176,9 +187,10 @@ class MoveEvaluation(SearchState):
 
         left = []
         for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
-            key = frozenset((*parent.names, group[0].screened.effect.name))
+            key = group[0].names
             self.tried.free_runs.fits[key] = free
-            if found is not None:
+            # two parents may lead to the same effects
+            if found is not None and (key not in self.tried or found.log_evidence >= self.tried[key].log_evidence):
                 self.tried[key] = found
             left += [group[i] for i in later]
         return left
@@ -187,17 +199,20 @@ class MoveEvaluation(SearchState):
         """Return the effects of the catalogue that were not tried beside those of a model."""
         return [e for e in self.catalogue if e.name not in h.names and frozenset((*h.names, e.name)) not in self.tried]
 
-    def _try_added(
-        self, h: ScoredModel, effects: Sequence[Effect], most: int | None, *, near: ScoredModel | None = None, behind: float = 0.0
-    ) -> None:  # fmt: skip
-        """Fit a model with each of some effects that passes its likelihood's screen: see `add_effect` and `_evaluate_moves`."""
-        moves = add_effect(h, effects, most, self.parallel, anew=False, flown=True, behind=behind)
-        self._evaluate_moves(h, by_effect(moves), near=near)
+    def _try_added(self, asked: Sequence[Addition]) -> None:
+        """Fit each model with each of its effects that passes the screen: see `screen_additions` and `_evaluate_moves`."""
+        moves = screen_additions([addition for addition in asked if addition.effects], self.parallel)
+        self._evaluate_moves([group for of_one in moves for group in by_effect(of_one)])
 
-    def _add_at(self, best: ScoredModel, others: Sequence[Effect], effects: Sequence[Effect]) -> None:
-        """Add each of some effects to others at the parameters of the best model."""
-        if effects:
-            self._try_added(self._moved(best, others), effects, None, near=best)
+    def _at(self, best: ScoredModel, others: Sequence[Effect], effects: Sequence[Effect]) -> Addition:
+        """Return the addition of each of some effects to others at the parameters of the best model."""
+        return Addition(self._moved(best, others) if effects else best, effects, near=best)
+
+    def _try_variants_near(self, best: ScoredModel, pairs: Sequence[tuple[Sequence[Effect], Sequence[Effect]]]) -> None:
+        """Try what comes near the best by log evidence, of pairs some effects and one more, with what it lacks in variants."""
+        keys = dict.fromkeys(frozenset((*(e.name for e in others), one.name)) for others, alike in pairs for one in alike)
+        near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
+        self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
 
     @staticmethod
     def _moved(h: ScoredModel, effects: Sequence[Effect]) -> ScoredModel:
@@ -214,7 +229,7 @@ class MoveEvaluation(SearchState):
         Not what an effect of the model may be mistaken for: that takes a part of it, and is exchanged for it elsewhere.
         """
         alike = {n for e in h.effects for n in e.mistaken_for}
-        self._try_added(h, [e for e in self._untried(h) if e.name not in alike], MAX_PROMISING)
+        self._try_added([Addition(h, [e for e in self._untried(h) if e.name not in alike], MAX_PROMISING)])
 
     def _may_come_near(self, h: ScoredModel, ml_fit: LikelihoodFit) -> bool:
         """Whether a fit may come near a model by log evidence, if it left nothing of the validation runs but the noise.
@@ -226,13 +241,13 @@ class MoveEvaluation(SearchState):
         # the penalty, none of which is below nothing, asks for a linearisation
         return most > least and most - bic_penalty(ml_fit, self.validation) > least
 
-    def _start_of(self, parent: ScoredModel, move: SearchMove) -> tuple[FloatArray, list[FittedProblem]]:
+    def _start_of(self, move: SearchMove) -> tuple[FloatArray, list[FittedProblem]]:
         """Return where the model that a move leads to is fitted from, and its output-error fit where that is made first."""
         screened = move.screened
-        self.report("+".join((*parent.names, screened.effect.name)))
+        self.report("+".join((*move.parent.names, screened.effect.name)))
         if not move.by_output_error:
             return screened.start, []
-        free = fit_output_error(screened.problem, screened.start, parent.likelihood_fit.fitted.weights)
+        free = fit_output_error(screened.problem, screened.start, move.parent.likelihood_fit.fitted.weights)
         return free.x, [free]
 
     def _fit_child(

@@ -14,11 +14,11 @@ from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximu
 from fieldsid.diagnosis.evidence.noise_kind import fit_other_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
 from fieldsid.diagnosis.residual_tests.residual_tests import residuals_reject
-from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, likelihood_linearisation, may_gain
+from fieldsid.diagnosis.search.add_effect import MAX_EFFECTS_LATER, Addition, likelihood_linearisation, may_gain
 from fieldsid.diagnosis.search.model_spec import Assumptions, ModelSpec
 from fieldsid.diagnosis.search.move_evaluation import MoveEvaluation
 from fieldsid.diagnosis.search.variant_search import VariantRequest
-from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, MAX_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
+from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MISSING_ERROR_RATIO, RIVAL_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, scan_points, shifts_time
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect, Stage, with_variant
@@ -27,6 +27,8 @@ MAX_STARTS_IN_SERIES = 4
 """Scan points, those of the lowest cost, that an actuator and a hidden state are fitted from together."""
 MAX_IDLE_EXPANSIONS = 2
 """Expansions beyond the budget that may lower no error: the last of three effects that show together only is the third."""
+EXCHANGES_IN_ANY_CASE = 2
+"""Leading models that are exchanged whatever was spent: what comes to lead by the first may itself be mistaken for another."""
 MAX_JOINED = 3
 """Sets that are fitted again with what the leading model has besides, a fit each, and rivals of it that are grown."""
 
@@ -55,17 +57,17 @@ class Search(MoveEvaluation):
             and self.may_go_on()
             and (nothing or residuals_reject(found.likelihood_fit, self.parallel))
         ):
-            self._try_added(self.base(), [e for e in self._untried(self.base()) if nothing and e.variants], None)
+            self._try_added([Addition(self.base(), [e for e in self._untried(self.base()) if nothing and e.variants])])
             self._try_laws_and_variants(self.root, [], every=True)
             self._expand()
         if self._is_expandable(leading := self._most_evident()):
             self._add_most_promising(leading)
+            self._exchange_leaders()
         self._lift_under_other_trim_law()
-        while True:
+        self.share_own_moments()
+        while self._drop_each(found := self.best_admissible()):
             self.share_own_moments()
-            found = self.best_admissible()
-            if not self._drop_each(found):
-                return found
+        return found
 
     def _expand(self) -> None:
         """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise."""
@@ -128,14 +130,14 @@ class Search(MoveEvaluation):
         on one that lacks the lag.
         """
         best = self._most_evident()
-        for h in [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]:
-            if self.may_go_on():
-                self._add_to_rival(h, self._untried(h), best)
+        rivals = [h for h in self.ranked() if h is not best and self._predicts_as_well(h, best)][:MAX_JOINED]
+        if self.may_go_on():
+            self._try_added([self._to_rival(h, self._untried(h), best) for h in rivals])
 
-    def _add_to_rival(self, h: ScoredModel, effects: Sequence[Effect], best: ScoredModel) -> None:
-        """Add to a model the effects that, to first order, may bring it near the best by log evidence."""
+    def _to_rival(self, h: ScoredModel, effects: Sequence[Effect], best: ScoredModel) -> Addition:
+        """Return the addition to a model of the effects that, to first order, may bring it near the best by log evidence."""
         behind = max(lacks(h, best) - RIVAL_LOG_ODDS, 0.0)
-        self._try_added(h, effects, MAX_EFFECTS_LATER, near=best, behind=behind)
+        return Addition(h, effects, MAX_EFFECTS_LATER, behind=behind, near=best)
 
     def _predicts_as_well(self, h: ScoredModel, best: ScoredModel) -> bool:
         """Whether an accepted set of no more effects, some at least, leaves nothing missing on fitted nor on unseen runs."""
@@ -147,11 +149,11 @@ class Search(MoveEvaluation):
         """Exchange effects of the model of the highest evidence for others, then of what leads after it, expanded in its turn.
 
         It goes on as long as the budget lasts: what leads after an exchange differs from what led before it by less each time.
-        Twice it is done in any case: what comes to lead by the first may itself be mistaken for something not yet tried.
         """
-        exchanged = self.tried.progress.exchanged
-        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (len(exchanged) < 2 or self.may_go_on()):
+        exchanged, left = self.tried.progress.exchanged, EXCHANGES_IN_ANY_CASE
+        while (spec := ModelSpec.of(best := self._most_evident())) not in exchanged and (left > 0 or self.may_go_on()):
             exchanged.add(spec)
+            left -= 1
             self._exchange_for_variants(best)
             self._exchange_for_lookalikes(self._most_evident())
             self._drop_each(self._most_evident())
@@ -181,24 +183,24 @@ class Search(MoveEvaluation):
         """
         self._drop_each(best)
         accepted = self.core_of(best) - self.root
-        for stands in (e for e in best.effects if e.name in accepted):
-            others = [e for e in best.effects if e is not stands]
-            alike = [e for e in self.catalogue if e.name in stands.mistaken_for and e.name not in best.names]
-            if len(best.names) > len(self.known) + 1:
-                self._add_to_rival(self.tried[frozenset(best.names) - {stands.name}], alike, best)
-                self._add_at(best, others, [e for e in alike if shifts_time(e)] if shifts_time(stands) else [])
-                self._try_variants_near(best, others, alike)
-            for textbook in (e for e in self.catalogue if e.name == stands.name and stands.is_formed):
-                self._add_at(best, [*others, textbook], alike)
-                self._try_variants_near(best, [*others, textbook], alike)
-            if stands.is_formed and len(others) == len(self.known):
-                self._fit_pairs([(e, b) for e in self.catalogue if e.name == stands.name for b in alike if _in_series(e, b)])
+        stands = [(e, [other for other in best.effects if other is not e], self._alike(e, best)) for e in best.effects]
+        stands = [one for one in stands if one[0].name in accepted]
+        if len(best.names) > len(self.known) + 1:
+            less = [(self.tried[frozenset(best.names) - {e.name}], alike) for e, _, alike in stands]
+            self._try_added([self._to_rival(h, alike, best) for h, alike in less])
+            shifts = [(others, [a for a in alike if shifts_time(a)]) for e, others, alike in stands if shifts_time(e)]
+            self._try_added([self._at(best, *one) for one in shifts])
+            self._try_variants_near(best, [(others, alike) for _, others, alike in stands])
+        textbook = {e.name: e for e in self.catalogue}
+        formed = [([*others, textbook[e.name]], alike) for e, others, alike in stands if e.is_formed]
+        self._try_added([self._at(best, *one) for one in formed])
+        self._try_variants_near(best, formed)
+        if len(best.names) == len(self.known) + 1:
+            self._fit_pairs([(e, a) for effects, alike in formed for e in effects[-1:] for a in alike if _in_series(e, a)])
 
-    def _try_variants_near(self, best: ScoredModel, others: Sequence[Effect], alike: Sequence[Effect]) -> None:
-        """Try what comes near the best by log evidence, some effects and one more, with what it does not share in variants."""
-        keys = [frozenset((*(e.name for e in others), one.name)) for one in alike]
-        near = [h for k in keys if (h := self.tried.get(k)) and best.log_evidence - h.log_evidence < ALTERNATIVE_LOG_ODDS]
-        self._try_variants([VariantRequest(h, set(h.names) - set(best.names)) for h in near])
+    def _alike(self, effect: Effect, h: ScoredModel) -> list[Effect]:
+        """Return what an effect may be mistaken for and a model lacks."""
+        return [e for e in self.catalogue if e.name in effect.mistaken_for and e.name not in h.names]
 
     def _front(self, best: ScoredModel) -> list[ScoredModel]:
         """Return the models of accepted effects whose error is clearly below that of the one with the highest evidence."""
@@ -270,7 +272,7 @@ class Search(MoveEvaluation):
             if (varied := self.tried[key := frozenset(best.names)]) is not best:
                 self.tried.progress.expanded.discard(key)  # what the textbook's leaves room for says nothing of the new one
                 leading = self._most_evident()
-                self._add_to_rival(varied, [e for e in leading.effects if e.name not in key], leading)
+                self._try_added([self._to_rival(varied, [e for e in leading.effects if e.name not in key], leading)])
                 self._join_children(self._children(key), varied)
 
     def _fit_pairs(self, pairs: Sequence[tuple[Effect, Effect]]) -> None:
@@ -361,10 +363,7 @@ class Search(MoveEvaluation):
         return True
 
     def _lift_under_other_trim_law(self) -> None:
-        """Let what lacks one of the found effects count under the other trim law, where that explains it better.
-
-        What a law explains without an effect is no evidence for that effect.
-        """
+        """Let what lacks one of the found effects count under the other trim law: what that explains is no evidence for it."""
         lawful = self.trim_laws.without_an_effect(self.best_admissible(), self.tried)
         self.tried.update({frozenset(h.names): prefer_output_error(h, self.floor) for h in lawful})
 

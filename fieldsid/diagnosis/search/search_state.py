@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
 from fieldsid.diagnosis.evidence.acceptance import (
     excess_share,
     is_accepted,
+    keeps_error,
     leaves_error,
     lowers_error,
     settles_error,
@@ -136,9 +139,10 @@ class SearchState:
             self.resolution_floor = resolution_floor(self.floor, fitted.weights)
             ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.noise_kind, self.parallel)
             self.tried.assumptions = Assumptions(ml_fit.noise_kind, fitted.problem.layout.groups.trim_of_fin)
-            self._keep(ml_fit)
-            self.tried[self.root] = prefer_output_error(self.tried[self.root], self.floor)
-            self._try_other_speed_law([self.root])
+            h = self._keep(ml_fit)
+            ways: tuple[Callable[[], Any], ...] = (partial(prefer_output_error, h, self.floor), partial(self._under_other_law, h))
+            own, other = self.parallel.map(lambda way: way(), ways)
+            self.tried[self.root] = own if other is None or not keeps_error(own, other) else other
             self._try_variants([VariantRequest(self.tried[self.root])])
         return self.tried[self.root]
 
@@ -208,13 +212,13 @@ class SearchState:
 
     def _try_other_speed_law(self, names: Sequence[frozenset[str]]) -> None:
         """Fit models under the other speed law, and keep that where it has more evidence."""
+        others = self.parallel.map(lambda name: self._under_other_law(self.tried[name]), names)
+        self.tried.update({name: other for name, other in zip(names, others, strict=True) if other is not None})
 
-        def better(name: frozenset[str]) -> ScoredModel:
-            known = self.tried[name]
-            other = other_speed_law(known, self.resolution_floor, self.noise_kind, asks_for_more=leaves_error(known, self.floor))
-            return known if other is None else prefer_output_error(other, self.floor).evaluate_errors()
-
-        self.tried.update(zip(names, self.parallel.map(better, names), strict=True))
+    def _under_other_law(self, h: ScoredModel) -> ScoredModel | None:
+        """Return a model under the other speed law where that has more evidence, None elsewhere."""
+        other = other_speed_law(h, self.resolution_floor, self.noise_kind, asks_for_more=leaves_error(h, self.floor))
+        return None if other is None else prefer_output_error(other, self.floor).evaluate_errors()
 
     def _try_variants(self, asked: Sequence[VariantRequest]) -> None:
         """Try other variants of the models' effects, unless that was done at the same evidence."""

@@ -339,20 +339,20 @@ def _at_best_points(
     shared, squares = [i for i in new if problem.layout.parameters[i].run < 0], []
     for run, (slot, grid) in enumerate(zip(places, grids, strict=True)):
         own = [i for i in new if i != slot and problem.layout.parameters[i].run == run]
+        basis = linearisation.nuisance_basis[run]
+        parent = project_out(basis, linearisation.shared[run])
+        of_parent = parent @ parent.T
         for value in grid:
             x[slot] = value
-            rows = whitened_rows_of_run(linearisation, problem, x, run, [*shared, *own])
-            basis = _extend_basis(linearisation.nuisance_basis[run], rows[1 + len(shared) :].T)
-            left = project_out(basis, np.concatenate([rows[: 1 + len(shared)], linearisation.shared[run]]))
-            squares.append(left @ left.T)
+            rows = project_out(basis, whitened_rows_of_run(linearisation, problem, x, run, [*shared, *own]))
+            first, beside = rows[: 1 + len(shared)], rows[1 + len(shared) :]
+            if beside.any():
+                left = project_out(_orthonormal(beside.T), np.concatenate([first, parent]))
+                squares.append(left @ left.T)
+            else:
+                cross = first @ parent.T
+                squares.append(np.concatenate([np.hstack([first @ first.T, cross]), np.hstack([cross.T, of_parent])]))
     square = np.array(squares).reshape(*grids.shape, *squares[0].shape)
     low, high = (bound[shared] - x[shared] for bound in (problem.layout.low, problem.layout.high))
     x[list(places)] = grids[np.arange(len(places)), joint_grid_search(square, low, high)]
     return x
-
-
-def _extend_basis(basis: FloatArray, columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis (rows, rank) of the span of a basis and further columns."""
-    if not columns.any():
-        return basis
-    return np.concatenate([basis, _orthonormal(columns - basis @ (basis.T @ columns))], axis=1)

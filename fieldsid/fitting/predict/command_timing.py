@@ -238,10 +238,11 @@ def _rough_gain(record: Record, shift: FloatArray, own: FloatArray) -> float:
 def correlation_length(values: FloatArray, lags: int) -> float:
     """Return 1 + 2 sum of the autocorrelation up to its first value below zero, in samples."""
     centred = values - values.mean()
-    power, total = float(centred @ centred), 1.0
-    for lag in range(1, min(lags, values.size - 1) + 1):
-        r = float(centred[lag:] @ centred[:-lag]) / power if power > 0.0 else 0.0
-        if r <= 0.0:
-            break
-        total += 2.0 * r
-    return total
+    reach = min(lags, values.size - 1)
+    # the products of all lags at once: one for each would cost its call
+    products = np.correlate(np.concatenate([centred, np.zeros(reach)]), centred, "valid")
+    if not products[0] > 0.0:
+        return 1.0
+    later = products[1:] / products[0]
+    below = np.flatnonzero(later <= 0.0)
+    return 1.0 + 2.0 * float(later[: below[0] if below.size else None].sum())

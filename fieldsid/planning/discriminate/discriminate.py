@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
@@ -19,10 +19,16 @@ from fieldsid.planning.flight.excitation import Excitation, Window, fits, flown_
 from fieldsid.planning.flight.operating_point import autopilot_of, operating_point
 from fieldsid.planning.safety.envelope import Envelope, excursion_of, used
 
+Pairs = Mapping[str, float]
+Map = Callable[[Callable[[Excitation], Pairs], Sequence[Excitation]], list[Pairs]]
+"""The expected log odds of each ordered pair of rivals; and what evaluates a function of them at several candidates."""
+
 DEFAULT_WINDOW_S = 60.0
 MOST_LOG_ODDS = 300.0
 CANDIDATES_TUNED = 3
 FAST_HZ, FAST_ROUNDS, BEYOND_DOUBT = 10.0, 3, 50.0
+AT_ONCE = 2
+"""Candidates that are evaluated at once, before it is asked whether one of them decides."""
 DECISIVE_LOG_ODDS = float(np.log(20.0))
 """Log odds above which a pair counts as discriminated."""
 
@@ -103,7 +109,7 @@ class _RivalFlights:
                 return None
         return flights
 
-    def pairs(self, candidate: Excitation) -> dict[str, float]:
+    def pairs(self, candidate: Excitation) -> Pairs:
         """Return the expected log odds of every ordered pair, empty where the envelope is left.
 
         A model that is part of another cannot be shown to be the right one by fit alone: such pairs are left out.
@@ -118,6 +124,10 @@ class _RivalFlights:
         return found
 
 
+def _in_turn(function: Callable[[Excitation], Pairs], candidates: Sequence[Excitation]) -> list[Pairs]:
+    return [function(c) for c in candidates]
+
+
 def separate(
     models: Sequence[Model],
     envelope: Envelope,
@@ -128,12 +138,13 @@ def separate(
     run_up_s: float = 0.0,
     candidates: Sequence[Excitation] | None = None,
     fast: bool = False,
+    mapped: Map = _in_turn,
 ) -> Separation:
     """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
 
     `fast`: at most 10 Hz, the maneuvers that the rivals' effects declare to be excited by, no tuning; the first that decides
-    clearly is taken. `candidates`: what to choose among, in place of the catalogue. Raises UsageError for fewer than two rivals,
-    rivals of different axes, or when no maneuver stays inside the envelope.
+    clearly is taken. `candidates`: what to choose among, in place of the catalogue. `mapped` evaluates several at once. Raises
+    UsageError for fewer than two rivals, rivals of different axes, or when no maneuver stays inside the envelope.
     """
     _check(models)
     if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
@@ -144,7 +155,7 @@ def separate(
         rate = min(rate_hz, FAST_HZ) if fast else rate_hz
         rounds = FAST_ROUNDS if fast else MAX_REFIT_ITERATIONS
         arena = _RivalFlights(rivals, envelope, Window(window_s, rate_hz=rate), rounds, run_up_s * speed)
-        found = _at_speed(arena, candidates, fast=fast)
+        found = _at_speed(arena, candidates, mapped, fast=fast)
         if found is not None and fast:
             found = replace(found, window=replace(found.window, rate_hz=rate_hz))
         if found is not None and (best is None or found.expected_log_odds > best.expected_log_odds):
@@ -179,8 +190,9 @@ def _check(models: Sequence[Model]) -> None:
         raise UsageError("the rivals are of different axes", found=", ".join(m.axis.value for m in models), hint="plan one axis")
 
 
-def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, *, fast: bool) -> Separation | None:
-    scored = _scored(arena, candidate_maneuvers(arena.window, arena.envelope) if candidates is None else candidates, fast=fast)
+def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, mapped: Map, *, fast: bool) -> Separation | None:
+    among = candidate_maneuvers(arena.window, arena.envelope) if candidates is None else candidates
+    scored = _scored(arena, among, mapped, fast=fast)
     if not scored:
         return None
     scored.sort(key=lambda s: -worth(s[1]))
@@ -193,19 +205,16 @@ def _at_speed(arena: _RivalFlights, candidates: Sequence[Excitation] | None, *, 
     )  # fmt: skip
 
 
-def _scored(
-    arena: _RivalFlights, candidates: Sequence[Excitation], *, fast: bool
-) -> list[tuple[Excitation, Mapping[str, float]]]:
+def _scored(arena: _RivalFlights, candidates: Sequence[Excitation], mapped: Map, *, fast: bool) -> list[tuple[Excitation, Pairs]]:
     """Return the candidates that stay inside the envelope, with the log odds of their pairs."""
     named = {m for r in arena.rivals for e in r.scene.effects for m in e.excited_by}
-    scored: list[tuple[Excitation, Mapping[str, float]]] = []
-    for candidate in candidates:
-        if fast and named and candidate.maneuver not in named:
-            continue
-        if pairs := arena.pairs(candidate):
-            scored.append((candidate, pairs))
-            if fast and min(pairs.values()) > BEYOND_DOUBT:
-                break
+    asked = [c for c in candidates if not (fast and named) or c.maneuver in named]
+    scored = list[tuple[Excitation, Pairs]]()
+    for first in range(0, len(asked), AT_ONCE):
+        some = asked[first : first + AT_ONCE]
+        scored += [(c, pairs) for c, pairs in zip(some, mapped(arena.pairs, some), strict=True) if pairs]
+        if fast and any(min(pairs.values()) > BEYOND_DOUBT for _, pairs in scored[-AT_ONCE:]):
+            break
     return scored
 
 

@@ -14,7 +14,10 @@ from fieldsid.models.model import Noise
 
 FLOOR = Noise(0.004, 0.002)
 RIVALS = [SimpleNamespace(names=(n,), likelihood_model=None) for n in ("servo_lag", "delay")]
-WORK = SimpleNamespace(is_noiseless=False, known=(), records=[SimpleNamespace(fin=np.array([-0.2, 0.0, 0.2]), speed=1.5)])
+WORK = SimpleNamespace(
+    is_noiseless=False, known=(), records=[SimpleNamespace(fin=np.array([-0.2, 0.0, 0.2]), speed=1.5)],
+    parallel=SimpleNamespace(map=None),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("odds", [12.0, 0.4])

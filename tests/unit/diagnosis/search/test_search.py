@@ -15,7 +15,15 @@ from fieldsid.diagnosis.evidence.likelihood_fit import likelihood_at, measured_c
 from fieldsid.diagnosis.evidence.scored_model import score_model
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
-from fieldsid.diagnosis.search.add_effect import add_effect, by_effect, likelihood_linearisation, may_gain, mechanisms
+from fieldsid.diagnosis.search.add_effect import (
+    Addition,
+    by_effect,
+    foremost,
+    likelihood_linearisation,
+    may_gain,
+    mechanisms,
+    screen_additions,
+)
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE
 from fieldsid.effects import all_effects
@@ -45,15 +53,14 @@ def with_children(*names):
     """A search for a lag, a dead time and a bias with its base and the children of some of them."""
     made, effects = search_for("servo_lag", "delay", "gyro_bias"), all_effects(Axis.YAW)
     base, asked = made.base(), [effects[n] for n in names]
-    made._evaluate_moves(base, by_effect(add_effect(base, asked, None, made.parallel, anew=False, flown=True)))
+    made._try_added([Addition(base, asked)])
     return made, base, [made.tried[frozenset([n])] for n in names]
 
 
 def with_a_bias_after_a_delay():
     """A search for a lag, a dead time and a bias that has fitted the dead time, then the bias with it, and the model of both."""
     made, _, (parent,) = with_children("delay")
-    moves = add_effect(parent, [all_effects(Axis.YAW)["gyro_bias"]], None, made.parallel, anew=False, flown=True)
-    made._evaluate_moves(parent, by_effect(moves))
+    made._try_added([Addition(parent, [all_effects(Axis.YAW)["gyro_bias"]])])
     return made, made.tried[frozenset(["delay", "gyro_bias"])]
 
 
@@ -83,7 +90,7 @@ def other_ends(monkeypatch):
 @pytest.mark.parametrize("seen", [True, False], ids=["seen to first order", "too long for that"])
 def test_an_effect_is_exchanged_for_what_it_may_be_mistaken_for_beside_the_others(monkeypatch, seen):
     if not seen:
-        monkeypatch.setattr(Search, "_add_to_rival", lambda *_: None)
+        monkeypatch.setattr(Search, "_to_rival", lambda _self, h, *_: Addition(h, []))
     made, parent = with_a_bias_after_a_delay()
     monkeypatch.setattr(Search, "_most_evident", lambda _self: parent)
     assert frozenset(["gyro_bias", "servo_lag"]) not in made.tried
@@ -111,6 +118,21 @@ def test_what_comes_to_lead_by_an_exchange_is_exchanged_in_its_turn_whatever_was
     made.budget.most = made.budget.where_unexplained = 0.0
     made._exchange_leaders()
     assert asked == [("delay",), ("servo_lag",)]
+
+
+def test_what_comes_to_lead_by_what_promised_most_is_exchanged_in_its_turn(monkeypatch):
+    made, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
+    exchanged, found = [], [lag]
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: found[-1])
+    monkeypatch.setattr(Search, "_is_expandable", lambda *_: True)
+    monkeypatch.setattr(Search, "_add_most_promising", lambda *_: found.append(bias))
+    monkeypatch.setattr(Search, "_exchange_for_lookalikes", lambda _self, h: exchanged.append(h.names))
+    monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: False)
+    for name in ("_expand", "_grow_rivals", "_exchange_for_variants", "_drop_each"):
+        monkeypatch.setattr(Search, name, lambda *_: False)
+    made.budget.most = made.budget.where_unexplained = 0.0
+    made.best()
+    assert exchanged == [("servo_lag",), ("gyro_bias",)]
 
 
 def test_an_accepted_set_that_predicts_as_well_is_grown_beside_the_most_evident(monkeypatch):
@@ -199,8 +221,8 @@ def test_a_model_lacks_no_more_evidence_than_on_the_training_runs_in_proportion(
 def test_what_cannot_come_near_a_model_is_not_kept(behind):
     made = search_for("servo_lag", "delay")
     base, lag = made.base(), all_effects(Axis.YAW)["servo_lag"]
-    moves = by_effect(add_effect(base, [lag], None, made.parallel, anew=False, flown=True))
-    made._evaluate_moves(base, moves, near=replace(base, complexity_penalty=base.complexity_penalty - behind))
+    near = replace(base, complexity_penalty=base.complexity_penalty - behind)
+    made._try_added([Addition(base, [lag], near=near)])
     assert (frozenset(["servo_lag"]) in made.tried) is (behind == 0.0)
 
 
@@ -212,7 +234,7 @@ def test_models_without_children_are_joined_with_nothing(base):
 
 def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence(base):
     lag, alone = base.catalogue[0], base.base()
-    base._evaluate_moves(alone, by_effect(add_effect(alone, [lag], None, base.parallel, anew=True, flown=False)))
+    base._try_added([Addition(alone, [lag], flown=False, anew=True)])
     paid = base.tried[frozenset(["servo_lag"])].complexity_penalty - alone.complexity_penalty
     prior = EVIDENCE_TEMPERATURE * ALTERNATIVE_LOG_ODDS
     assert prior < paid < prior + 0.5 * np.log(2 * sum(r.time.size for r in base.records))
@@ -221,7 +243,7 @@ def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence(base):
 
 def test_a_model_moved_to_fewer_effects_has_the_numbers_it_had_and_the_likelihood_there(base):
     lag = base.catalogue[0]
-    base._evaluate_moves(base.base(), by_effect(add_effect(base.base(), [lag], None, base.parallel, anew=True, flown=False)))
+    base._try_added([Addition(base.base(), [lag], flown=False, anew=True)])
     fast = base.tried[frozenset(["servo_lag"])]
     moved = base._moved(fast, [])
     assert moved.names == ()
@@ -241,8 +263,9 @@ def test_a_model_that_diverges_is_not_expanded(base):
 def test_a_model_that_diverges_has_no_moves(base):
     h = base.base()
     lost = replace(h, likelihood_fit=replace(h.likelihood_fit, log_likelihood=-np.inf))
-    assert add_effect(h, base.catalogue, None, base.parallel, anew=False, flown=True)
-    assert not add_effect(lost, base.catalogue, None, base.parallel, anew=False, flown=True)
+    some, none = screen_additions([Addition(h, base.catalogue), Addition(lost, base.catalogue)], base.parallel)
+    assert some
+    assert not none
 
 
 @pytest.mark.parametrize(("unseen", "kept"), [(-300.0, False), (1.0, True)])
@@ -314,8 +337,7 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
     made = search_for("servo_lag", "sway_coupling", "gyro_bias")
     sway, starts = next(e for e in made.catalogue if e.name == "sway_coupling"), []
     base = made.base()
-    moves = add_effect(base, [sway], None, made.parallel, anew=False, flown=True)
-    made._evaluate_moves(base, by_effect(moves))
+    made._try_added([Addition(base, [sway])])
     real = search.fit_maximum_likelihood
 
     def fit(problem, start, *more, rival):
@@ -338,9 +360,7 @@ def test_an_actuator_and_a_state_of_the_hull_are_fitted_together_from_the_base(m
 def test_a_pair_in_series_that_its_state_makes_likelier_is_tried_with_what_the_leading_model_has(monkeypatch, gains):
     made, pair = search_for("servo_lag", "sway_coupling", "gyro_bias"), frozenset(["servo_lag", "sway_coupling"])
     made.base()
-    made._evaluate_moves(
-        made.base(), by_effect(add_effect(made.base(), made.catalogue, None, made.parallel, anew=False, flown=True))
-    )
+    made._try_added([Addition(made.base(), made.catalogue)])
     made._fit_pairs(made._all_in_series())
     leading = made._moved(made._most_evident(), [e for e in made.catalogue if e.name in ("servo_lag", "gyro_bias")])
     tried = []
@@ -354,7 +374,7 @@ def test_a_pair_in_series_that_its_state_makes_likelier_is_tried_with_what_the_l
     monkeypatch.setattr(Search, "_try_variants", other_variant)
     monkeypatch.setattr(Search, "_most_evident", lambda _self: leading)
     monkeypatch.setattr(
-        Search, "_add_to_rival", lambda _self, h, effects, best: tried.append((h, [e.name for e in effects], best))
+        Search, "_try_added", lambda _self, asked: tried.extend((a.parent, [e.name for e in a.effects], a.near) for a in asked)
     )
     monkeypatch.setattr(Search, "_join_children", lambda _self, _children, parent: tried.append(parent))
     made.tried.progress.expanded.add(pair)
@@ -418,3 +438,44 @@ def test_a_hull_that_its_sway_alone_holds_straight_is_left_without_it_from_the_b
     left = made._drop_effect(replace(base, likelihood_fit=at), sway)
     assert left.names == ("servo_lag",)
     assert left.log_likelihood > base.log_likelihood + 100.0
+
+
+@pytest.mark.parametrize("left", [1.1, 1.3])
+def test_what_promises_less_is_fitted_where_the_first_leave_a_visible_error_or_are_mistaken_for_it(monkeypatch, left):
+    made = search_for("servo_lag", "delay", "gyro_bias")
+    base = made.base()
+    [found] = screen_additions([Addition(base, made.catalogue)], made.parallel)
+    groups = by_effect(found)
+    monkeypatch.setattr(move_evaluation, "FOREMOST_EFFECTS", 1)
+    monkeypatch.setattr(move_evaluation, "worst_error", lambda *_: left)
+    made._evaluate_foremost(made.root, groups)
+    assert [group[0].screened.effect.name for group in foremost(groups, 1)] == ["servo_lag"]
+    fitted = {n for key in made.tried for n in key}
+    assert fitted == ({"servo_lag", "delay"} if left < 1.15 else {"servo_lag", "delay", "gyro_bias"})
+
+
+def test_the_foremost_are_those_that_come_first_on_either_screen():
+    made = search_for("servo_lag", "delay", "gyro_bias")
+    [found] = screen_additions([Addition(made.base(), made.catalogue, flown=False)], made.parallel)
+    whitened = [replace(move, by_output_error=False) for move in found if not move.by_output_error]
+    flown = [
+        replace(move, by_output_error=True, screened=replace(move.screened, predicted_cost=1.0 - 0.1 * i))
+        for i, move in enumerate(whitened)
+    ]
+    groups = by_effect([*whitened, *flown])
+    last, first = flown[-1].screened.effect.name, foremost(by_effect(whitened), 1)[0][0].screened.effect.name
+    assert {group[0].screened.effect.name for group in foremost(groups, 1)} == {first, last}
+    assert foremost(groups, 5) == groups
+
+
+def test_additions_to_several_models_are_screened_and_fitted_at_once_and_the_better_of_two_ways_to_a_set_is_kept():
+    made, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
+    effects = {e.name: e for e in made.catalogue}
+    apart = [Addition(lag, [effects["gyro_bias"]]), Addition(bias, [effects["servo_lag"]])]
+    for addition in apart:
+        made._try_added([addition])
+    one_by_one = made.tried[frozenset(["servo_lag", "gyro_bias"])]
+    other, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
+    other._try_added([Addition(lag, [effects["gyro_bias"]]), Addition(bias, [effects["servo_lag"]])])
+    both = other.tried[frozenset(["servo_lag", "gyro_bias"])]
+    assert both.log_evidence == pytest.approx(one_by_one.log_evidence, abs=0.5)

@@ -14,7 +14,7 @@ from fieldsid.maneuvers import parse_spec
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.planning.belief.prior_model import named_prior
-from fieldsid.planning.discriminate.discriminate import separate
+from fieldsid.planning.discriminate.discriminate import AT_ONCE, BEYOND_DOUBT, separate
 from fieldsid.planning.discriminate.rivals import rivals_from, rivals_named, typical
 from fieldsid.planning.discriminate.t_optimality import log_odds, rival_of
 from fieldsid.planning.flight.excitation import Excitation, Window, flown
@@ -70,6 +70,20 @@ def test_a_quick_search_finds_a_maneuver_inside_the_envelope_for_every_pair(name
     assert found.expected_log_odds > np.log(20)
     assert found.plain()["decides"]
     assert len(found.says()) == 3
+
+
+def test_several_candidates_are_evaluated_at_once_until_one_decides():
+    rivals, asked = rivals_named(PRIOR, ("servo_lag", "delay")), []
+
+    def mapped(function, candidates):
+        asked.append(len(candidates))
+        return [function(c) for c in candidates]
+
+    found = separate(rivals, ENVELOPE, speeds=(1.4,), fast=True, mapped=mapped)
+    assert found == separate(rivals, ENVELOPE, speeds=(1.4,), fast=True)
+    assert set(asked[:-1]) <= {AT_ONCE}
+    assert sum(asked) - AT_ONCE < len(found.alternatives) <= sum(asked)
+    assert found.expected_log_odds > BEYOND_DOUBT
 
 
 def test_a_full_search_is_never_worse_than_its_own_catalogue():
