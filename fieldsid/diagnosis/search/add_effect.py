@@ -65,9 +65,10 @@ MAX_TIME_SHIFTS, TIME_SHIFT_ITERATIONS = 3, 12
 class Addition:
     """A request to add one of some effects to a model: the `most` best of each screen, and all their starts where that is None.
 
-    `anew`: the free run's error is screened as well, and time shifts are tried too, because a base model that lacks one has
-    biased parameters (see `_iterate_time_shift`). `behind`: the log evidence that the parent lacks to be of interest itself;
-    `near`: a model that what comes of it must come near to be kept.
+    `flown`: the parent's free run was screened before, or shows no more than its likelihood, which alone is screened. `anew`:
+    time shifts are tried too, because a base model that lacks one has biased parameters (see `_iterate_time_shift`).
+    `behind`: the log evidence that the parent lacks to be of interest itself. `near`: a model that what comes of it must come
+    near to be kept.
     """
 
     parent: ScoredModel
@@ -78,9 +79,8 @@ class Addition:
     behind: float = 0.0
     near: ScoredModel | None = None
 
-    @property
     def screens(self) -> list[_Screen]:
-        """The screens of its effects; none for a parent that diverges, which cannot be linearised."""
+        """Return the screens of its effects; none for a parent that diverges, which cannot be linearised."""
         if not np.isfinite(self.parent.likelihood_fit.log_likelihood):
             return []
         whitened = _Screen(self, likelihood_linearisation(self.parent), by_output_error=False)
@@ -113,7 +113,7 @@ class SearchMove:
 
 def screen_additions(asked: Sequence[Addition], parallel: ParallelMap) -> list[list[SearchMove]]:
     """Return the moves worth evaluating of each addition: the best of two screens, by output-error and by whitened cost."""
-    screens = [screen for addition in asked for screen in addition.screens]
+    screens = [screen for addition in asked for screen in addition.screens()]
     # all screens at once, then all that is to be followed: at the end of each sharing out one process waits for the other
     pairs = [(i, effect) for i, screen in enumerate(screens) for effect in mechanisms(screen.asked.effects)]
     points = parallel.map(lambda pair: _best_points(screens[pair[0]].linearisation, pair[1]), pairs)
