@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -213,11 +213,11 @@ class _PendingMove:
     evaluate: Callable[[], ScreenResult]
 
 
-def by_effect(found: Sequence[SearchMove]) -> list[list[SearchMove]]:
-    """Return the moves grouped by effect, in their order."""
-    groups: dict[str, list[SearchMove]] = {}
+def by_effects(found: Iterable[SearchMove]) -> list[list[SearchMove]]:
+    """Return the moves grouped by the effects of the model that they lead to, in their order."""
+    groups: dict[frozenset[str], list[SearchMove]] = {}
     for move in found:
-        groups.setdefault(move.screened.effect.name, []).append(move)
+        groups.setdefault(move.names, []).append(move)
     return list(groups.values())
 
 

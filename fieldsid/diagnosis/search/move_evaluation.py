@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ from fieldsid.diagnosis.search.add_effect import (
     MAX_EFFECTS_LATER,
     Addition,
     SearchMove,
-    by_effect,
+    by_effects,
     foremost,
     is_redundant_start,
     screen_additions,
@@ -74,13 +75,13 @@ class MoveEvaluation(SearchState):
             [found] = screen_additions([Addition(parent, left, most, flown, anew=is_root)], self.parallel)
             self._fit_from_output_error(parent)
             self.tried.free_runs.screened.add(key)
-            groups = by_effect(found)
+            groups = by_effects(found)
             later = self._evaluate_moves(groups) if forced else self._evaluate_foremost(key, groups)
             if only_validation_shows(parent, self.floor):
                 moves = moves_of_all_runs(parent, self._untried(parent), self.parallel)
-                self._evaluate_moves(by_effect(moves), every=True)
+                self._evaluate_moves(by_effects(moves), every=True)
             leading = {n for h in self._children(key)[:LEADING_CHILDREN] for n in h.names if n not in key}
-            self._evaluate_moves(by_effect([w for w in later if w.screened.effect.name in leading]), every=True)
+            self._evaluate_moves(by_effects([w for w in later if w.screened.effect.name in leading]), every=True)
             self._refine_children(key)
         return self._children(key)
 
@@ -161,22 +162,22 @@ class MoveEvaluation(SearchState):
         self.tried.update(zip(names, self.parallel.map(fit_all, names), strict=True))
 
     def _evaluate_moves(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
-        """Evaluate the moves of each effect; return those left out because an earlier start has reached their predicted cost.
+        """Evaluate the moves to each set of effects; return those left out: an earlier start has reached their predicted cost.
 
         `every` leaves none out. All moves of a parent are compared with the same rival, so that the result does not depend on
         their order. What cannot come near a model is not kept, where one is given.
         """
-        parents = {frozenset(group[0].parent.names) for group in groups}
+        parents = {frozenset(move.parent.names) for group in groups for move in group}
         rivals = {p: max((h.log_likelihood for h in self._children(p)), default=-np.inf) for p in parents}
 
         def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[FittedProblem], list[int]]:
-            key, rival = group[0].names, rivals[frozenset(group[0].parent.names)]
+            key = group[0].names
             found = {key: self.tried[key]} if key in self.tried else {}
             free, later = list(self.tried.free_runs.fits.get(key, ())), list[int]()
             fits = [h.likelihood_fit for h in found.values()]
             for i, move in enumerate(group):
                 if every or not fits or not is_redundant_start(move, max(fits, key=lambda f: f.log_likelihood)):
-                    start, flown = self._start_of(move)
+                    (start, flown), rival = self._start_of(move), rivals[frozenset(move.parent.names)]
                     free += flown
                     fits.append(self._fit_child(move.parent, move.screened.problem, start, move.screened.effect, rival))
                     if move.asked.near is None or self._may_come_near(move.asked.near, fits[-1]):
@@ -189,8 +190,7 @@ class MoveEvaluation(SearchState):
         for group, (found, free, later) in zip(groups, self.parallel.map(evaluate_all, groups), strict=True):
             key = group[0].names
             self.tried.free_runs.fits[key] = free
-            # two parents may lead to the same effects
-            if found is not None and (key not in self.tried or found.log_evidence >= self.tried[key].log_evidence):
+            if found is not None:
                 self.tried[key] = found
             left += [group[i] for i in later]
         return left
@@ -202,7 +202,7 @@ class MoveEvaluation(SearchState):
     def _try_added(self, asked: Sequence[Addition]) -> None:
         """Fit each model with each of its effects that passes the screen: see `screen_additions` and `_evaluate_moves`."""
         moves = screen_additions([addition for addition in asked if addition.effects], self.parallel)
-        self._evaluate_moves([group for of_one in moves for group in by_effect(of_one)])
+        self._evaluate_moves(by_effects(chain.from_iterable(moves)))
 
     def _at(self, best: ScoredModel, others: Sequence[Effect], effects: Sequence[Effect]) -> Addition:
         """Return the addition of each of some effects to others at the parameters of the best model."""

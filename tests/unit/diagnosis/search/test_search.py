@@ -17,7 +17,7 @@ from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.search import move_evaluation, search, search_state
 from fieldsid.diagnosis.search.add_effect import (
     Addition,
-    by_effect,
+    by_effects,
     foremost,
     likelihood_linearisation,
     may_gain,
@@ -445,7 +445,7 @@ def test_what_promises_less_is_fitted_where_the_first_leave_a_visible_error_or_a
     made = search_for("servo_lag", "delay", "gyro_bias")
     base = made.base()
     [found] = screen_additions([Addition(base, made.catalogue)], made.parallel)
-    groups = by_effect(found)
+    groups = by_effects(found)
     monkeypatch.setattr(move_evaluation, "FOREMOST_EFFECTS", 1)
     monkeypatch.setattr(move_evaluation, "worst_error", lambda *_: left)
     made._evaluate_foremost(made.root, groups)
@@ -462,13 +462,13 @@ def test_the_foremost_are_those_that_come_first_on_either_screen():
         replace(move, by_output_error=True, screened=replace(move.screened, predicted_cost=1.0 - 0.1 * i))
         for i, move in enumerate(whitened)
     ]
-    groups = by_effect([*whitened, *flown])
-    last, first = flown[-1].screened.effect.name, foremost(by_effect(whitened), 1)[0][0].screened.effect.name
+    groups = by_effects([*whitened, *flown])
+    last, first = flown[-1].screened.effect.name, foremost(by_effects(whitened), 1)[0][0].screened.effect.name
     assert {group[0].screened.effect.name for group in foremost(groups, 1)} == {first, last}
     assert foremost(groups, 5) == groups
 
 
-def test_additions_to_several_models_are_screened_and_fitted_at_once_and_the_better_of_two_ways_to_a_set_is_kept():
+def test_additions_to_several_models_are_screened_and_fitted_at_once_and_two_ways_to_a_set_are_one():
     made, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
     effects = {e.name: e for e in made.catalogue}
     apart = [Addition(lag, [effects["gyro_bias"]]), Addition(bias, [effects["servo_lag"]])]
