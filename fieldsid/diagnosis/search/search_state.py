@@ -139,9 +139,9 @@ class SearchState:
             self.resolution_floor = resolution_floor(self.floor, fitted.weights)
             ml_fit = fit_base(fitted, self.floor, self.resolution_floor, self.noise_kind, self.parallel)
             self.tried.assumptions = Assumptions(ml_fit.noise_kind, fitted.problem.layout.groups.trim_of_fin)
-            h = self._keep(
-                ml_fit
-            ).evaluate_errors()  # here, as both ways ask for them: one process would count them once, two twice
+            h = self._keep(ml_fit).evaluate_errors()
+            # both ways ask for its errors: two processes would compute and count them twice
+            _ = h.unseen_errors
             ways: tuple[Callable[[], Any], ...] = (partial(prefer_output_error, h, self.floor), partial(self._under_other_law, h))
             own, other = self.parallel.map(lambda way: way(), ways)
             self.tried[self.root] = own if other is None or not keeps_error(own, other) else other
