@@ -142,9 +142,10 @@ def separate(
 ) -> Separation:
     """Return the maneuver inside the envelope that discriminates rival models best, at the best of the speeds (m/s).
 
-    `fast`: at most 10 Hz, the maneuvers that the rivals' effects declare to be excited by, no tuning; the first that decides
-    clearly is taken. `candidates`: what to choose among, in place of the catalogue. `mapped` evaluates several at once. Raises
-    UsageError for fewer than two rivals, rivals of different axes, or when no maneuver stays inside the envelope.
+    `fast`: at most 10 Hz, the maneuvers that the rivals' effects declare to be excited by, no tuning, and none beyond those
+    evaluated at once with the first that decides clearly. `candidates`: what to choose among, in place of the catalogue. `mapped`
+    evaluates several at once. Raises UsageError for fewer than two rivals, rivals of different axes, or when no maneuver stays
+    inside the envelope.
     """
     _check(models)
     if set(models[0].effects) == set(models[1].effects) and len(models) == 2:
