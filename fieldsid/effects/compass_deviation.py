@@ -17,20 +17,29 @@ from fieldsid.numerics.arrays import FloatArray
 
 def measure(motion: Motion, values: Values, record: Record) -> Motion:
     """Return the motion as the compass shows it; angle (n,) rad, rate as it is."""
-    psi = motion.angle
-    shown = psi + values["deviation_sin"] * np.sin(psi) + values["deviation_cos"] * np.cos(psi)
+    sin, cos = np.sin(motion.angle), np.cos(motion.angle)
+    shown = motion.angle + values["deviation_sin"] * sin + values["deviation_cos"] * cos
     if "deviation_sin2" in values:
-        shown = shown + values["deviation_sin2"] * np.sin(2.0 * psi) + values["deviation_cos2"] * np.cos(2.0 * psi)
+        shown += 2.0 * values["deviation_sin2"] * sin * cos + values["deviation_cos2"] * (cos - sin) * (cos + sin)
     return Motion(shown, motion.rate)
 
 
 def sensor_jvp(moves: FloatArray, motion: Motion, values: Values, record: Record) -> FloatArray:
     """Return small moves of the motion (P, 2, n) as the compass shows them."""
-    psi = motion.angle
-    slope = 1.0 + values["deviation_sin"] * np.cos(psi) - values["deviation_cos"] * np.sin(psi)
+    sin, cos = np.sin(motion.angle), np.cos(motion.angle)
+    slope = 1.0 + values["deviation_sin"] * cos - values["deviation_cos"] * sin
     if "deviation_sin2" in values:
-        slope += 2.0 * (values["deviation_sin2"] * np.cos(2.0 * psi) - values["deviation_cos2"] * np.sin(2.0 * psi))
-    return np.asarray(moves * np.stack([slope, np.ones_like(slope)]))
+        slope += 2.0 * values["deviation_sin2"] * (cos - sin) * (cos + sin) - 4.0 * values["deviation_cos2"] * sin * cos
+    carried = moves.copy()
+    carried[:, 0] *= slope
+    return carried
+
+
+def sensor_slope(name: str, motion: Motion, values: Values, record: Record) -> FloatArray:
+    """Return the derivative (2, n) of what the compass shows by a coefficient."""
+    slope, times = np.zeros((2, motion.angle.size)), 2.0 if name.endswith("2") else 1.0
+    (np.sin if name.startswith("deviation_sin") else np.cos)(times * motion.angle, out=slope[0])
+    return slope
 
 
 EFFECT = Effect(
@@ -49,6 +58,7 @@ EFFECT = Effect(
     source="Groves 2013, chapter 6",
     measure=measure,
     sensor_jvp=sensor_jvp,
+    sensor_slope=sensor_slope,
     variants=(
         Variant(
             "it goes twice around with the heading as well",

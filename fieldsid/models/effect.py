@@ -214,8 +214,9 @@ class Effect:
     core(values, scale) -> Core                             hydrodynamics inside the core; scale = speed / reference
     moment(motion, values, record) -> (n,) rad/s^2          hydrodynamics evaluated along the last trajectory
     measure(motion, values, record) -> Motion               sensor
-    carry(moves, motion, values, record) -> (P, 2, n)       sensor, optional: the derivative of measure, applied to P small
+    sensor_jvp(moves, motion, values, record) -> (P, 2, n)  sensor, optional: the derivative of measure, applied to P small
                                                             moves (P, 2, n) of the motion; without it differences are taken
+    sensor_slope(name, motion, values, record) -> (2, n)    sensor, optional: that by one of the coefficients
     `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
     suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
     the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
@@ -248,6 +249,7 @@ class Effect:
     moment: MomentHook | None = None
     measure: Callable[[Motion, Values, Record], Motion] | None = None
     sensor_jvp: Callable[[FloatArray, Motion, Values, Record], FloatArray] | None = None
+    sensor_slope: Callable[[str, Motion, Values, Record], FloatArray] | None = None
     initial_guesses: InitialGuesses | None = None
     equivalent_solution: Callable[[Values, Axis], dict[str, float] | None] | None = None
     variants: tuple[Variant, ...] = ()

@@ -20,7 +20,7 @@ EFFECTS = all_effects()
 HOOKS = {
     Stage.ACTUATOR: {"fin"},
     Stage.HYDRODYNAMICS: {"terms", "slope", "core", "moment"},
-    Stage.SENSOR: {"measure", "sensor_jvp"},
+    Stage.SENSOR: {"measure", "sensor_jvp", "sensor_slope"},
 }
 MANEUVERS = set(all_maneuvers())
 ROLES = {"surge", "thrust", "roll", "depth", "cross"}
@@ -89,7 +89,7 @@ def untouched(name: str, log: Record) -> np.ndarray | float:
 
 @each_effect
 def test_exactly_the_hooks_of_its_stage_are_given(effect):
-    given = {n for n in ("fin", "terms", "slope", "core", "moment", "measure", "sensor_jvp") if getattr(effect, n) is not None}
+    given = {hook for hooks in HOOKS.values() for hook in hooks if getattr(effect, hook) is not None}
     assert given
     assert given <= HOOKS[effect.stage]
 
@@ -245,6 +245,16 @@ def test_moves_carried_through_a_sensor_are_the_slopes_of_what_it_shows(effect):
         ends = [effect.measure(Motion(motion.angle + s * move[0], motion.rate + s * move[1]), values, log) for s in (1e-5, -1e-5)]
         slope = np.stack([ends[0].angle - ends[1].angle, ends[0].rate - ends[1].rate]) / 2e-5
         np.testing.assert_allclose(carried, slope, atol=1e-6)
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS.values() if e.sensor_slope], ids=lambda e: e.name)
+def test_the_slope_by_a_sensors_coefficient_is_that_of_what_it_shows(effect):
+    log = record(effect.axes[0])
+    motion, values = motion_of(log), {c.name: c.start + 0.1 * (c.high - c.start) for c in effect.every}
+    for name in effect.names:
+        ends = [effect.measure(motion, values | {name: values[name] + s}, log) for s in (1e-5, -1e-5)]
+        slope = np.stack([ends[0].angle - ends[1].angle, ends[0].rate - ends[1].rate]) / 2e-5
+        np.testing.assert_allclose(effect.sensor_slope(name, motion, values, log), slope, atol=1e-9)
 
 
 def test_a_fin_path_has_its_mean_between_its_ends():

@@ -317,41 +317,42 @@ class Sensitivities:
         return self.others[owner.name]
 
     def through_sensors(self, motion: Motion, slots: tuple[int, ...], sens: FloatArray) -> Motion:
-        """Return what the sensors show, and carry the sensitivities (P, 2, n) through them in place."""
-        sensors = [e for e in self.layout.effects if e.measure is not None]
-        if not sensors:
-            return motion
-        shown = measured(motion, self.record, sensors, self.values)
-        sens[:] = self._sensor_jvp(motion, shown, sensors, sens)
-        own = {c.name: c for e in sensors for c in e.coefficients}
-        for j, slot in enumerate(slots):
-            name = self.layout.parameters[slot].name
-            if name in own:
-                step = own[name].step
-                ends = (self.values | {name: self.values[name] + s} for s in (step, -step))
-                plus, minus = (measured(motion, self.record, sensors, values) for values in ends)
-                sens[j] = _difference_quotient(plus, minus, 2.0 * step)
-        return shown
+        """Return what the sensors show, and carry the sensitivities (P, 2, n) through one after another of them in place."""
+        for effect in self.layout.effects:
+            if effect.measure is None:
+                continue
+            shown = effect.measure(motion, self.values, self.record)
+            sens[:] = self._sensor_jvp(effect, motion, shown, sens)
+            own = {c.name: c.step for c in effect.coefficients}
+            for j, slot in enumerate(slots):
+                if (name := self.layout.every[slot]) in own:
+                    sens[j] = self._sensor_slope(effect, motion, name, own[name])
+            motion = shown
+        return motion
 
-    def _sensor_jvp(self, motion: Motion, shown: Motion, sensors: Sequence[Effect], sens: FloatArray) -> FloatArray:
-        """Return the product of the sensors' Jacobian with the sensitivities, by differences where an effect has no derivative.
+    def _sensor_jvp(self, effect: Effect, motion: Motion, shown: Motion, sens: FloatArray) -> FloatArray:
+        """Return the product of a sensor's Jacobian with sensitivities, by differences where the effect has no derivative.
 
         A step of 1e-6 rad is so small against the scale of any sensor's law that a one-sided difference is exact to 1e-6.
         """
+        if effect.sensor_jvp is not None:
+            return effect.sensor_jvp(sens, motion, self.values, self.record)
         out = sens.copy()
-        if all(e.sensor_jvp is not None for e in sensors):
-            for before, effect in zip(([], *([e] for e in sensors)), sensors, strict=False):
-                motion = measured(motion, self.record, before, self.values)
-                if effect.sensor_jvp is not None:
-                    out = effect.sensor_jvp(out, motion, self.values, self.record)
-            return out
         for j, direction in enumerate(sens):
             size = float(np.max(np.abs(direction)))
             step = 1e-6 / size if size > 0 else 1.0
             out[j] = _difference_quotient(
-                measured(_moved(motion, direction, step), self.record, sensors, self.values), shown, step
+                measured(_moved(motion, direction, step), self.record, [effect], self.values), shown, step
             )
         return out
+
+    def _sensor_slope(self, effect: Effect, motion: Motion, name: str, step: float) -> FloatArray:
+        """Return the derivative (2, n) of what a sensor shows by one of its coefficients, by differences where it has none."""
+        if effect.sensor_slope is not None:
+            return effect.sensor_slope(name, motion, self.values, self.record)
+        ends = (self.values | {name: self.values[name] + s} for s in (step, -step))
+        plus, minus = (measured(motion, self.record, [effect], values) for values in ends)
+        return _difference_quotient(plus, minus, 2.0 * step)
 
 
 def _add_moment(changes: dict[int, FloatArray], moment: FloatArray) -> None:
