@@ -28,17 +28,22 @@ BRIEF = 1e-6
 
 def through(path: FinPath, steps: FloatArray, part: Part) -> FinPath:
     """Return a path seen through a part of the gear, which is given straight pieces of it with their lengths in s."""
+    lines = _table(steps.size)
     if path.first is None or path.last is None:
-        out = np.empty((steps.size, 4))
-        part(steps, path.start, path.end, out)
-        return FinPath(*np.ascontiguousarray(out.T))
-    pieces = np.empty((3 * steps.size, 4))
+        part(steps, path.start, path.end, lines)
+        return FinPath(*lines.T)
+    pieces = _table(3 * steps.size)
     count = split(steps, path.start, path.end, path.first, path.last, pieces)
-    lengths, start, end, _ = np.ascontiguousarray(pieces[:count].T)
-    out, joined = np.empty((count, 4)), np.empty((steps.size, 4))
-    part(lengths, start, end, out)
-    join(pieces[:count], out, joined)
-    return FinPath(*np.ascontiguousarray(joined.T))
+    length, start, end, _ = pieces[:count].T
+    out = _table(count)
+    part(length, start, end, out)
+    join(count, pieces, out, lines)
+    return FinPath(*lines.T)
+
+
+def _table(rows: int) -> FloatArray:
+    """Return room for a table (rows, 4), each of its columns in one piece: what reads one later need not copy it."""
+    return np.empty((rows, 4), order="F")
 
 
 @jit
@@ -87,9 +92,9 @@ def split(
 
 
 @jit
-def join(pieces: FloatArray, lines: FloatArray, out: FloatArray) -> None:
-    """Fill out (n-1, 4) with the line of each interval and where the fin begins and ends, from those of its pieces (k, 4)."""
-    k, count = 0, pieces.shape[0]
+def join(count: int, pieces: FloatArray, lines: FloatArray, out: FloatArray) -> None:
+    """Fill out (n-1, 4) with the line of each interval, and where the fin begins and ends, from those of the pieces (k, 4)."""
+    k = 0
     while k < count:
         i = int(pieces[k, 3])
         begins, length, area = k, 0.0, 0.0

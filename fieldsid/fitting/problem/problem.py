@@ -127,9 +127,9 @@ class Problem:
             [values["angle0"], values["rate0"], 0.0 if core is None or before is None else core.steady_cross_state(before)]
         )
 
-    def _arrays(self, base: Base, values: Values, run: int) -> KernelInputs:
+    def _arrays(self, record: Record, base: Base, values: Values, run: int) -> KernelInputs:
         """Return the kernel inputs of a run: those of the last call where nothing but the run's initial state has changed."""
-        key, record = (base, *(v for name, v in values.items() if name not in START_NAMES)), self._counted(run)
+        key = (base, *(v for name, v in values.items() if name not in START_NAMES))
         make = partial(assemble, record, self.layout.effects, base, values, self.scales(run)[0])
         return self.cache.get(run, key, make) if len(record) <= MAX_CACHED_SAMPLES else make()
 
@@ -139,7 +139,7 @@ class Problem:
         record, effects = self._counted(run), self.layout.effects
         values = self.values_of(x, run)
         base, start = self._base(values, run), self._start_of(values, run)
-        arrays = with_moments(record, self._arrays(base, values, run), effects, values, start)
+        arrays = with_moments(record, self._arrays(record, base, values, run), effects, values, start)
         out = integrate_record(record, arrays, start)
         return measured(Motion(out[:, 0], out[:, 1]), record, effects, values), base
 
@@ -177,7 +177,7 @@ class Problem:
         base, start = self._base(values, run), self._start_of(values, run)
         wanted = range(len(x)) if free is None else set(free)
         slots = tuple(i for i in (*self._shared_of(run), *layout.nuisances_of(run)) if i in wanted)
-        arrays = with_moments(record, self._arrays(base, values, run), layout.effects, values, start)
+        arrays = with_moments(record, self._arrays(record, base, values, run), layout.effects, values, start)
         return slots, Sensitivities(record, layout, self.scales(run), self.authority_of(run), base, values, start, arrays)
 
     def authority_of(self, run: int) -> str:

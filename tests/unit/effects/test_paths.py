@@ -21,7 +21,7 @@ def pieces_of(path: FinPath) -> np.ndarray:
 
 def joined(pieces: np.ndarray) -> np.ndarray:
     lines, out = np.column_stack([pieces[:, 1:3], pieces[:, 1:3]]), np.empty((1, 4))
-    join(pieces, lines, out)
+    join(len(pieces), pieces, lines, out)
     return out[0]
 
 
