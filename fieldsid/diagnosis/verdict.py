@@ -10,9 +10,10 @@ import numpy as np
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import (
     compared_errors,
+    error_left,
     excess_share,
-    fitted_errors,
     settles_error,
+    share_explained,
     validation_error_ratio,
     worst_error,
 )
@@ -61,14 +62,12 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
-    fitted = fitted_errors(search.base(), found)
-    error = max(now.over(floor), fitted[1].over(floor))
+    error, share = error_left(search.base(), found, floor), share_explained(search.base(), found, floor)
     if frozenset(found.names) == search.root:
         if worst_error(found, floor) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())
         return _unnamed(found, left, floor)
     visible = error > SUFFICIENT_ERROR_RATIO
-    share = excess_share([was, fitted[0]], [now, fitted[1]], floor)
     large = error > MISSING_ERROR_RATIO and not search.is_noiseless
     minor = large and share < MAIN_EXPLAINED_SHARE
     sums = search.evidences()

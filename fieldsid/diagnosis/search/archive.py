@@ -18,7 +18,7 @@ class Progress:
 
     The spec that stands for it; whether it was expanded; the log evidence at which variants of its effects were tried; the specs
     that were fitted without each of their effects, and those whose effects were exchanged; the log likelihood of the part that
-    its model was fitted again from. The lowest error over the floor after each expansion.
+    its model was fitted again from.
     """
 
     standing: dict[Names, ModelSpec] = field(default_factory=dict)
@@ -27,7 +27,6 @@ class Progress:
     thinned: set[ModelSpec] = field(default_factory=set)
     exchanged: set[ModelSpec] = field(default_factory=set)
     likelihood_of_part: dict[Names, float] = field(default_factory=dict)
-    lowest_errors: list[float] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -42,11 +41,13 @@ class FreeRuns:
 class Archive(MutableMapping[Names, ScoredModel]):
     """All scored models by spec. As a mapping: the model that stands for each set of effects under the present assumptions.
 
-    Only models of the same assumptions are compared; a search may come back to assumptions that it has left.
+    Only models of the same assumptions are compared; a search may come back to assumptions that it has left. `lowest_errors` are
+    those over the floor after each expansion, under whatever assumptions: the error of a free run depends on none.
     """
 
     models: dict[ModelSpec, ScoredModel] = field(default_factory=dict)
     assumptions: Assumptions | None = None
+    lowest_errors: list[float] = field(default_factory=list)
     _progress: dict[Assumptions | None, Progress] = field(default_factory=dict)
     _free_runs: dict[bool | None, FreeRuns] = field(default_factory=dict)
 

@@ -73,13 +73,15 @@ class Search(MoveEvaluation):
         """Expand the leading models, best first, until each of them is expanded or predicts to within the sensors' noise."""
         self.base()
         while (leading := self._next_to_expand()) is not None:
+            began = self.budget.used
             self._join_children(self.forward_step(leading), leading)
             self._drop_each(self._most_evident())
             self._fit_from_parts()
             self.share_own_moments()
             self.update_noise_floor(self.best_admissible().likelihood_fit.fitted)
-            lowest = self.tried.progress.lowest_errors
+            lowest = self.tried.lowest_errors
             lowest.append(min([worst_error(self.best_admissible(), self.floor), *lowest[-1:]]))
+            self.budget.last_expansion = self.budget.used - began
             if self._switch_noise_or_trim():
                 self.base()
 
@@ -215,17 +217,17 @@ class Search(MoveEvaluation):
         if self.root not in self.tried.progress.expanded and (len(self.tried) == 1 or self.may_go_on()):
             return self.base()
         best = self._most_evident()
-        if self._is_expandable(best) and (self.may_go_on() or (self.may_follow_leading() and self._gets_lower())):
+        if self._is_expandable(best) and (self.may_go_on() or self._may_expand_leading()):
             return best
         return next((h for h in self._leading_models() if self._is_expandable(h)), None)
 
-    def _gets_lower(self) -> bool:
-        """Whether the last few expansions have lowered the error of the best accepted set, by what an addition must.
+    def _may_expand_leading(self) -> bool:
+        """Whether beyond the budget the leading model may grow: there is room, and the last few expansions lowered the error.
 
-        A model that goes on to gain evidence and leaves the error where it is takes up what is in no effect's form.
+        That of the best accepted set: a model that gains evidence and leaves it takes up what is in no effect's form.
         """
-        lowest = self.tried.progress.lowest_errors
-        return len(lowest) <= MAX_IDLE_EXPANSIONS or lowest[-1] < MAX_ERROR_RATIO * lowest[-1 - MAX_IDLE_EXPANSIONS]
+        lowest, room = self.tried.lowest_errors, self.may_follow_leading() and self.budget.remains_for_expansion
+        return room and (len(lowest) <= MAX_IDLE_EXPANSIONS or lowest[-1] < MAX_ERROR_RATIO * lowest[-1 - MAX_IDLE_EXPANSIONS])
 
     def _leading_models(self) -> list[ScoredModel]:
         """Return the leading models, none where the budget is used up.

@@ -11,12 +11,14 @@ import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
 from fieldsid.diagnosis.evidence.acceptance import (
+    error_left,
     excess_share,
     is_accepted,
     keeps_error,
     leaves_error,
     lowers_error,
     settles_error,
+    share_explained,
     worst_error,
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem, LikelihoodFit
@@ -161,12 +163,12 @@ class SearchState:
         return worst_error(self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def leaves_unexplained(self) -> bool:
-        """Whether the best accepted set leaves a visible error, or explains less of one than stands whatever is left."""
+        """Whether the best accepted set leaves an error as a verdict counts it, or explains less of one than a verdict asks."""
         base, best = self.base(), self.best_admissible()
-        if worst_error(best, self.floor) > SUFFICIENT_ERROR_RATIO:
+        if error_left(base, best, self.floor) > SUFFICIENT_ERROR_RATIO:
             return True
         is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
-        return is_visible and self.explained_share(base, best) < MIN_EXPLAINED_SHARE
+        return is_visible and share_explained(base, best, self.floor) < MIN_EXPLAINED_SHARE
 
     def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
         """Return the share of what a model leaves above the noise, on fitted and on unseen runs, that another explains."""

@@ -10,6 +10,7 @@ import pytest
 
 from fieldsid.diagnosis.evidence.acceptance import (
     compared_errors,
+    error_left,
     gains_evidence,
     is_accepted,
     keeps_error,
@@ -17,6 +18,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
     lowers_error,
     only_validation_shows,
     settles_error,
+    share_explained,
 )
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
@@ -129,6 +131,24 @@ def test_both_models_are_compared_with_the_moments_of_the_runs_own_that_the_more
     assert now.angle_rms_rad == pytest.approx(FLOOR.angle / 1.1)
     assert is_accepted(lacks, found)
     assert not is_accepted(found, lacks)
+
+
+@pytest.mark.parametrize(
+    ("over", "settled", "train", "left"),
+    [
+        (1.1, 1.8, 1.0, 1.8),  # follows unseen runs at the fitted runs' numbers, not at those that all leave
+        (1.1, 1.0, 1.0, 1.0),
+        (1.1, 1.1, 1.3, 1.3),
+    ],
+)
+def test_the_error_left_is_the_one_that_an_addition_is_compared_by(over, settled, train, left):
+    base = hypothesis(over=1.2, settled=3.0, train=2.0)
+    found = hypothesis("servo_lag", gain=50.0, over=over, settled=settled, train=train)
+    assert error_left(base, found, FLOOR) == pytest.approx(left)
+    was, now = compared_errors(base, found, FLOOR)
+    assert now.over(FLOOR) <= error_left(base, found, FLOOR)
+    excess = [unseen.over(FLOOR) ** 2 + h.train.over(FLOOR) ** 2 - 2.0 for unseen, h in ((was, base), (now, found))]
+    assert share_explained(base, found, FLOOR) == pytest.approx(1.0 - excess[1] / excess[0])
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,22 @@ def test_what_leads_is_not_followed_for_ever(monkeypatch):
     assert not made.may_go_on(leading=True)
 
 
+def test_no_expansion_begins_there_that_would_not_end_there():
+    allowance = Budget(2, where_unexplained=30.0, in_all=280.0)
+    allowance.evaluations.add(2 * 200)
+    assert allowance.remains_for_expansion
+    allowance.last_expansion = 79.0
+    assert allowance.remains_for_expansion
+    allowance.last_expansion = 80.0
+    assert not allowance.remains_for_expansion
+    assert allowance.remains_for_leading
+
+
+def test_a_search_remembers_what_its_last_expansion_took():
+    made = a_search(thorough=False)
+    assert 0.0 < made.budget.last_expansion < made.budget.used
+
+
 def test_long_runs_are_followed_for_as_long_as_usual_ones_and_at_least_as_what_is_unexplained():
     usual, long = (Budget(2, samples, where_unexplained=30.0, in_all=280.0) for samples in (1000, 3800))
     assert usual.most_for_leading == 280.0
@@ -138,8 +154,26 @@ def test_beyond_the_allowance_the_leading_model_grows_only_while_the_error_falls
     leading = made._most_evident()
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: True)
     monkeypatch.setattr(Search, "_is_expandable", lambda _self, h: h is leading)
-    made.tried.progress.lowest_errors[:] = lowest
+    made.tried.lowest_errors[:] = lowest
     assert made._next_to_expand() is (leading if goes_on else None)
+
+
+def test_a_search_that_begins_again_under_another_noise_goes_on_counting_what_lowered_no_error():
+    made = a_search(thorough=False)
+    before = list(made.tried.lowest_errors)
+    assert before
+    made.tried.assumptions = replace(made.tried.assumptions, noise_kind="another")
+    assert not made.tried.progress.expanded
+    assert made.tried.lowest_errors == before
+
+
+@pytest.mark.parametrize(("left", "share", "goes_on"), [(1.2, 1.0, True), (1.1, 0.65, True), (1.1, 0.75, False)])
+def test_the_longer_allowance_goes_by_the_error_that_the_verdict_counts(monkeypatch, left, share, goes_on):
+    made = a_search(thorough=False)
+    made.budget.most = 0.0
+    monkeypatch.setattr(search_state, "error_left", lambda *_of: left)
+    monkeypatch.setattr(search_state, "share_explained", lambda *_of: share)
+    assert made.may_go_on() == goes_on
 
 
 @pytest.mark.parametrize("thorough", [False, True])
