@@ -47,53 +47,71 @@ class StaticMap:
 
 
 @inner
-def corner(x: float, blend: float) -> float:
-    """Return max(x, 0), its corner rounded over about `blend` to either side."""
-    return max(x, 0.0) if blend == 0.0 else 0.5 * (x + math.hypot(x, blend))
-
-
-@inner
-def corner_area(x: float, blend: float) -> float:
-    """Return an antiderivative of `corner`."""
+def corner(x: float, blend: float) -> tuple[float, float]:
+    """Return max(x, 0), its corner rounded over about `blend` to either side, and an antiderivative of it."""
     if blend == 0.0:
-        return 0.5 * x * max(x, 0.0)
-    return 0.25 * (x * x + x * math.hypot(x, blend) + blend * blend * math.asinh(x / blend))
+        return max(x, 0.0), 0.5 * x * max(x, 0.0)
+    root = math.hypot(x, blend)
+    return 0.5 * (x + root), 0.25 * (x * x + x * root + blend * blend * math.asinh(x / blend))
 
 
 @inner
-def value(d: float, numbers: Numbers) -> float:
-    """Return the angle that the map makes of one, rad."""
+def value(d: float, numbers: Numbers, rest: float) -> float:
+    """Return the angle that the map makes of one, rad; `rest` is the corner's value at an angle of zero."""
     proportional, beyond, edge, blend, jump, one_sided, square = numbers
     size, side = abs(d), 0.0 if d == 0.0 else math.copysign(1.0, d)
-    far = beyond * (corner(size - edge, blend) - corner(-edge, blend)) + (jump if size > edge else 0.0)
+    reach = size - edge
+    bent = max(reach, 0.0) if blend == 0.0 else 0.5 * (reach + math.hypot(reach, blend))
+    far = beyond * (bent - rest) + (jump if size > edge else 0.0)
     return proportional * d + side * far + one_sided * size + square * d * d
 
 
 @inner
-def area(d: float, numbers: Numbers) -> float:
-    """Return the integral of the map from zero, rad^2."""
+def value_and_area(d: float, numbers: Numbers, rest: float, rest_area: float) -> tuple[float, float]:
+    """Return the same, and the integral of the map from zero, rad^2; `rest_area` is that of the corner at an angle of zero."""
     proportional, beyond, edge, blend, jump, one_sided, square = numbers
-    size = abs(d)
-    far = corner_area(size - edge, blend) - corner_area(-edge, blend) - corner(-edge, blend) * size
+    size, side = abs(d), 0.0 if d == 0.0 else math.copysign(1.0, d)
+    bent, bent_area = corner(size - edge, blend)
+    far = beyond * (bent - rest) + (jump if size > edge else 0.0)
+    far_area = bent_area - rest_area - rest * size
     whole = 0.5 * d * (proportional * d + one_sided * size) + square * d * d * d / 3.0
-    return whole + beyond * far + jump * max(size - edge, 0.0)
+    return (
+        proportional * d + side * far + one_sided * size + square * d * d,
+        whole + beyond * far_area + jump * max(size - edge, 0.0),
+    )
 
 
 @jit
 def fill_values(angles: FloatArray, numbers: Numbers, out: FloatArray) -> None:
     """Fill out (n,) with what the map makes of angles (n,) rad."""
+    rest, _ = corner(-numbers[2], numbers[3])
     for i in range(angles.shape[0]):
-        out[i] = value(angles[i], numbers)
+        out[i] = value(angles[i], numbers, rest)
 
 
 @jit
 def fill_lines(start: FloatArray, end: FloatArray, numbers: Numbers, out: FloatArray) -> None:
-    """Fill out (n, 4) with the line's start and end, and where the fin begins and ends, of straight pieces (n,) rad."""
+    """Fill out (n, 4) with the line's start and end, and where the fin begins and ends, of straight pieces (n,) rad.
+
+    A piece mostly begins where the one before ends, and a held one has one value: the square root and the logarithm of each
+    angle are worked out once.
+    """
+    rest, rest_area = corner(-numbers[2], numbers[3])
+    last_angle, last, last_area = math.nan, 0.0, 0.0
     for i in range(start.shape[0]):
-        first, last, change = value(start[i], numbers), value(end[i], numbers), end[i] - start[i]
+        change = end[i] - start[i]
         if abs(change) > STRAIGHT_RAD:
-            mean = (area(end[i], numbers) - area(start[i], numbers)) / change
+            if start[i] != last_angle:
+                last, last_area = value_and_area(start[i], numbers, rest, rest_area)
+            first, first_area = last, last_area
+            last_angle = end[i]
+            last, last_area = value_and_area(last_angle, numbers, rest, rest_area)
+            mean, half = (last_area - first_area) / change, 0.5 * (last - first)
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, last
+        elif change == 0.0:
+            held = last if start[i] == last_angle else value(start[i], numbers, rest)
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = held, held, held, held
         else:
-            mean = value(0.5 * (start[i] + end[i]), numbers)
-        half = 0.5 * (last - first)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, last
+            first, bent = value(start[i], numbers, rest), value(end[i], numbers, rest)
+            mean, half = value(0.5 * (start[i] + end[i]), numbers, rest), 0.5 * (bent - first)
+            out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, bent

@@ -58,3 +58,18 @@ def test_the_compiled_kernels_are_their_plain_python(kernel):
     kernel(*ends, numbers, fast)
     plain_of(kernel)(*ends, numbers, slow)
     np.testing.assert_allclose(fast, slow, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("of", MAPS)
+def test_a_path_has_the_lines_of_its_pieces_one_at_a_time(of):
+    rng = np.random.default_rng(5)
+    moves = np.where(rng.random(80) < 0.4, 0.0, 0.1 * rng.standard_normal(80)) * np.where(rng.random(80) < 0.2, 1e-6, 1.0)
+    knots = np.concatenate([[0.0], np.cumsum(moves)])
+    start, end = knots[:-1].copy(), knots[1:].copy()
+    start[40:] += 0.05  # a jump: the next piece does not begin where the last one ended
+    numbers = (of.proportional, of.beyond, of.edge, of.blend, of.jump, of.one_sided, of.square)
+    whole, alone = np.empty((80, 4)), np.empty((80, 4))
+    fill_lines(start, end, numbers, whole)
+    for i in range(80):
+        fill_lines(start[i : i + 1], end[i : i + 1], numbers, alone[i : i + 1])
+    np.testing.assert_array_equal(whole, alone)
