@@ -1,4 +1,4 @@
-"""Moves of a search: each adds one effect to a model, is fitted from its start, and is scored."""
+"""Moves of a search: each adds one effect to a model, or drops one, is fitted from its start, and is scored."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ from fieldsid.diagnosis.thresholds import (
     SUFFICIENT_ERROR_RATIO,
 )
 from fieldsid.fitting.initial.effect_screen import carry_parameters
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.effect import Effect
 from fieldsid.numerics.arrays import FloatArray
@@ -62,7 +63,7 @@ from fieldsid.numerics.arrays import FloatArray
 
 @dataclass(slots=True)
 class MoveEvaluation(SearchState):
-    """A search that can add one effect to a model and score what comes of it."""
+    """A search that can add one effect to a model, or drop one, and score what comes of it."""
 
     def forward_step(self, parent: ScoredModel, *, forced: bool = False) -> list[ScoredModel]:
         """Return the parent with each effect that passes the screens, or with each when forced, fitted and scored, best first."""
@@ -258,6 +259,23 @@ class MoveEvaluation(SearchState):
             p, start, parent.likelihood_fit.noise, self.resolution_floor, self.noise_kind, rival=rival
         )
         return prefer_smaller_equivalent(ml_fit, effect)
+
+    def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
+        """Return a model without one of its effects, fitted from the parameters it has with it, the base's where they diverge."""
+        fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
+        problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
+        starts = [carry_parameters(problem.layout, fitted.vector)]
+        if not np.isfinite(cost_of(problem, starts[0], noise)):
+            # a hull that its sway alone holds straight runs away without it, and no descent begins there
+            starts = [carry_parameters(problem.layout, self.base().likelihood_fit.fitted.vector, fitted.vector)]
+        before = self.tried.get(frozenset(e.name for e in problem.layout.effects))
+        if before is not None and any(e not in before.effects for e in problem.layout.effects):
+            # in its variants the others' numbers may be far from those without it
+            starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
+        found = {} if before is None else {frozenset(before.names): before}
+        for start in starts:
+            kept = self._keep(fit_maximum_likelihood(problem, start, noise, self.resolution_floor, self.noise_kind), found)
+        return kept if kept is before else prefer_output_error(kept, self.floor)
 
     def _takes_refit(self, key: frozenset[str], again: LikelihoodFit) -> bool:
         """Keep a model fitted again from its best child's parameters where that has more evidence; return whether it has.

@@ -161,6 +161,17 @@ class Search(MoveEvaluation):
             self._drop_each(self._most_evident())
             self.share_own_moments()
             self._expand()
+            if self._is_twin(leading := self._most_evident(), best):
+                exchanged.add(ModelSpec.of(leading))
+
+    def _is_twin(self, h: ScoredModel, other: ScoredModel) -> bool:
+        """Whether a model has one effect in place of one that it may be mistaken for, and is a rival of the model with that.
+
+        What its other effects may be mistaken for was tried beside the one: beside the other it gains as much.
+        """
+        new, gone = ([e for e in a.effects if e.name not in b.names] for a, b in ((h, other), (other, h)))
+        alike = len(new) == len(gone) == 1 and new[0].name in gone[0].mistaken_for
+        return alike and h.log_evidence - other.log_evidence < RIVAL_LOG_ODDS
 
     def _exchange_for_variants(self, best: ScoredModel) -> None:
         """Try a model without each effect, the others of the same stage in their other variants.
@@ -368,23 +379,6 @@ class Search(MoveEvaluation):
         """Let what lacks one of the found effects count under the other trim law: what that explains is no evidence for it."""
         lawful = self.trim_laws.without_an_effect(self.best_admissible(), self.tried)
         self.tried.update({frozenset(h.names): prefer_output_error(h, self.floor) for h in lawful})
-
-    def _drop_effect(self, h: ScoredModel, gone: Effect) -> ScoredModel:
-        """Return a model without one of its effects, fitted from the parameters it has with it, the base's where they diverge."""
-        fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
-        problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
-        starts = [carry_parameters(problem.layout, fitted.vector)]
-        if not np.isfinite(cost_of(problem, starts[0], noise)):
-            # a hull that its sway alone holds straight runs away without it, and no descent begins there
-            starts = [carry_parameters(problem.layout, self.base().likelihood_fit.fitted.vector, fitted.vector)]
-        before = self.tried.get(frozenset(e.name for e in problem.layout.effects))
-        if before is not None and any(e not in before.effects for e in problem.layout.effects):
-            # in its variants the others' numbers may be far from those without it
-            starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
-        found = {} if before is None else {frozenset(before.names): before}
-        for start in starts:
-            kept = self._keep(fit_maximum_likelihood(problem, start, noise, self.resolution_floor, self.noise_kind), found)
-        return kept if kept is before else prefer_output_error(kept, self.floor)
 
 
 def _better_optimum(known: ScoredModel, h: ScoredModel) -> ScoredModel:

@@ -163,9 +163,9 @@ class SearchState:
         return worst_error(self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def leaves_unexplained(self) -> bool:
-        """Whether the best accepted set leaves an error as a verdict counts it, or explains less of one than a verdict asks."""
+        """Whether the best accepted set leaves a visible error, or a verdict would count one, or less explained than it asks."""
         base, best = self.base(), self.best_admissible()
-        if error_left(base, best, self.floor) > SUFFICIENT_ERROR_RATIO:
+        if self.leaves_visible_error() or error_left(base, best, self.floor) > SUFFICIENT_ERROR_RATIO:
             return True
         is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
         return is_visible and share_explained(base, best, self.floor) < MIN_EXPLAINED_SHARE

@@ -120,6 +120,20 @@ def test_what_comes_to_lead_by_an_exchange_is_exchanged_in_its_turn_whatever_was
     assert asked == [("delay",), ("servo_lag",)]
 
 
+@pytest.mark.parametrize(("new", "ahead", "asked"), [("servo_lag", 2.9, 1), ("servo_lag", 3.1, 2), ("gyro_bias", 2.9, 2)])
+def test_a_rival_with_one_effect_for_another_that_it_is_mistaken_for_needs_no_exchange_of_its_own(monkeypatch, new, ahead, asked):
+    made, _, (first, second) = with_children("delay", new)
+    per_run = (first.log_evidence + ahead - second.log_evidence) / len(second.validation_log_density)
+    leaders = first, replace(second, validation_log_density=second.validation_log_density + per_run)
+    exchanged = []
+    monkeypatch.setattr(Search, "_most_evident", lambda _self: leaders[min(len(exchanged), 1)])
+    monkeypatch.setattr(Search, "_exchange_for_lookalikes", lambda _self, h: exchanged.append(h.names))
+    for name in ("_exchange_for_variants", "_drop_each", "share_own_moments", "_expand"):
+        monkeypatch.setattr(Search, name, lambda *_: None)
+    made._exchange_leaders()
+    assert exchanged == [h.names for h in leaders[:asked]]
+
+
 def test_what_comes_to_lead_by_what_promised_most_is_exchanged_in_its_turn(monkeypatch):
     made, _, (lag, bias) = with_children("servo_lag", "gyro_bias")
     exchanged, found = [], [lag]
