@@ -152,7 +152,7 @@ class SearchState:
 
     def may_go_on(self, *, leading: bool = False) -> bool:
         """Whether evaluations are left; with the model that leads the search goes on for longer while an error is visible."""
-        return (leading and self.may_follow_leading()) or self.budget.remaining(self.leaves_unexplained)
+        return (leading and self.may_follow_leading()) or self.budget.remaining(self._misses_something)
 
     def may_follow_leading(self) -> bool:
         """Whether an error is visible and the search may go on from the model that leads, if from no other."""
@@ -163,12 +163,16 @@ class SearchState:
         return worst_error(self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def leaves_unexplained(self) -> bool:
-        """Whether the best accepted set leaves a visible error, or a verdict would count one, or less explained than it asks."""
+        """Whether the best accepted set leaves a visible error, or explains less of one than stands whatever is left."""
         base, best = self.base(), self.best_admissible()
-        if self.leaves_visible_error() or error_left(base, best, self.floor) > SUFFICIENT_ERROR_RATIO:
-            return True
         is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
-        return is_visible and share_explained(base, best, self.floor) < MIN_EXPLAINED_SHARE
+        few = is_visible and share_explained(base, best, self.floor) < MIN_EXPLAINED_SHARE
+        return few or self.leaves_visible_error()
+
+    def _misses_something(self) -> bool:
+        """Whether the best accepted set leaves that, or an error that the verdict counts although those shown are small."""
+        left = error_left(self.base(), self.best_admissible(), self.floor)
+        return left > SUFFICIENT_ERROR_RATIO or self.leaves_unexplained()
 
     def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
         """Return the share of what a model leaves above the noise, on fitted and on unseen runs, that another explains."""

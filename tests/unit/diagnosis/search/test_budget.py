@@ -168,18 +168,23 @@ def test_a_search_that_begins_again_under_another_noise_goes_on_counting_what_lo
 
 
 @pytest.mark.parametrize(
-    ("visible", "left", "share", "goes_on"),
-    [(True, 1.1, 1.0, True), (False, 1.2, 1.0, True), (False, 1.1, 0.65, True), (False, 1.1, 0.75, False)],
+    ("visible", "left", "share", "goes_on", "says"),
+    [
+        (True, 1.1, 1.0, True, True),
+        (False, 1.2, 1.0, True, False),  # the table shows nothing that is left
+        (False, 1.1, 0.65, True, True),
+        (False, 1.1, 0.75, False, False),
+    ],
 )
 def test_the_longer_allowance_goes_by_the_error_that_is_shown_and_that_the_verdict_counts(
-    monkeypatch, visible, left, share, goes_on
+    monkeypatch, visible, left, share, goes_on, says
 ):
     made = a_search(thorough=False)
     made.budget.most = 0.0
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
     monkeypatch.setattr(search_state, "error_left", lambda *_of: left)
     monkeypatch.setattr(search_state, "share_explained", lambda *_of: share)
-    assert made.may_go_on() == goes_on
+    assert (made.may_go_on(), made.leaves_unexplained()) == (goes_on, says)
 
 
 @pytest.mark.parametrize("thorough", [False, True])
