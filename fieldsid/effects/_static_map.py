@@ -47,46 +47,58 @@ class StaticMap:
 
 
 @inner
-def corner(x: float, blend: float) -> tuple[float, float]:
-    """Return max(x, 0), its corner rounded over about `blend` to either side, and an antiderivative of it."""
-    if blend == 0.0:
-        return max(x, 0.0), 0.5 * x * max(x, 0.0)
-    root = math.hypot(x, blend)
-    return 0.5 * (x + root), 0.25 * (x * x + x * root + blend * blend * math.asinh(x / blend))
+def root_of(x: float, blend: float) -> float:
+    """Return the root in the corner max(x, 0) = (x + root) / 2, rounded over about `blend` to either side."""
+    return abs(x) if blend == 0.0 else math.hypot(x, blend)
 
 
 @inner
-def value(d: float, numbers: Numbers, rest: float) -> float:
-    """Return the angle that the map makes of one, rad; `rest` is the corner's value at an angle of zero."""
-    proportional, beyond, edge, blend, jump, one_sided, square = numbers
+def corner_area(x: float, root: float, blend: float) -> float:
+    """Return an antiderivative of the corner."""
+    rounded = 0.0 if blend == 0.0 else blend * blend * math.asinh(x / blend)
+    return 0.25 * (x * x + x * root + rounded)
+
+
+@inner
+def value(d: float, root: float, numbers: Numbers, rest: float) -> float:
+    """Return the angle that the map makes of one, rad, with the corner's root there; `rest` is the corner at an angle of zero."""
+    proportional, beyond, edge, _, jump, one_sided, square = numbers
     size, side = abs(d), 0.0 if d == 0.0 else math.copysign(1.0, d)
-    reach = size - edge
-    bent = max(reach, 0.0) if blend == 0.0 else 0.5 * (reach + math.hypot(reach, blend))
-    far = beyond * (bent - rest) + (jump if size > edge else 0.0)
+    far = beyond * (0.5 * (size - edge + root) - rest) + (jump if size > edge else 0.0)
     return proportional * d + side * far + one_sided * size + square * d * d
+
+
+@inner
+def value_at(d: float, numbers: Numbers, rest: float) -> float:
+    """Return the angle that the map makes of one, rad."""
+    return value(d, root_of(abs(d) - numbers[2], numbers[3]), numbers, rest)
 
 
 @inner
 def value_and_area(d: float, numbers: Numbers, rest: float, rest_area: float) -> tuple[float, float]:
     """Return the same, and the integral of the map from zero, rad^2; `rest_area` is that of the corner at an angle of zero."""
     proportional, beyond, edge, blend, jump, one_sided, square = numbers
-    size, side = abs(d), 0.0 if d == 0.0 else math.copysign(1.0, d)
-    bent, bent_area = corner(size - edge, blend)
-    far = beyond * (bent - rest) + (jump if size > edge else 0.0)
-    far_area = bent_area - rest_area - rest * size
+    size = abs(d)
+    root = root_of(size - edge, blend)
+    far = corner_area(size - edge, root, blend) - rest_area - rest * size
     whole = 0.5 * d * (proportional * d + one_sided * size) + square * d * d * d / 3.0
-    return (
-        proportional * d + side * far + one_sided * size + square * d * d,
-        whole + beyond * far_area + jump * max(size - edge, 0.0),
-    )
+    return value(d, root, numbers, rest), whole + beyond * far + jump * max(size - edge, 0.0)
+
+
+@inner
+def at_rest(numbers: Numbers) -> tuple[float, float]:
+    """Return the corner at an angle of zero, and its antiderivative."""
+    edge, blend = numbers[2], numbers[3]
+    root = root_of(-edge, blend)
+    return 0.5 * (root - edge), corner_area(-edge, root, blend)
 
 
 @jit
 def fill_values(angles: FloatArray, numbers: Numbers, out: FloatArray) -> None:
     """Fill out (n,) with what the map makes of angles (n,) rad."""
-    rest, _ = corner(-numbers[2], numbers[3])
+    rest, _ = at_rest(numbers)
     for i in range(angles.shape[0]):
-        out[i] = value(angles[i], numbers, rest)
+        out[i] = value_at(angles[i], numbers, rest)
 
 
 @jit
@@ -96,7 +108,7 @@ def fill_lines(start: FloatArray, end: FloatArray, numbers: Numbers, out: FloatA
     A piece mostly begins where the one before ends, and a held one has one value: the square root and the logarithm of each
     angle are worked out once.
     """
-    rest, rest_area = corner(-numbers[2], numbers[3])
+    rest, rest_area = at_rest(numbers)
     last_angle, last, last_area = math.nan, 0.0, 0.0
     for i in range(start.shape[0]):
         change = end[i] - start[i]
@@ -109,9 +121,9 @@ def fill_lines(start: FloatArray, end: FloatArray, numbers: Numbers, out: FloatA
             mean, half = (last_area - first_area) / change, 0.5 * (last - first)
             out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, last
         elif change == 0.0:
-            held = last if start[i] == last_angle else value(start[i], numbers, rest)
+            held = last if start[i] == last_angle else value_at(start[i], numbers, rest)
             out[i, 0], out[i, 1], out[i, 2], out[i, 3] = held, held, held, held
         else:
-            first, bent = value(start[i], numbers, rest), value(end[i], numbers, rest)
-            mean, half = value(0.5 * (start[i] + end[i]), numbers, rest), 0.5 * (bent - first)
+            first, bent = value_at(start[i], numbers, rest), value_at(end[i], numbers, rest)
+            mean, half = value_at(0.5 * (start[i] + end[i]), numbers, rest), 0.5 * (bent - first)
             out[i, 0], out[i, 1], out[i, 2], out[i, 3] = mean - half, mean + half, first, bent
