@@ -9,11 +9,11 @@ import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.acceptance import (
+    compared_error,
     compared_errors,
-    error_left,
+    compared_share,
     excess_share,
     settles_error,
-    share_explained,
     validation_error_ratio,
     worst_error,
 )
@@ -62,7 +62,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
-    error, share = error_left(search.base(), found, floor), share_explained(search.base(), found, floor)
+    error, share = compared_error(search.base(), found, floor), compared_share(search.base(), found, floor)
     if frozenset(found.names) == search.root:
         if worst_error(found, floor) <= SUFFICIENT_ERROR_RATIO:
             return Verdict("sufficient", ())

@@ -138,7 +138,7 @@ def worst_error(h: ScoredModel, floor: Noise) -> float:
     return max(h.selection_errors.over(floor), h.train.over(floor))
 
 
-def error_left(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
+def compared_error(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
     """Return the error over a noise floor that a model leaves on unseen or fitted runs, as it is compared with the base there.
 
     A model may follow the unseen runs from the fitted runs' parameters by chance, and not from those that all runs leave.
@@ -146,8 +146,8 @@ def error_left(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
     return max(compared_errors(base, h, floor)[1].over(floor), fitted_errors(base, h)[1].over(floor))
 
 
-def share_explained(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
-    """Return the share (0..1) of the base's excess squared error over a noise floor that a model explains, see `error_left`."""
+def compared_share(base: ScoredModel, h: ScoredModel, floor: Noise) -> float:
+    """Return the share (0..1) of the base's excess squared error over a noise floor that a model explains so."""
     pairs = compared_errors(base, h, floor), fitted_errors(base, h)
     return excess_share([was for was, _ in pairs], [left for _, left in pairs], floor)
 

@@ -205,9 +205,9 @@ class MoveEvaluation(SearchState):
         moves = screen_additions([addition for addition in asked if addition.effects], self.parallel)
         self._evaluate_moves(by_effects(chain.from_iterable(moves)))
 
-    def _at(self, best: ScoredModel, others: Sequence[Effect], effects: Sequence[Effect]) -> Addition:
-        """Return the addition of each of some effects to others at the parameters of the best model."""
-        return Addition(self._moved(best, others) if effects else best, effects, near=best)
+    def _try_at(self, best: ScoredModel, pairs: Sequence[tuple[Sequence[Effect], Sequence[Effect]]]) -> None:
+        """Fit some effects with each of some others, at the parameters of the best model, for each pair of the two."""
+        self._try_added([Addition(self._moved(best, others), effects, near=best) for others, effects in pairs if effects])
 
     def _try_variants_near(self, best: ScoredModel, pairs: Sequence[tuple[Sequence[Effect], Sequence[Effect]]]) -> None:
         """Try what comes near the best by log evidence, of pairs some effects and one more, with what it lacks in variants."""

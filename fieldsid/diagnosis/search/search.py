@@ -202,11 +202,11 @@ class Search(MoveEvaluation):
             less = [(self.tried[frozenset(best.names) - {e.name}], alike) for e, _, alike in stands]
             self._try_added([self._to_rival(h, alike, best) for h, alike in less])
             shifts = [(others, [a for a in alike if shifts_time(a)]) for e, others, alike in stands if shifts_time(e)]
-            self._try_added([self._at(best, *one) for one in shifts])
+            self._try_at(best, shifts)
             self._try_variants_near(best, [(others, alike) for _, others, alike in stands])
         textbook = {e.name: e for e in self.catalogue}
         formed = [([*others, textbook[e.name]], alike) for e, others, alike in stands if e.is_formed]
-        self._try_added([self._at(best, *one) for one in formed])
+        self._try_at(best, formed)
         self._try_variants_near(best, formed)
         if len(best.names) == len(self.known) + 1:
             self._fit_pairs([(e, a) for effects, alike in formed for e in effects[-1:] for a in alike if _in_series(e, a)])

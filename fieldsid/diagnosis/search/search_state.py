@@ -11,14 +11,14 @@ import numpy as np
 
 from fieldsid.diagnosis.data.noise_floor import is_noiseless, resolution_floor
 from fieldsid.diagnosis.evidence.acceptance import (
-    error_left,
+    compared_error,
+    compared_share,
     excess_share,
     is_accepted,
     keeps_error,
     leaves_error,
     lowers_error,
     settles_error,
-    share_explained,
     worst_error,
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, FittedProblem, LikelihoodFit
@@ -164,15 +164,17 @@ class SearchState:
 
     def leaves_unexplained(self) -> bool:
         """Whether the best accepted set leaves a visible error, or explains less of one than stands whatever is left."""
+        if self.leaves_visible_error():
+            return True
         base, best = self.base(), self.best_admissible()
         is_visible = worst_error(base, self.floor) > SUFFICIENT_ERROR_RATIO
-        few = is_visible and share_explained(base, best, self.floor) < MIN_EXPLAINED_SHARE
-        return few or self.leaves_visible_error()
+        return is_visible and compared_share(base, best, self.floor) < MIN_EXPLAINED_SHARE
 
     def _misses_something(self) -> bool:
         """Whether the best accepted set leaves that, or an error that the verdict counts although those shown are small."""
-        left = error_left(self.base(), self.best_admissible(), self.floor)
-        return left > SUFFICIENT_ERROR_RATIO or self.leaves_unexplained()
+        if self.leaves_unexplained():
+            return True
+        return compared_error(self.base(), self.best_admissible(), self.floor) > SUFFICIENT_ERROR_RATIO
 
     def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
         """Return the share of what a model leaves above the noise, on fitted and on unseen runs, that another explains."""

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.evidence.acceptance import (
+    compared_error,
     compared_errors,
-    error_left,
+    compared_share,
     gains_evidence,
     is_accepted,
     keeps_error,
@@ -18,7 +19,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
     lowers_error,
     only_validation_shows,
     settles_error,
-    share_explained,
 )
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.verdict import added_effects
@@ -144,11 +144,11 @@ def test_both_models_are_compared_with_the_moments_of_the_runs_own_that_the_more
 def test_the_error_left_is_the_one_that_an_addition_is_compared_by(over, settled, train, left):
     base = hypothesis(over=1.2, settled=3.0, train=2.0)
     found = hypothesis("servo_lag", gain=50.0, over=over, settled=settled, train=train)
-    assert error_left(base, found, FLOOR) == pytest.approx(left)
+    assert compared_error(base, found, FLOOR) == pytest.approx(left)
     was, now = compared_errors(base, found, FLOOR)
-    assert now.over(FLOOR) <= error_left(base, found, FLOOR)
+    assert now.over(FLOOR) <= compared_error(base, found, FLOOR)
     excess = [unseen.over(FLOOR) ** 2 + h.train.over(FLOOR) ** 2 - 2.0 for unseen, h in ((was, base), (now, found))]
-    assert share_explained(base, found, FLOOR) == pytest.approx(1.0 - excess[1] / excess[0])
+    assert compared_share(base, found, FLOOR) == pytest.approx(1.0 - excess[1] / excess[0])
 
 
 @pytest.mark.parametrize(

@@ -182,8 +182,8 @@ def test_the_longer_allowance_goes_by_the_error_that_is_shown_and_that_the_verdi
     made = a_search(thorough=False)
     made.budget.most = 0.0
     monkeypatch.setattr(Search, "leaves_visible_error", lambda _self: visible)
-    monkeypatch.setattr(search_state, "error_left", lambda *_of: left)
-    monkeypatch.setattr(search_state, "share_explained", lambda *_of: share)
+    monkeypatch.setattr(search_state, "compared_error", lambda *_of: left)
+    monkeypatch.setattr(search_state, "compared_share", lambda *_of: share)
     assert (made.may_go_on(), made.leaves_unexplained()) == (goes_on, says)
 
 
