@@ -6,6 +6,8 @@ missing effect widens them. Source: Ljung 1999, section 7.2; Klein and Morelli 2
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from fieldsid.fitting.covariance.kenward_roger import (
@@ -19,6 +21,7 @@ from fieldsid.fitting.covariance.output_error_covariance import white_weight_cov
 from fieldsid.fitting.covariance.reml import linearise_runs, reml_likelihood
 from fieldsid.fitting.initial.effect_screen import backtrack, carry_parameters, linearise_at, screen_effect
 from fieldsid.fitting.initial.forward_build import forward_build
+from fieldsid.fitting.initial.other_event_times import starts_at_other_times
 from fieldsid.fitting.optimise.levenberg_marquardt import Minimum, covariance, levenberg_marquardt, normal_equations
 from fieldsid.fitting.optimise.residual_weights import negative_log_likelihood, squares_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
@@ -42,6 +45,10 @@ NEGLIGIBLE_LOG_WEIGHT_CHANGE = 0.02
 """Change of both weights on a long record, in logs, that does not move the minimum."""
 MAX_RESCANS, MIN_RESCAN_GAIN = 12, 0.5
 """Searches of the nuisances' grids at the minimum found, and the log likelihood below which another is not worth it."""
+MAX_STARTS = 6
+"""Other times of events that a solution is left for, the most promising first."""
+START_COST_TOLERANCE = 1e-5
+"""Relative change of the cost at which a descent ends from one of many starts, most of which lead nowhere."""
 LONG_RECORD_COST_TOLERANCE = 1e-4
 """The same on a long record, whose start is near the end."""
 INITIAL_DAMPING = 1e-9
@@ -77,31 +84,40 @@ def minimise(problem: Problem, start: FloatArray, noise: Noise) -> tuple[Minimum
 
 
 def _rescanned(problem: Problem, found: Minimum, weights: Noise) -> tuple[Minimum, Noise]:
-    """Return the minimum that searching each run's event times and phases again leads to, with its weights.
+    """Return the minimum from which no search for the runs' event times and phases leads to a lower one, with its weights.
 
     While the fin rests an event's time changes nothing, and no descent leaves such a stretch. With the shared parameters found,
-    the grids show each run's best.
+    the grids show each run's best; with the times found, the effect screened anew shows which times and sizes go together.
     """
     timed = [e for e in problem.layout.effects if any(c.scan for c in e.nuisance)]
     if not timed:
         return found, weights
     cost = negative_log_likelihood(problem, found.x)
     for _ in range(MAX_RESCANS):
-        x = found.x
-        for run in range(len(problem.records)):
-            x = refit_nuisances(problem, x, run, weights)
-        other, new = minimise(problem, x, weights)
-        before, cost = cost, negative_log_likelihood(problem, other.x)
-        if not cost < before:
+        before, x = cost, found.x
+        for start in _starts_at_other_times(problem, x, timed, weights):
+            # what a start before this one has gained stays: it is of another event
+            other = levenberg_marquardt(problem, found.x + start - x, weights, tolerance=START_COST_TOLERANCE)
+            if not other.cost < found.cost:
+                continue
+            other, new = minimise(problem, other.x, weights)
+            after = negative_log_likelihood(problem, other.x)
+            if after < cost:
+                found, weights, cost = other, new, after
+        if not before - cost > MIN_RESCAN_GAIN:
             break
-        found, weights = other, new
-        if before - cost < MIN_RESCAN_GAIN:
-            break
-    for effect in timed:
-        other, new = minimise(problem, _screened_again(problem, found.x, effect, weights), weights)
-        if negative_log_likelihood(problem, other.x) < negative_log_likelihood(problem, found.x):
-            found, weights = other, new
     return found, weights
+
+
+def _starts_at_other_times(problem: Problem, x: FloatArray, timed: Sequence[Effect], weights: Noise) -> Iterator[FloatArray]:
+    """Yield starts with other times of events and other phases, those of every run alone before those of all together."""
+    start = x
+    for run in range(len(problem.records)):
+        start = refit_nuisances(problem, start, run, weights)
+    yield start
+    for effect in timed:
+        yield _screened_again(problem, x, effect, weights)
+    yield from starts_at_other_times(problem, x, weights, MAX_STARTS)
 
 
 def _screened_again(problem: Problem, x: FloatArray, effect: Effect, weights: Noise) -> FloatArray:

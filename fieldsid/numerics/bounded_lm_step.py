@@ -10,12 +10,12 @@ from fieldsid.numerics.arrays import FloatArray
 
 
 def bounded_step(
-    normal: FloatArray, gradient: FloatArray, damping: float, x: FloatArray, low: FloatArray, high: FloatArray
+    normal: FloatArray, gradient: FloatArray, damping: float | FloatArray, x: FloatArray, low: FloatArray, high: FloatArray
 ) -> FloatArray:
     """Return the step (F,) from a normal matrix (F, F) and the gradient (F,) that points where to go.
 
-    damping is relative to the normal matrix's diagonal. What is at its bound and would leave it, or carries no
-    information, stays; what would cross its bound goes just there, and the rest makes the best of that.
+    damping, one for all or one for each (F,), is relative to the normal matrix's diagonal. What is at its bound and would leave
+    it, or carries no information, stays; what would cross its bound goes just there, and the rest makes the best of that.
     Raises DivergenceError where the equations hold what is no number: there is nowhere to go.
     Source: Marquardt 1963, SIAM J. 11(2).
     """

@@ -16,8 +16,9 @@ SEED, CHUNK, CHUNKS = 501, 25, 3
 SHORT = (("own", 1, 77), ("own", 24, 501), ("own", 7, 501), ("hard", 3, 501), ("own", 15, 2612), ("own", 60, 2614))
 """A delay of 0.6 s and a drag along the hull that a fit with too few weightings missed, two that came at random, a hull that
 heaves so that its own damping is a tenth of what pitch alone says, a trim that changes once in runs of three speeds."""
-SHORT_OF_SECOND = (("second", 7, 501), ("second-hard", 44, 501))
-"""A fin that is lost within a pulse, anew in each run: its times lie between the grid's."""
+SHORT_OF_SECOND = (("second", 7, 501), ("second-hard", 44, 501), ("second", 72, 501), ("second", 78, 716), ("second", 37, 708))
+"""A fin that is lost within a pulse, anew in each run: its times lie between the grid's, twice beside an edge of the fin where no
+step of all parameters leads on."""
 
 needs_second_bank = pytest.mark.skipif(not SECOND_BANK.is_dir(), reason=f"the second bank is absent here: {SECOND_BANK}")
 

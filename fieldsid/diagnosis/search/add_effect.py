@@ -14,7 +14,6 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel, price_of_runs
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import (
-    EVENT_UNIT,
     Linearisation,
     ScreenResult,
     backtrack,
@@ -248,11 +247,8 @@ def is_redundant_start(move: SearchMove, known: LikelihoodFit) -> bool:
 
 def _starts_apart(screened: ScreenResult, x: FloatArray) -> bool:
     """Whether an event of a run starts so far from where x has it that one would not converge to the other."""
-    events = {c.name for c in screened.effect.nuisance if c.unit == EVENT_UNIT}
     slots = screened.problem.layout.parameters
-    return any(
-        abs(a - b) > MIN_EVENT_SEPARATION_SHARE for s, a, b in zip(slots, screened.start, x, strict=True) if s.name in events
-    )
+    return any(abs(a - b) > MIN_EVENT_SEPARATION_SHARE for s, a, b in zip(slots, screened.start, x, strict=True) if s.is_event)
 
 
 def _output_error_linearisation(parent: ScoredModel) -> Linearisation:

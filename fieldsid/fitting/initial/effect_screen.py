@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from fieldsid.fitting.initial.event_times import event_times
 from fieldsid.fitting.initial.joint_grid_search import joint_grid_search
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of, levenberg_marquardt
 from fieldsid.fitting.problem.parameters import ParameterLayout, SpeedGroups, group_name, layout_of
@@ -32,8 +33,8 @@ MAX_SETTLING_ITERATIONS, SETTLED_COST_SHARE = 4, 1e-3
 WEAK_START_SHARE = 0.03
 """Coefficients of either sign are also tried at this share of their scan value: a slow ship's are far below a small vehicle's. So
 are lags and dead times: beside a dead band no first-order step from a long one leads back to one within a sample."""
-EVENT_UNIT, EVENT_REFINEMENT = "run", 7
-"""Unit of a time that is a share of a run, and the points it is searched at between the neighbours of its best grid point."""
+EVENT_REFINEMENT = 7
+"""Points at which the time of an event is searched for between the neighbours of its best grid point."""
 MIN_COLUMN_NORM, MIN_INDEPENDENT_SHARE = 1e-9, 1e-8
 MIN_HULL_RATE_1_S = 1e-3
 """1/s; a base model that lacks an effect may have almost no damping."""
@@ -298,9 +299,9 @@ def backtrack(linearisation: Linearisation, screened: ScreenResult) -> ScreenRes
         start = 0.6 * x + 0.4 * start
     else:
         start = x
-    events = {c.name for c in screened.effect.nuisance if c.unit == EVENT_UNIT}
-    if events:
-        free = [i for i, slot in enumerate(problem.layout.parameters) if slot.name not in events]
+    events = {c.name for c in screened.effect.nuisance}
+    free = [i for i, slot in enumerate(problem.layout.parameters) if not (slot.is_event and slot.name in events)]
+    if len(free) < start.size:
         start = levenberg_marquardt(
             problem, start, linearisation.noise, free=free, max_iterations=MAX_SETTLING_ITERATIONS, tolerance=SETTLED_COST_SHARE
         ).x
@@ -325,10 +326,14 @@ def _best_per_run(
     slots = problem.layout.parameters
     places = [next(i for i in problem.layout.nuisances_of(run) if slots[i].name == c.name) for run in runs]
     x = _at_best_points(linearisation, problem, x, new, places, np.tile(grid, (len(places), 1)))
-    if c.unit != EVENT_UNIT or len(grid) < 2:
+    if not slots[places[0]].is_event or len(grid) < 2:
         return x
-    between = (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, EVENT_REFINEMENT)
-    return _at_best_points(linearisation, problem, x, new, places, np.clip(x[places][:, None] + between, c.low, c.high))
+    apart = grid[1] - grid[0]
+    finer = [
+        event_times(record, EVENT_REFINEMENT, max(t - apart, c.low), min(t + apart, c.high))
+        for record, t in zip(problem.records, x[places], strict=True)
+    ]
+    return _at_best_points(linearisation, problem, x, new, places, np.array(finer))
 
 
 def _at_best_points(

@@ -126,7 +126,8 @@ def levenberg_marquardt(
 
     Residuals are whitened through the dynamics at the start throughout: the sum of squares without the determinant of the noise
     covariance would otherwise be lowered by dynamics that make the noise look larger. `damping` is that of the first step, small
-    where x is near the minimum. A parameter at a bound whose gradient points outward is fixed for the step. Source:
+    where x is near the minimum. A parameter at a bound whose gradient points outward is fixed for the step; so are the times of
+    events after a step that was refused, where the others alone promise to lower the cost. Source:
     Levenberg-Marquardt with Marquardt's scaling and projected bounds (Nocedal and Wright 2006, section 10.3).
     """
     slots = tuple(range(len(x)) if free is None else free)
@@ -136,16 +137,22 @@ def levenberg_marquardt(
     hill = _Objective(problem, noise, slots, dynamics_of(problem, x), prior, linear_white(problem, noise, slots))
     cost, normal, gradient = hill.linear(x)
     done, refused, count = False, False, 0
+    # beside an edge of the fin the cost has a kink in an event's time: no step of all parameters leads along it
+    events, hold = np.array([problem.layout.parameters[i].is_event for i in slots], dtype=bool), False
+    dampings = np.full(len(slots), damping)
     while count < max_iterations and not done and np.isfinite(cost):
         count += 1
-        step = bounded_step(normal, gradient, damping, x[index], low, high)
-        trial = x.copy()
-        trial[index] = np.clip(x[index] + step, low, high)
-        moved = trial[index] - x[index]
-        expected = float(2 * gradient @ moved - moved @ normal @ moved)
+        trial, expected = _stepped(x, index, normal, gradient, dampings, (low, high))
+        if hold:
+            still = np.where(events, x[index], low), np.where(events, x[index], high)
+            along, promised = _stepped(x, index, normal, gradient, dampings, still)
+            hold = promised > tolerance * cost
+            if hold:
+                trial, expected = along, promised
+        moved, stepped = trial[index] - x[index], ~events if hold else np.full(len(slots), True)
         if (
             0.0 <= expected <= tolerance * cost
-            and damping <= INITIAL_DAMPING
+            and (dampings <= INITIAL_DAMPING).all()
             and (np.abs(moved) <= MAX_RELATIVE_LAST_STEP * np.abs(x[index])).all()
         ):
             # no step was refused: where so little is left to gain it is there, and nobody need look
@@ -156,22 +163,40 @@ def levenberg_marquardt(
         refused = not new < cost
         if not refused:
             done = cost - new <= tolerance * cost or expected <= tolerance * cost
-            x = trial
-            damping = max(damping * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)
-            if equations is None and done and (hill.long or _at_rest(damping, cost - new, tolerance * cost)):
+            x, hold = trial, False
+            dampings[stepped] = np.maximum(dampings[stepped] * (0.1 if new < cost - 0.5 * expected else 1.0), 1e-12)
+            if equations is None and done and (hill.long or _at_rest(dampings, cost - new, tolerance * cost)):
                 cost = new
                 break
             cost, normal, gradient = hill.linear(x) if equations is None else (new, *equations)
         else:
             done = abs(expected) <= tolerance * cost
-            damping = max(damping, 1e-7) * 10.0
-            done = done or damping > MAX_DAMPING
+            hold = not hold and bool(events.any())
+            raised = events if hold else stepped
+            dampings[raised] = np.maximum(dampings[raised], 1e-7) * 10.0
+            done = done or bool(dampings.max() > MAX_DAMPING)
     return Minimum(x, cost, normal, gradient, slots, count, done)
 
 
-def _at_rest(damping: float, gained: float, worth: float) -> bool:
+def _stepped(
+    x: FloatArray,
+    index: Sequence[int],
+    normal: FloatArray,
+    gradient: FloatArray,
+    dampings: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, float]:
+    """Return where a step of the parameters at `index` leads, and the fall of the cost that the normal equations promise."""
+    low, high = bounds
+    trial = x.copy()
+    trial[index] = np.clip(x[index] + bounded_step(normal, gradient, dampings, x[index], low, high), low, high)
+    moved = trial[index] - x[index]
+    return trial, float(2 * gradient @ moved - moved @ normal @ moved)
+
+
+def _at_rest(dampings: FloatArray, gained: float, worth: float) -> bool:
     """Whether a step gained so little that the normal equations before it are those after it."""
-    return damping <= INITIAL_DAMPING and gained <= 1e-3 * worth
+    return bool((dampings <= INITIAL_DAMPING).all()) and gained <= 1e-3 * worth
 
 
 @dataclass(frozen=True, slots=True)

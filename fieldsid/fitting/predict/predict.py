@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from fieldsid.display import Brief
 from fieldsid.dynamics.assemble import fin_path
 from fieldsid.dynamics.free_run import effects_of, growing_hint
-from fieldsid.errors import DivergenceError, EffectError
+from fieldsid.errors import DivergenceError
 from fieldsid.fitting.initial.initial_state_prior import initial_state_prior
+from fieldsid.fitting.initial.other_event_times import starts_at_other_times
 from fieldsid.fitting.optimise.levenberg_marquardt import levenberg_marquardt
 from fieldsid.fitting.predict import command_timing, own_moment, speed_correction
 from fieldsid.fitting.problem.parameters import Parameter, ParameterLayout, SpeedGroups, layout_of
@@ -26,15 +26,12 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.noise.white_floor import white_noise_floor
 from fieldsid.noise.whiten import is_white
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.bounded_lm_step import bounded_step
-from fieldsid.numerics.gram_least_squares import solve_normal_equations
-from fieldsid.rounding import nine_digits
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
 """Iterations for a run's nuisances, and the share of the sum of squares that an iteration must gain."""
-MAX_STEPPED_POINTS = 4
-"""Points of a scan that are stepped from: the two of least cost, and as many beside them."""
+MAX_STARTS = 2
+"""Other times of a run's events that are tried beside the present ones."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -173,7 +170,7 @@ def refit_nuisances(problem: Problem, x: FloatArray, run: int, noise: Noise, *, 
     alone = replace(problem, records=(problem.records[run],), layout=_layout_of_one(problem.layout, run))
     keep = [*range(problem.layout.shared), *own]
     free = range(problem.layout.shared, len(keep))
-    starts = scanned_starts(alone, x[keep]) if rescan else [x[keep]]
+    starts = [x[keep], *(starts_at_other_times(alone, x[keep], noise, MAX_STARTS, free) if rescan else [])]
     found = [
         levenberg_marquardt(
             alone, start, noise, free=free, max_iterations=MAX_NUISANCE_ITERATIONS, tolerance=NUISANCE_COST_TOLERANCE
@@ -205,73 +202,6 @@ def _left_over(problem: Problem, x: FloatArray, noise: Noise) -> Noise:
     record = problem.records[0]
     rms = [float(np.sqrt(np.mean(e[ok] ** 2))) if ok.any() else 0.0 for e, ok in zip(residual, record.ok, strict=True)]
     return Noise(max(rms[0], noise.angle), max(rms[1], noise.rate))
-
-
-def scanned_starts(problem: Problem, x: FloatArray) -> list[FloatArray]:
-    """Return starts with every per-run nuisance at the best points of its scan grid, and x itself, each once.
-
-    The points are compared with the initial state that is best at each, to first order: a wrong point bends the start of a run,
-    and at that start the wrong point is the best. The best few are then compared where a step leads from them: an event beside an
-    edge of the fin has a minimum narrower than the grid, which no other basin leads to.
-    """
-    layout = problem.layout
-    grids = {
-        i: c.scan
-        for i, s in enumerate(layout.parameters)
-        if s.run >= 0
-        for e in layout.effects
-        for c in e.nuisance
-        if c.name == s.name and c.scan
-    }
-    if not grids:
-        return [x]
-    state = [i for i in range(layout.shared, x.size) if i not in grids]
-    noise, record = white_noise_floor(problem.records), problem.records[0]
-    weight = record.ok / np.array([[noise.angle], [noise.rate]])
-    columns = problem.linearise(x, 0, state)
-    slopes = (columns.sensitivity * weight).reshape(len(columns.columns), -1)
-    if not np.isfinite(slopes).all():
-        return [x]
-    gram, scored = slopes @ slopes.T, []
-    for point in product(*grids.values()):
-        trial = x.copy()
-        trial[list(grids)] = point
-        try:
-            left = (problem.residual(trial, 0)[0] * weight).ravel()
-        except EffectError:
-            continue
-        if not np.isfinite(left).all():
-            continue
-        step = solve_normal_equations(gram, slopes @ left)
-        trial[list(columns.columns)] += step
-        left = left - step @ slopes
-        scored.append((nine_digits(float(left @ left)), tuple(point), np.clip(trial, layout.low, layout.high)))
-    scored.sort(key=lambda item: item[:2])
-    reach = np.full(x.size, np.inf)
-    reach[list(grids)] = [max(np.diff(grid), default=np.inf) for grid in grids.values()]
-    stepped = [(*_stepped(problem, trial, weight, reach), point) for _, point, trial in scored[:MAX_STEPPED_POINTS]]
-    likely = sorted(stepped, key=lambda item: (item[0], item[2]))
-    return [x, *(trial for cost, trial, _ in likely[:2] if np.isfinite(cost) and not np.array_equal(trial, x))]
-
-
-def _stepped(problem: Problem, x: FloatArray, weight: FloatArray, reach: FloatArray) -> tuple[float, FloatArray]:
-    """Return cost and vector that a Gauss-Newton step of a one-run problem's nuisances leads to, each moved within its reach."""
-    layout = problem.layout
-    own = range(layout.shared, x.size)
-    result = problem.linearise(x, 0, own)
-    stack = (result.stack * weight).reshape(result.stack.shape[0], -1)
-    if not np.isfinite(stack).all():
-        return np.inf, x
-    low, high = np.maximum(layout.low, x - reach)[own], np.minimum(layout.high, x + reach)[own]
-    step = bounded_step(stack[1:] @ stack[1:].T, stack[1:] @ stack[0], 0.0, x[own], low, high)
-    trial = x.copy()
-    trial[own] = np.clip(x[own] + step, low, high)
-    try:
-        left = problem.residual(trial, 0)[0] * weight
-    except EffectError:
-        return np.inf, x
-    cost = float(np.vdot(left, left))
-    return (nine_digits(cost), trial) if np.isfinite(cost) else (np.inf, x)
 
 
 def _layout_of_one(layout: ParameterLayout, run: int) -> ParameterLayout:

@@ -20,6 +20,8 @@ START_NAMES = ("angle0", "rate0", "rate_before")
 MAX_RATE_BEFORE_RATIO, MAX_RATE_BEFORE_RAD_S = 1.5, 2.0
 """Largest rate before a run over the largest of the records, and in rad/s where no rate was measured."""
 
+EVENT_UNIT = "run"
+"""Unit of the time of an event, a share of its run."""
 GROUP_WIDTH_TRAINED = 0.12
 """A run this near to a group counts as of it, where the training runs showed that a group shares its parameters."""
 BOUND_SHARE = 1e-6
@@ -37,6 +39,11 @@ class Parameter:
     high: float
     start: float
     run: int = -1
+
+    @property
+    def is_event(self) -> bool:
+        """Whether it is the time of an event, as a share of its run."""
+        return self.unit == EVENT_UNIT
 
 
 @dataclass(frozen=True, slots=True)
