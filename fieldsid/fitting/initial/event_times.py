@@ -13,8 +13,8 @@ from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
 EVENT_TIMES = 41
-"""Times that a whole run is searched at. Of 183 data sets with a step change, of both banks' generators, one fit ends more than 0.5
-above the cost from the true values, with as many times and with twice as many."""
+"""Times that a whole run is searched at. Of 183 data sets with a step change, of both banks' generators, one fit ends more than
+0.5 above the cost from the true values, with as many times and with twice as many."""
 
 
 def event_times(record: Record, count: int = EVENT_TIMES, low: float = 0.0, high: float = 1.0) -> FloatArray:

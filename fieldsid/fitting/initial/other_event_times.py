@@ -11,7 +11,6 @@ import numpy as np
 from fieldsid.errors import EffectError
 from fieldsid.fitting.initial.event_times import event_times
 from fieldsid.fitting.optimise.levenberg_marquardt import gram_products
-from fieldsid.fitting.problem.parameters import Parameter
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
@@ -29,8 +28,8 @@ def starts_at_other_times(
     """Return up to `most` starts (N,), each with one event's time where a minimum is predicted, the least predicted cost first.
 
     From each point of a grid a Gauss-Newton step of the `free` parameters (all by default) is taken, the time among them, under
-    `noise`. A minimum is predicted where the time stays between the grid's neighbours of its point, and where it would go beyond
-    from two neighbours towards each other: beside an edge of the fin it is narrower than the grid.
+    `noise`. A minimum is predicted where the time stays between the grid's neighbours of its point, and between two neighbours
+    that lead to each other: beside an edge of the fin it is narrower than the grid.
     """
     layout, runs = problem.layout, range(len(problem.records))
     low, high = x.copy(), x.copy()
@@ -52,33 +51,34 @@ def starts_at_other_times(
             own = _products(problem, trial, slot.run, noise, index)
             if own is not None:
                 cost, end = _stepped(trial, total - products[slot.run] + own, low, high)
-                steps.append(_Step(nine_digits(cost), end, _side(end[event], before, after, slot)))
+                side = int(end[event] >= after and after < slot.high) - int(end[event] <= before and before > slot.low)
+                steps.append(_Step(nine_digits(cost), trial, end, side))
         low[event], high[event] = slot.low, slot.high
-        basins = [s for s in steps if s.side == 0]
-        basins += [min(a, b, key=lambda s: s.cost) for a, b in pairwise(steps) if a.side > 0 > b.side]
-        found += [(b.cost, event, b.end) for b in _distinct(basins)]
+        found += [(cost, event, start) for cost, start in _basins(steps)]
     return [end for *_, end in sorted(found, key=lambda f: f[:2])[:most]]
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """Where a step from a point of a grid leads, its predicted cost, and to which side it would go beyond a neighbour, else 0."""
+    """A step from a point of a grid: predicted cost, begin and end, and the side to which it goes as far as it may, else 0."""
 
     cost: float
+    begin: FloatArray
     end: FloatArray
     side: int
 
 
-def _side(end: float, before: float, after: float, slot: Parameter) -> int:
-    """Return the side to which a step went as far as it might, -1, 0 or 1; beyond a parameter's own bound there is none."""
-    return int(end >= after and end < slot.high) - int(end <= before and end > slot.low)
-
-
-def _distinct(basins: Sequence[_Step]) -> Iterator[_Step]:
-    """Yield each basin once."""
-    for i, one in enumerate(basins):
-        if all(abs(one.cost - b.cost) > SAME_COST_SHARE * abs(b.cost) for b in basins[:i]):
-            yield one
+def _basins(steps: Sequence[_Step]) -> Iterator[tuple[float, FloatArray]]:
+    """Yield predicted cost and start of each minimum: where a step ends, or halfway along the better of two that meet."""
+    seen = list[float]()
+    for one in steps:
+        if one.side == 0 and all(abs(one.cost - cost) > SAME_COST_SHARE * cost for cost in seen):
+            seen.append(one.cost)
+            yield one.cost, one.end
+    for a, b in pairwise(steps):
+        if a.side > 0 > b.side:
+            better = min(a, b, key=lambda s: s.cost)
+            yield better.cost, 0.5 * (better.begin + better.end)
 
 
 def _products(problem: Problem, x: FloatArray, run: int, noise: Noise, free: Sequence[int]) -> FloatArray | None:

@@ -30,7 +30,7 @@ from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
 MAX_NUISANCE_ITERATIONS, NUISANCE_COST_TOLERANCE = 15, 1e-6
 """Iterations for a run's nuisances, and the share of the sum of squares that an iteration must gain."""
-MAX_STARTS = 2
+MAX_STARTS = 4
 """Other times of a run's events that are tried beside the present ones."""
 
 
