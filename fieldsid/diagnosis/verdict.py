@@ -36,6 +36,7 @@ from fieldsid.diagnosis.thresholds import (
     SHARES_TO_EXPLAIN_FAR,
     SHARES_TO_EXPLAIN_MISSING,
     SUFFICIENT_ERROR_RATIO,
+    UNTRIED_PROBABILITY,
 )
 from fieldsid.models.model import Noise
 
@@ -140,7 +141,10 @@ def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:
 
 
 def probabilities(evidences: Mapping[frozenset[str], float]) -> dict[frozenset[str], float]:
-    """Return the posterior probability of each set of effects: proportional to exp(log evidence / EVIDENCE_TEMPERATURE)."""
+    """Return the posterior probability of each set of effects: proportional to exp(log evidence / EVIDENCE_TEMPERATURE).
+
+    They sum to what is left beside the probability that what is hidden is in none of the sets tried.
+    """
     scores = np.array(list(evidences.values())) / EVIDENCE_TEMPERATURE
     weights = np.exp(scores - scores.max())
-    return dict(zip(evidences, (weights / weights.sum()).tolist(), strict=True))
+    return dict(zip(evidences, ((1.0 - UNTRIED_PROBABILITY) * weights / weights.sum()).tolist(), strict=True))
