@@ -139,17 +139,16 @@ def levenberg_marquardt(
     done, refused, count = False, False, 0
     # beside an edge of the fin the cost has a kink in an event's time: no step of all parameters leads along it
     events, hold = np.array([problem.layout.parameters[i].is_event for i in slots], dtype=bool), False
-    dampings = np.full(len(slots), damping)
+    every, dampings = np.full(len(slots), True), np.full(len(slots), damping)
     while count < max_iterations and not done and np.isfinite(cost):
         count += 1
-        trial, expected = _stepped(x, index, normal, gradient, dampings, (low, high))
-        if hold:
-            still = np.where(events, x[index], low), np.where(events, x[index], high)
-            along, promised = _stepped(x, index, normal, gradient, dampings, still)
-            hold = promised > tolerance * cost
-            if hold:
-                trial, expected = along, promised
-        moved, stepped = trial[index] - x[index], ~events if hold else np.full(len(slots), True)
+        stepped = ~events if hold else every
+        within = np.where(stepped, low, x[index]), np.where(stepped, high, x[index])
+        trial, expected = _stepped(x, index, normal, gradient, dampings, within)
+        if hold and not expected > tolerance * cost:
+            hold, stepped = False, every
+            trial, expected = _stepped(x, index, normal, gradient, dampings, (low, high))
+        moved = trial[index] - x[index]
         if (
             0.0 <= expected <= tolerance * cost
             and (dampings <= INITIAL_DAMPING).all()

@@ -127,3 +127,10 @@ def test_a_set_as_likely_is_a_rival_though_its_free_run_is_worse():
     sums = {frozenset(h.names): h.log_evidence for h in (found, near, far)}
     work = SimpleNamespace(records=(1, 2), floor=FLOOR, evidences=lambda: sums, ranked=lambda: [found, near, far])
     assert verdict.rivals_of(work, found) == (near,)
+
+
+def test_a_probability_is_left_for_what_is_in_no_set_that_was_tried():
+    found = verdict.probabilities({frozenset(): 0.0, frozenset({"delay"}): 800.0, frozenset({"servo_lag"}): 796.0})
+    assert sum(found.values()) == pytest.approx(1.0 - verdict.UNTRIED_PROBABILITY)
+    alike = found[frozenset({"servo_lag"})] / found[frozenset({"delay"})]
+    assert alike == pytest.approx(np.exp(-4.0 / verdict.EVIDENCE_TEMPERATURE))
