@@ -59,7 +59,7 @@ class Pair(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Candidate(Displayed):
-    """One model: its effects, probability among all that were tried, parameters, errors, and its evidence in a sentence.
+    """One model: its effects, probability beside what was tried and what was not, parameters, errors, its evidence in a sentence.
 
     `explained` is the share of the excess error it removes, 0..1; `worse` says that it raises the error instead.
     `confusable_with` are models of comparable probability that remove as much.
