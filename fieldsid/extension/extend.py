@@ -140,7 +140,7 @@ def _extension(
     learned, judged = work.records, work.validation
     told = common_own_moment(before, after)
     before, after = before.with_own_moment(told), after.with_own_moment(told)
-    work.update_noise_floor(after.likelihood_fit.fitted)
+    work.lower_floor(after)
     # as `diagnose` has it: what runs without noise leave over is no colour of a sensor's
     ended_with = after.likelihood_fit if work.is_noiseless else joint_noise_fit(after.likelihood_fit, work.parallel)
     noise = ended_with.noise
@@ -199,7 +199,7 @@ def _with_all(work: Search) -> ScoredModel:
     """Return the model of all effects of the search's catalogue, grown one effect at a time."""
     front = [work.base()]
     for _ in range(len(work.catalogue) - len(work.known)):
-        children = {frozenset(c.names): c for parent in front for c in work.forward_step(parent, forced=True)}
+        children = {frozenset(c.names): c for parent in front for c in work.grow(parent, forced=True)}
         front = sorted(children.values(), key=lambda h: -h.log_evidence)[:BEAM_WIDTH]
     return front[0]
 

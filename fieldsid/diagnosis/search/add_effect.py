@@ -64,45 +64,32 @@ MAX_TIME_SHIFTS, TIME_SHIFT_ITERATIONS = 3, 12
 class Addition:
     """A request to add one of some effects to a model: the `most` best of each screen, and all their starts where that is None.
 
-    `flown`: the parent's free run was screened before, or shows no more than its likelihood, which alone is screened. `anew`:
-    time shifts are tried too, because a base model that lacks one has biased parameters (see `_iterate_time_shift`).
-    `behind`: the log evidence that the parent lacks to be of interest itself. `near`: a model that what comes of it must come
-    near to be kept.
+    `flown`: the parent's free run is screened too; near the noise its likelihood shows as much. `anew`: time shifts are iterated
+    too, because a base model that lacks one has biased parameters (see `_iterate_time_shift`).
     """
 
     parent: ScoredModel
     effects: Sequence[Effect]
     most: int | None = None
-    flown: bool = True
+    flown: bool = False
     anew: bool = False
-    behind: float = 0.0
-    near: ScoredModel | None = None
 
     def screens(self) -> list[_Screen]:
         """Return the screens of its effects; none for a parent that diverges, which cannot be linearised."""
         if not np.isfinite(self.parent.likelihood_fit.log_likelihood):
             return []
-        whitened = _Screen(self, likelihood_linearisation(self.parent), by_output_error=False)
-        return (
-            [whitened]
-            if self.flown
-            else [_Screen(self, _output_error_linearisation(self.parent), by_output_error=True), whitened]
-        )
+        flown = [_Screen(self, _output_error_linearisation(self.parent), by_output_error=True)] if self.flown else []
+        return [*flown, _Screen(self, likelihood_linearisation(self.parent), by_output_error=False)]
 
 
 @dataclass(frozen=True, slots=True)
 class SearchMove:
-    """A screened effect, the linearisation it was screened on, whether output error is fitted from it first, and what asked."""
+    """A screened effect, the linearisation it was screened on, whether output error is fitted from it first, and its parent."""
 
     screened: ScreenResult
     linearisation: Linearisation
     by_output_error: bool
-    asked: Addition
-
-    @property
-    def parent(self) -> ScoredModel:
-        """The model that it adds to."""
-        return self.asked.parent
+    parent: ScoredModel
 
     @property
     def names(self) -> frozenset[str]:
@@ -110,17 +97,16 @@ class SearchMove:
         return frozenset((*self.parent.names, self.screened.effect.name))
 
 
-def screen_additions(asked: Sequence[Addition], parallel: ParallelMap) -> list[list[SearchMove]]:
-    """Return the moves worth evaluating of each addition: the best of two screens, by output-error and by whitened cost."""
-    screens = [screen for addition in asked for screen in addition.screens()]
+def screen_addition(asked: Addition, parallel: ParallelMap) -> list[SearchMove]:
+    """Return the moves worth evaluating of an addition: the best of two screens, by output-error and by whitened cost."""
+    screens = asked.screens()
     # all screens at once, then all that is to be followed: at the end of each sharing out one process waits for the other
-    pairs = [(i, effect) for i, screen in enumerate(screens) for effect in mechanisms(screen.asked.effects)]
+    pairs = [(i, effect) for i in range(len(screens)) for effect in mechanisms(asked.effects)]
     points = parallel.map(lambda pair: _best_points(screens[pair[0]].linearisation, pair[1]), pairs)
     steps = list[_PendingMove]()
     for i, screen in enumerate(screens):
         steps += screen.steps([p for (at, _), p in zip(pairs, points, strict=True) if at == i])
-    taken = list(zip(steps, parallel.map(lambda step: step.evaluate(), steps), strict=True))
-    return [_worth_evaluating(addition, [(s, p) for s, p in taken if s.screen.asked is addition]) for addition in asked]
+    return _worth_evaluating(asked, list(zip(steps, parallel.map(lambda step: step.evaluate(), steps), strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,12 +135,12 @@ class _Screen:
         """Return the fall of the cost that an effect must promise."""
         if self.by_output_error:
             return MIN_OUTPUT_ERROR_COST_SHARE * self.linearisation.cost
-        return _least_cost_fall(self.asked.parent, effect, self.asked.behind)
+        return _least_cost_fall(self.asked.parent, effect)
 
 
 def _worth_evaluating(addition: Addition, taken: Sequence[tuple[_PendingMove, ScreenResult]]) -> list[SearchMove]:
     """Return the moves of an addition: of those iterated the best, that have lowered the cost enough, and the others."""
-    moves = [(s.is_iterated, SearchMove(p, s.screen.linearisation, s.screen.by_output_error, addition)) for s, p in taken]
+    moves = [(s.is_iterated, SearchMove(p, s.screen.linearisation, s.screen.by_output_error, addition.parent)) for s, p in taken]
     best = sorted((move for iterated, move in moves if iterated), key=lambda move: move.screened.predicted_cost)
     found = [
         *first_few(best, addition.most, lambda move: move.screened.effect),
@@ -182,19 +168,13 @@ def first_few(ranked: Sequence[T], most: int | None, effect: Callable[[T], Effec
     return list(ranked[:end])
 
 
-def may_gain(parent: ScoredModel, linearisation: Linearisation, effect: Effect) -> bool:
-    """Whether an effect may gain a model log evidence enough, to first order at the best of its scan points."""
-    predicted = screen_points(linearisation, effect)[0].predicted_cost
-    return linearisation.cost - predicted > _least_cost_fall(parent, effect, 0.0)
-
-
-def _least_cost_fall(parent: ScoredModel, effect: Effect, behind: float) -> float:
+def _least_cost_fall(parent: ScoredModel, effect: Effect) -> float:
     """Return the fall of the training runs' whitened cost below which an effect cannot gain log evidence enough.
 
     That is the prior odds against one and the price of the numbers it has of each run's own; validation runs gain in proportion.
     """
     records = parent.likelihood_fit.fitted.problem.records
-    asked = ALTERNATIVE_LOG_ODDS + price_of_runs(effect, (*records, *parent.validation)) + behind
+    asked = ALTERNATIVE_LOG_ODDS + price_of_runs(effect, (*records, *parent.validation))
     return max(MIN_WHITENED_COST_FALL, 2.0 * asked * parent.training_share / MAX_FIRST_ORDER_SHORTFALL)
 
 

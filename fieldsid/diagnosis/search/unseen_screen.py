@@ -16,7 +16,6 @@ from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.add_effect import (
     MAX_EFFECTS_LATER,
     MIN_OUTPUT_ERROR_COST_SHARE,
-    Addition,
     SearchMove,
     first_few,
     iterate_points,
@@ -47,5 +46,5 @@ def moves_of_all_runs(parent: ScoredModel, left: Sequence[Effect], parallel: Par
         coefficients = dict(zip(screened.problem.layout.names, screened.start.tolist(), strict=False))
         alone, x = with_effect(fitted.problem, fitted.x, screened.effect, coefficients)
         at = replace(screened, problem=alone, point=x, start=x)
-        moves.append(SearchMove(at, ground, by_output_error=False, asked=Addition(parent, left)))
+        moves.append(SearchMove(at, ground, by_output_error=False, parent=parent))
     return moves

@@ -9,9 +9,10 @@ from itertools import product
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import gains_evidence, keeps_error, leaves_error, validation_error_ratio
-from fieldsid.diagnosis.evidence.likelihood_fit import fit_maximum_likelihood
-from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
-from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
+from fieldsid.diagnosis.search.archive import Archive
+from fieldsid.diagnosis.search.grounds import Grounds
 from fieldsid.diagnosis.thresholds import MAX_VALIDATION_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.initial.effect_screen import carry_parameters
@@ -44,61 +45,51 @@ class VariantRequest:
         return frozenset(self.model.names), frozenset(self.model.names if self.effects is None else self.effects)
 
 
-@dataclass(frozen=True, slots=True)
-class FormSearch:
-    """A search over variants: the noise kind and floors that models are fitted under, and the parallel map."""
+def try_variants(asked: Sequence[VariantRequest], tried: Archive, grounds: Grounds) -> None:
+    """Keep the models with their effects in the best variants, changed one by one as long as a change is accepted.
 
-    resolution_floor: Noise
-    noise_kind: str
-    floor: Noise
-    parallel: ParallelMap
+    It is accepted where it gains evidence and does not raise the validation error. All are fitted in one parallel map, as the
+    models have different numbers of variants. What was tried before at the same evidence is not tried again.
+    """
+    varied = tried.varied
+    new = [r for r in asked if r.model.log_evidence > varied.get(r.key, -np.inf) + MIN_LIKELIHOOD_GAIN]
+    asked, left = list(new), [i for i, request in enumerate(new) if leaves_error(request.model, grounds.floor)]
+    while left:
+        best = zip(left, _best_variants([asked[i] for i in left], grounds), strict=True)
+        likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
+        formed = grounds.parallel.map(lambda of: grounds.flown(of[1]), likely)
+        taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if keeps_error(asked[i].model, variant)}
+        for i, variant in taken.items():
+            asked[i] = replace(asked[i], model=variant)
+        left = [i for i, variant in taken.items() if leaves_error(variant, grounds.floor)]
+    for request, found in zip(new, asked, strict=True):
+        tried[frozenset(found.model.names)], varied[request.key] = found.model, found.model.log_evidence
 
-    def try_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel]:
-        """Return the models with their effects in the best variants, changed one by one as long as a change is accepted.
 
-        It is accepted where it gains evidence and does not raise the validation error. All are fitted in one parallel map, as
-        the models have different numbers of variants.
-        """
-        asked, left = list(asked), [i for i, request in enumerate(asked) if leaves_error(request.model, self.floor)]
-        while left:
-            best = zip(left, self._best_variants([asked[i] for i in left]), strict=True)
-            likely = [(i, variant) for i, variant in best if variant is not None and gains_evidence(asked[i].model, variant)]
-            formed = self.parallel.map(lambda of: prefer_output_error(of[1], self.floor).evaluate_errors(), likely)
-            taken = {i: variant for (i, _), variant in zip(likely, formed, strict=True) if keeps_error(asked[i].model, variant)}
-            for i, variant in taken.items():
-                asked[i] = replace(asked[i], model=variant)
-            left = [i for i, variant in taken.items() if leaves_error(variant, self.floor)]
-        return [request.model for request in asked]
+def _best_variants(asked: Sequence[VariantRequest], grounds: Grounds) -> list[ScoredModel | None]:
+    """Return for each model its variant with most evidence, None where no variant gains any."""
+    starts = [_VariantStart.under(request.model, grounds.floor) for request in asked]
+    variants = [
+        (start, e, variant)
+        for start, request in zip(starts, asked, strict=True)
+        for e in request.model.effects
+        if request.effects is None or e.name in request.effects
+        for variant in e.variants
+        if with_variant(e, variant) in with_one_cross_state(_exchanged(request.model.effects, e, variant))
+    ]
+    fitted = list(zip(variants, grounds.parallel.map(lambda of: _fit_variant(*of, grounds), variants), strict=True))
+    found = [[h for (of, _, _), h in fitted if of is start and h is not None] for start in starts]
+    return [max(of_one, key=lambda h: h.log_evidence, default=None) for of_one in found]
 
-    def _best_variants(self, asked: Sequence[VariantRequest]) -> list[ScoredModel | None]:
-        """Return for each model its variant with most evidence, None where no variant gains any."""
-        grounds = [_VariantStart.under(request.model, self.floor) for request in asked]
-        forms = [
-            (linearisation, e, variant)
-            for linearisation, request in zip(grounds, asked, strict=True)
-            for e in request.model.effects
-            if request.effects is None or e.name in request.effects
-            for variant in e.variants
-            if with_variant(e, variant) in with_one_cross_state(_exchanged(request.model.effects, e, variant))
-        ]
-        ml_fit = list(zip(forms, self.parallel.map(lambda of: self._fit_variant(*of), forms), strict=True))
-        found = [[h for (g, _, _), h in ml_fit if g is linearisation and h is not None] for linearisation in grounds]
-        return [max(of_one, key=lambda h: h.log_evidence, default=None) for of_one in found]
 
-    def _fit_variant(self, linearisation: _VariantStart, effect: Effect, variant: Variant) -> ScoredModel | None:
-        h = linearisation.model
-        problem, noise_kinds_tried = _best_start(h, effect, variant, linearisation.residuals)
-        if 0.5 * (linearisation.cost - noise_kinds_tried.cost) < linearisation.min_gain:
-            return None
-        ml_fit = fit_maximum_likelihood(
-            problem,
-            noise_kinds_tried.x,
-            h.likelihood_fit.noise,
-            self.resolution_floor,
-            self.noise_kind,
-            rival=h.likelihood_fit.log_likelihood,
-        )
-        return score_model(ml_fit, h.validation)
+def _fit_variant(start: _VariantStart, effect: Effect, variant: Variant, grounds: Grounds) -> ScoredModel | None:
+    """Return a model with one of its effects in a variant, None where that does not gain enough likelihood after a few steps."""
+    h = start.model
+    problem, begun = _best_start(h, effect, variant, start.residuals)
+    if 0.5 * (start.cost - begun.cost) < start.min_gain:
+        return None
+    ml_fit = grounds.fit(problem, begun.x, h.likelihood_fit.noise, rival=h.likelihood_fit.log_likelihood)
+    return score_model(ml_fit, h.validation)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,62 @@
+"""Which effects of a model are accepted, and the log evidence of each accepted set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.acceptance import is_accepted, lowers_error, settles_error, worst_error
+from fieldsid.diagnosis.evidence.noise_kind import sensor_noise
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.search.archive import Archive, Names
+from fieldsid.diagnosis.thresholds import EXPLAINED_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
+from fieldsid.models.model import Noise
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedSets:
+    """The accepted sets of an archive over a noise floor, as it was when they were asked for."""
+
+    evidences: Mapping[Names, float]
+    """The log evidence of each accepted set: log sum exp over the models whose accepted effects are that set."""
+
+    @classmethod
+    def of(cls, tried: Archive, floor: Noise) -> AcceptedSets:
+        """Return those of an archive that holds the base."""
+        sums: dict[Names, float] = {}
+        for h in tried.ranked():
+            core = core_of(h, tried, floor)
+            sums[core] = float(np.logaddexp(sums.get(core, -np.inf), h.log_evidence))
+        return cls(sums)
+
+    @property
+    def best(self) -> Names:
+        """The set of the highest log evidence."""
+        return max(self.evidences, key=lambda k: self.evidences[k])
+
+
+def core_of(h: ScoredModel, tried: Archive, floor: Noise) -> Names:
+    """Return the accepted effects of a model: the rest is left out, one at a time, where the model without it is as good.
+
+    An effect that gains evidence beside all else stays where it lowers the error, though it may gain none once a small one is
+    left out: what that leaves in fast samples, a disturbance takes up with the rest. So does one that ends a visible error
+    and is a rival by evidence.
+    """
+    base = tried[tried.known]
+    over = sensor_noise(floor, base)
+    # an error to explain is a visible one, and any where the base leaves a visible one
+    least = EXPLAINED_ERROR_RATIO if worst_error(base, over) > SUFFICIENT_ERROR_RATIO else SUFFICIENT_ERROR_RATIO
+    proven = {name for name, w in tried.without_each(h) if is_accepted(w, h, over, least)}
+
+    def stands(name: str, without: ScoredModel) -> bool:
+        return (
+            is_accepted(without, h, over, least)
+            or (name in proven and lowers_error(without, h, over, least))
+            or settles_error(without, h, floor)
+        )
+
+    while idle := [w for name, w in tried.without_each(h) if not stands(name, w)]:
+        h = max(idle, key=lambda w: w.log_evidence)
+    return frozenset(h.names)

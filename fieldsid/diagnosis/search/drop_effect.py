@@ -1,0 +1,45 @@
+"""The move that drops: a model without each of its effects, fitted from the numbers it has with them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.search.archive import Archive
+from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.fitting.initial.effect_screen import carry_parameters
+from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
+from fieldsid.models.effect import Effect
+
+
+def drop_each(h: ScoredModel, tried: Archive, grounds: Grounds) -> bool:
+    """Fit a model without each of its effects, unless that was done; return whether anything was fitted.
+
+    Later effects may have made earlier ones idle. The set without one may have been tried in other variants only, or have ended
+    at a worse optimum than the one that the larger model has found.
+    """
+    if len(h.names) <= len(tried.known) + 1 or tried.is_thinned(h):
+        return False
+    tried.thinned[frozenset(h.names)] = h.log_evidence
+    effects = [e for e in h.effects if e.name not in tried.known]
+    less = grounds.parallel.map(lambda gone: _without(h, gone, tried, grounds), effects)
+    tried.update({frozenset(w.names): w for w in less})
+    return True
+
+
+def _without(h: ScoredModel, gone: Effect, tried: Archive, grounds: Grounds) -> ScoredModel:
+    """Return a model without one of its effects, fitted from the parameters it has with it, the base's where they diverge."""
+    fitted, noise = h.likelihood_fit.fitted, h.likelihood_fit.noise
+    problem = fitted.problem.with_effects([e for e in h.effects if e is not gone])
+    starts = [carry_parameters(problem.layout, fitted.vector)]
+    if not np.isfinite(cost_of(problem, starts[0], noise)):
+        # a hull that its sway alone holds straight runs away without it, and no descent begins there
+        starts = [carry_parameters(problem.layout, tried[tried.known].likelihood_fit.fitted.vector, fitted.vector)]
+    before = tried.get(frozenset(e.name for e in problem.layout.effects))
+    if before is not None and any(e not in before.effects for e in problem.layout.effects):
+        # in its variants the others' numbers may be far from those without it
+        starts.append(carry_parameters(problem.layout, before.likelihood_fit.fitted.vector, fitted.vector))
+    found = grounds.better(before, grounds.fit(problem, starts[0], noise))
+    for start in starts[1:]:
+        found = grounds.better(found, grounds.fit(problem, start, noise))
+    return found.evaluate_errors() if found is before else grounds.flown(found)

@@ -1,0 +1,75 @@
+"""What all models of a search have in common: the runs they are scored on, the noise they are fitted under, the other process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.acceptance import excess_share
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit, fit_maximum_likelihood
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, bic_penalty, prefer_output_error, score_model
+from fieldsid.diagnosis.parallel_map import ParallelMap
+from fieldsid.diagnosis.thresholds import RIVAL_LOG_ODDS
+from fieldsid.fitting.initial.effect_screen import carry_parameters
+from fieldsid.fitting.problem.problem import Problem
+from fieldsid.models.model import Noise
+from fieldsid.models.record import Record
+from fieldsid.numerics.arrays import FloatArray
+
+SAME_OPTIMUM = 1e-3
+"""Log likelihood within which two fits of the same effects have ended at the same optimum."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grounds:
+    """The grounds on which models are compared: log evidences of two models differ by what their effects differ by alone.
+
+    `floor` is the sensors' noise, `resolution_floor` what the white part of a fit's noise stays near, `noise_kind` the kind of
+    noise of every fit.
+    """
+
+    validation: tuple[Record, ...]
+    floor: Noise
+    resolution_floor: Noise
+    noise_kind: str
+    parallel: ParallelMap
+    report: Callable[[str], None]
+
+    def fit(self, problem: Problem, x: FloatArray, noise: Noise, *, rival: float = -np.inf) -> LikelihoodFit:
+        """Return the maximum-likelihood fit from x and a noise, stopped early where it cannot reach the log likelihood `rival`."""
+        return fit_maximum_likelihood(problem, x, noise, self.resolution_floor, self.noise_kind, rival=rival)
+
+    def fit_from(self, h: ScoredModel, other: ScoredModel) -> LikelihoodFit:
+        """Fit a model from another model's parameters where that has them, from its own elsewhere."""
+        here, there = h.likelihood_fit.fitted, other.likelihood_fit.fitted
+        x = carry_parameters(here.problem.layout, there.vector, here.vector)
+        return self.fit(here.problem, x, other.likelihood_fit.noise)
+
+    def better(self, known: ScoredModel | None, ml_fit: LikelihoodFit) -> ScoredModel:
+        """Return the model of a fit, or the one known of the same effects where that has more evidence.
+
+        The likelier one may validate worse: where two optima are about as likely after the training runs, as an event's at two
+        times, the validation runs decide.
+        """
+        if known is None:
+            return score_model(ml_fit, self.validation)
+        lead = ml_fit.log_likelihood - bic_penalty(ml_fit, self.validation) - known.training_evidence
+        if lead <= -RIVAL_LOG_ODDS or abs(lead) <= SAME_OPTIMUM:
+            return known
+        found = score_model(ml_fit, self.validation)
+        return found if found.log_evidence > known.log_evidence else known
+
+    def error_ratio(self, h: ScoredModel) -> float:
+        """Return a model's selection error over the noise floor."""
+        return h.selection_errors.over(self.floor)
+
+    def explained_share(self, before: ScoredModel, h: ScoredModel) -> float:
+        """Return the share of what a model leaves above the noise, on fitted and on unseen runs, that another explains."""
+        was, left = ((one.selection_errors, one.train) for one in (before, h))
+        return excess_share(was, left, self.floor)
+
+    def flown(self, h: ScoredModel) -> ScoredModel:
+        """Return a model with its output-error fit where that predicts the validation runs better, its errors computed."""
+        return prefer_output_error(h, self.floor).evaluate_errors()

@@ -1,0 +1,231 @@
+"""The move that adds: a model with each effect that passes the screens, fitted and scored; the best in other variants and laws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.acceptance import (
+    errs_less,
+    gains_any_evidence,
+    gains_evidence,
+    gains_training_evidence,
+    is_accepted,
+    leaves_error,
+    only_validation_shows,
+    worst_error,
+)
+from fieldsid.diagnosis.evidence.likelihood_fit import (
+    MIN_LIKELIHOOD_GAIN,
+    FittedProblem,
+    LikelihoodFit,
+    fit_output_error,
+    prefer_smaller_equivalent,
+)
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.search.add_effect import (
+    FOREMOST_EFFECTS,
+    MAX_EFFECTS_AT_BASE,
+    MAX_EFFECTS_LATER,
+    Addition,
+    SearchMove,
+    by_effects,
+    foremost,
+    is_redundant_start,
+    screen_addition,
+)
+from fieldsid.diagnosis.search.archive import Archive, Names
+from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.diagnosis.search.speed_law_search import under_other_law
+from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
+from fieldsid.diagnosis.search.variant_search import VariantRequest, try_variants
+from fieldsid.diagnosis.thresholds import (
+    MAIN_EXPLAINED_SHARE,
+    MAX_ERROR_RATIO,
+    MISSING_ERROR_RATIO,
+    RIVAL_LOG_ODDS,
+    SUFFICIENT_ERROR_RATIO,
+)
+from fieldsid.models.effect import Effect
+
+LEADING_CHILDREN = 3
+"""Best children whose left-out moves are evaluated too, and which may take their output-error fit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """The additions to one model: the archive that they are kept in, and the grounds that they are compared on."""
+
+    parent: ScoredModel
+    effects: Sequence[Effect]
+    tried: Archive
+    grounds: Grounds
+    may_refine: Callable[[], bool]
+    forced: bool = False
+    """Whether each effect is fitted from all its starts, whatever it promises."""
+
+    @property
+    def key(self) -> Names:
+        """The parent's effects."""
+        return frozenset(self.parent.names)
+
+    def grow(self) -> None:
+        """Put into the archive the parent with each effect that passes the screens."""
+        is_root, tried, floor = self.key == self.tried.known, self.tried, self.grounds.floor
+        tried.expanded.add(self.key)
+        flown = is_root or worst_error(self.parent, floor) >= MISSING_ERROR_RATIO
+        most = None if self.forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
+        found = screen_addition(Addition(self.parent, self.effects, most, flown, anew=is_root), self.grounds.parallel)
+        groups = by_effects(found)
+        later = self._evaluate(groups) if self.forced else self._evaluate_foremost(groups)
+        if only_validation_shows(self.parent, floor):
+            untried = [e for e in self.effects if self.key | {e.name} not in tried]
+            self._evaluate(by_effects(moves_of_all_runs(self.parent, untried, self.grounds.parallel)), every=True)
+        leading = {n for h in tried.children(self.key)[:LEADING_CHILDREN] for n in h.names if n not in self.key}
+        self._evaluate(by_effects([move for move in later if move.screened.effect.name in leading]), every=True)
+        if self._prefer_output_error(refit=True):
+            self._prefer_output_error(refit=False)
+        if self.may_refine():
+            self._try_laws_and_variants(self._leading())
+
+    def _evaluate_foremost(self, groups: Sequence[Sequence[SearchMove]]) -> list[SearchMove]:
+        """Evaluate the moves of the effects that promise most, then those of the others; return the starts left out.
+
+        Where the best child then leaves no visible error, of the others only what its effect may be mistaken for.
+        """
+        first = foremost(groups, FOREMOST_EFFECTS)
+        later = self._evaluate(first)
+        best = self.tried.children(self.key)[:1]
+        explained = [h for h in best if worst_error(h, self.grounds.floor) <= SUFFICIENT_ERROR_RATIO]
+        alike = {n for h in explained for e in h.effects if e.name not in self.key for n in e.mistaken_for}
+        others = [group for group in groups if group not in first]
+        return later + self._evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
+
+    def _evaluate(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
+        """Evaluate the moves to each set of effects; return those left out: an earlier start has reached their predicted cost.
+
+        `every` leaves none out. All moves are compared with the same rival, so that the result does not depend on their order.
+        """
+        rival = max((h.log_likelihood for h in self.tried.children(self.key)), default=-np.inf)
+
+        def evaluate_all(group: Sequence[SearchMove]) -> tuple[ScoredModel | None, list[FittedProblem], list[int]]:
+            found, free, later = self.tried.get(group[0].names), list[FittedProblem](), list[int]()
+            fits = [] if found is None else [found.likelihood_fit]
+            for i, move in enumerate(group):
+                if not every and fits and is_redundant_start(move, max(fits, key=lambda f: f.log_likelihood)):
+                    later.append(i)
+                    continue
+                fits.append(self._fitted(move, free, rival))
+                found = self.grounds.better(found, fits[-1])
+            return found and found.evaluate_errors(), free, later
+
+        left = []
+        for group, (found, free, later) in zip(groups, self.grounds.parallel.map(evaluate_all, groups), strict=True):
+            if found is not None:
+                self.tried[group[0].names] = found
+            self.tried.free_runs.setdefault(group[0].names, []).extend(free)
+            left += [group[i] for i in later]
+        return left
+
+    def _fitted(self, move: SearchMove, free: list[FittedProblem], rival: float) -> LikelihoodFit:
+        """Fit the model that a move leads to, by output error first where it was screened so, which joins `free`.
+
+        By maximum likelihood from there, and from the equivalent solution that has the same response at one speed.
+        """
+        screened, of_parent = move.screened, move.parent.likelihood_fit
+        self.grounds.report("+".join((*move.parent.names, screened.effect.name)))
+        start = screened.start
+        if move.by_output_error:
+            free.append(fit_output_error(screened.problem, start, of_parent.fitted.weights))
+            start = free[-1].x
+        ml_fit = self.grounds.fit(screened.problem, start, of_parent.noise, rival=rival)
+        return prefer_smaller_equivalent(ml_fit, screened.effect)
+
+    def _prefer_output_error(self, *, refit: bool) -> bool:
+        """Give the leading children with more evidence than their parent their output-error fit, where that validates better.
+
+        `refit`: beside that the parent is fitted again from the best child. Returns whether it was better so: then the children
+        are those before their output-error fits.
+        """
+        parent, leading = self.tried[self.key], self.tried.children(self.key)[:LEADING_CHILDREN]
+
+        def flown(child: ScoredModel) -> ScoredModel:
+            free = self.tried.free_runs.get(frozenset(child.names), ())
+            return prefer_output_error(child, self.grounds.floor, parent, free).evaluate_errors()
+
+        jobs: list[Callable[[], Any]] = [partial(self.grounds.fit_from, parent, child) for child in leading[:1] if refit]
+        again = len(jobs)
+        jobs += [partial(flown, child) for child in leading if child.log_evidence > parent.log_evidence]
+        done = self.grounds.parallel.map(lambda job: job(), jobs)
+        if again and self._takes_refit(done[0]):
+            return True
+        self.tried.update({frozenset(child.names): child for child in done[again:]})
+        return False
+
+    def _takes_refit(self, again: LikelihoodFit) -> bool:
+        """Keep the parent fitted again from its best child's parameters where that has more evidence; return whether it has.
+
+        The cost may have several local minima. The leading children are then fitted again from the new parameters.
+        """
+        parent = self.tried[self.key]
+        if again.log_likelihood <= parent.likelihood_fit.log_likelihood + MIN_LIKELIHOOD_GAIN:
+            return False
+        better = prefer_output_error(score_model(again, self.grounds.validation), self.grounds.floor)
+        if better.log_evidence <= parent.log_evidence:
+            return False
+        self.tried[self.key] = better
+        children = self.tried.children(self.key)[:LEADING_CHILDREN]
+        fits = self.grounds.parallel.map(lambda child: self.grounds.fit_from(child, better), children)
+        self.tried.update({frozenset(h.names): self.grounds.better(h, fit) for h, fit in zip(children, fits, strict=True)})
+        return True
+
+    def _leading(self) -> list[Names]:
+        """Return the best children, and the one with most evidence on the training runs, as far as they may come to lead.
+
+        A wrong speed law may hide the last on the validation runs.
+        """
+        children = self.tried.children(self.key)
+        best = sorted(children, key=lambda h: -h.training_evidence)[:1]
+        names = list(dict.fromkeys(frozenset(h.names) for h in (*children[:LEADING_CHILDREN], *best)))
+        if self.key == self.tried.known:
+            return [n for n in names if self._is_worth_refining(self.tried[n], children[0])]
+        return [frozenset(h.names) for h in children if self._stays_in_question(h, children[0])]
+
+    def _stays_in_question(self, h: ScoredModel, best: ScoredModel) -> bool:
+        """Whether a model is a rival of its best sibling by log evidence, or leaves clearly less of fitted and of unseen runs.
+
+        Its evidence may be lower only because its effect is there in another variant.
+        """
+        if best.log_evidence - h.log_evidence < RIVAL_LOG_ODDS:
+            return True
+        return leaves_error(best, self.grounds.floor) and errs_less(h, best, MAX_ERROR_RATIO)
+
+    def _is_worth_refining(self, h: ScoredModel, best: ScoredModel) -> bool:
+        """Whether a child may come to lead its best sibling in another variant or under another law.
+
+        Any may where that leaves a visible error. Where it leaves none, what explains less of the parent's than it leaves is not
+        the effect that is missing, in whatever variant.
+        """
+        if worst_error(best, self.grounds.floor) > SUFFICIENT_ERROR_RATIO or self._stays_in_question(h, best):
+            return True
+        return self.grounds.explained_share(self.tried[self.key], h) >= MAIN_EXPLAINED_SHARE
+
+    def _try_laws_and_variants(self, names: Sequence[Names]) -> None:
+        """Try another speed law and other variants of the effects for some children, kept where they have more evidence.
+
+        Where no child gains evidence over all runs and the parent's error is large all children are tried: the missing effect may
+        be any of them in another variant, whatever follows the training runs alone.
+        """
+        tried, parent = self.tried, self.tried[self.key]
+        large = self.grounds.error_ratio(parent) > MISSING_ERROR_RATIO
+        lost = large and not any(gains_evidence(parent, tried[n]) for n in names)
+        names = [frozenset(c.names) for c in tried.children(self.key)] if lost else names
+        # forms of what the parent has were tried on it: the best child tries them again, and the one that goes on
+        foremost = {*names[:1], *[n for n in names if is_accepted(parent, tried[n])][:1]}
+        helping = [n for n in names if lost or gains_any_evidence(parent, tried[n])]
+        under_other_law([n for n in names if gains_training_evidence(parent, tried[n])], tried, self.grounds)
+        try_variants([VariantRequest(tried[n], None if n in foremost else n - self.key) for n in helping], tried, self.grounds)

@@ -1,0 +1,48 @@
+"""The second entry of a search: the whole hull, with the effects that every vehicle has, fitted at once.
+
+Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn. Steps
+from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another whatever
+each is worth alone, each from the best few of its scan points at the fit before it; what the data do not show is dropped again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
+from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.search.add_effect import likelihood_linearisation
+from fieldsid.diagnosis.search.archive import Archive
+from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, screen_points
+from fieldsid.models.effect import Effect
+
+HULLS_OWN = ("sway_coupling", "heave_coupling", "servo_lag", "quadratic_damping", "speed_varying")
+"""The effects that every hull has, in the order in which they are added: the cross state changes the others' numbers most."""
+STARTS = 3
+"""Scan points, those that promise most to first order, that each of them is fitted from."""
+
+
+def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, grounds: Grounds) -> ScoredModel:
+    """Return the base with the effects of HULLS_OWN that are among some effects; every set on the way is kept in the archive."""
+    h = base
+    for effect in sorted((e for e in effects if e.name in HULLS_OWN), key=lambda e: HULLS_OWN.index(e.name)):
+        fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
+        if fits:
+            key = frozenset((*h.names, effect.name))
+            h = tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
+    return h
+
+
+def _fits_with(h: ScoredModel, effect: Effect, grounds: Grounds) -> list[LikelihoodFit]:
+    """Return the fits of a model with one effect more, from each of its starts."""
+    grounds.report("+".join((*h.names, effect.name)))
+    at, noise = likelihood_linearisation(h), h.likelihood_fit.noise
+
+    def fit(point: ScreenResult) -> LikelihoodFit:
+        started = backtrack(at, point)
+        return grounds.fit(started.problem, started.start, noise)
+
+    return grounds.parallel.map(fit, screen_points(at, effect)[:STARTS])
