@@ -26,7 +26,7 @@ from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, resi
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
-from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, names_added, probabilities, verdict_of, worsens
+from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, left_of, names_added, probabilities, verdict_of, worsens
 from fieldsid.effects import all_effects, apart_from
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.fitting.fit_runs import records_of
@@ -168,6 +168,7 @@ def _diagnosis(
             *([SEARCH_ENDED] if work.budget.is_exhausted and work.leaves_unexplained() else []),
         ),
         noiseless=work.is_noiseless,
+        left=left_of(work, named, found, end.residual_tests, floor),
     )
 
 
@@ -255,6 +256,12 @@ def body_of(d: Diagnosis) -> dict[str, Any]:
         "final": _pair(d.final),
         "noise_floor": {"angle_rad": d.noise_floor.angle, "rate_rad_s": d.noise_floor.rate},
         "noiseless": d.noiseless,
+        "left": {
+            "ratio": d.left.ratio,
+            "unexplained": d.left.unexplained,
+            "where": d.left.where or None,
+            "moves_with": d.left.moves_with or None,
+        },
         "candidates": [
             {
                 "effect": c.effect,

@@ -82,6 +82,29 @@ class Candidate(Displayed):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
+class Left(Brief):
+    """What remains beside the named effects, or of the base where none is named.
+
+    `ratio`: the free-run error over the noise floor, of fitted or of unseen runs, whichever is larger. `unexplained`: it is
+    visible, and its innovations are no disturbance's. It is largest in `run` from `start_s` to `end_s`, `burst` times the
+    average, and follows `moves_with`, empty where no test says so.
+    """
+
+    ratio: float
+    unexplained: bool
+    run: str = ""
+    start_s: float = float("nan")
+    end_s: float = float("nan")
+    burst: float = 1.0
+    moves_with: str = ""
+
+    @property
+    def where(self) -> str:
+        """The place in words; empty where nothing is left."""
+        return f"{self.run} at {self.start_s:.0f}-{self.end_s:.0f} s" if self.run else ""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Diagnosis(Plotted):
     """The verdict, what led to it, and the model with the named effects added.
 
@@ -103,3 +126,4 @@ class Diagnosis(Plotted):
     skipped: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
     noiseless: bool = False
+    left: Left = Left(float("nan"), unexplained=False)

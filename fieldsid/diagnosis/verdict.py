@@ -19,6 +19,7 @@ from fieldsid.diagnosis.evidence.acceptance import (
 )
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
+from fieldsid.diagnosis.records import Left
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import (
@@ -59,7 +60,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     better leaves a visible error on the validation runs that is no smaller than without it, or explains less of a large one, that
     of all runs, than it leaves: a lag of a sample may be there, and is not what is missing. And so it is where an effect that
     leaves a visible error has nothing to add for a rival by evidence. Where what is left surely follows something else that was
-    measured, a moment of the water is not named, as that of a hull's roll swings as a wave's does, nor what leaves a large error.
+    measured, a moment of the water is not named, as that of a hull's roll swings as a wave's does.
     """
     floor = reported_noise_floor(search.floor, ml_fit.noise)
     was, now = compared_errors(search.base(), found, floor)
@@ -78,7 +79,7 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     more = SHARES_TO_EXPLAIN_MISSING if error <= FAR_ERROR_RATIO else SHARES_TO_EXPLAIN_FAR
     asked = (*SHARES_TO_EXPLAIN, *(more if large else ()))
     added = [e for e in found.effects if e.name not in search.known]
-    follows = 3.0 * left.signals < CERTAIN_P_VALUE and (large or any(e.is_of_the_water for e in added))
+    follows = 3.0 * left.signals < CERTAIN_P_VALUE and any(e.is_of_the_water for e in added)
     if follows or (visible and any(left.p < p and share < enough for enough, p in asked)):
         return Verdict("unexplained", ())
     rivals = rivals_of(search, found)
@@ -87,12 +88,29 @@ def verdict_of(search: Search, found: ScoredModel, left: ResidualTests, ml_fit: 
     return Verdict("effect", added_effects(search, found))
 
 
+def left_of(search: Search, named: ScoredModel, found: ScoredModel, tests: ResidualTests, floor: Noise) -> Left:
+    """Return what a named model leaves over a noise floor; `tests` are those of the model found, which may hold more effects.
+
+    What the tests pass for a disturbance is not unexplained, unless it is on the unseen runs alone or more than any sea leaves.
+    """
+    ratio = worst_error(named, floor)
+    if ratio <= SUFFICIENT_ERROR_RATIO:
+        return Left(ratio, unexplained=False)
+    odd = named is not found or _is_no_disturbance(named, tests, floor)
+    moves_with = tests.moves_with if 3.0 * tests.dependence < MIN_P_VALUE else ""
+    return Left(ratio, odd, tests.worst_run, tests.worst_start_s, tests.worst_end_s, tests.worst_ratio, moves_with)
+
+
 def _unnamed(found: ScoredModel, left: ResidualTests, floor: Noise) -> Verdict:
     """Return the verdict where no effect lowers the error that models are selected by: `disturbed`, or `unexplained`."""
-    worst = worst_error(found, floor)
-    p = 3.0 * left.dependence if worst < GUSTY_ERROR_RATIO else left.p
-    odd = p < MIN_P_VALUE or worst > FAR_ERROR_RATIO or validation_error_ratio(found, floor) > MAX_VALIDATION_ERROR_RATIO
-    return Verdict("unexplained" if odd else "disturbed", ())
+    return Verdict("unexplained" if _is_no_disturbance(found, left, floor) else "disturbed", ())
+
+
+def _is_no_disturbance(h: ScoredModel, tests: ResidualTests, floor: Noise) -> bool:
+    """Whether what a model leaves follows the motion, is more than any sea leaves, or far more on the unseen runs."""
+    worst = worst_error(h, floor)
+    p = 3.0 * tests.dependence if worst < GUSTY_ERROR_RATIO else tests.p
+    return p < MIN_P_VALUE or worst > FAR_ERROR_RATIO or validation_error_ratio(h, floor) > MAX_VALIDATION_ERROR_RATIO
 
 
 def names_added(search: Search, h: ScoredModel) -> list[str]:

@@ -38,7 +38,7 @@ class Grounds:
     report: Callable[[str], None]
 
     def fit(self, problem: Problem, x: FloatArray, noise: Noise, *, rival: float = -np.inf) -> LikelihoodFit:
-        """Return the maximum-likelihood fit from x and a noise, stopped early where it cannot reach the log likelihood `rival`."""
+        """Return the maximum-likelihood fit from x and a noise; stopped early where it cannot reach a log likelihood, `rival`."""
         return fit_maximum_likelihood(problem, x, noise, self.resolution_floor, self.noise_kind, rival=rival)
 
     def fit_from(self, h: ScoredModel, other: ScoredModel) -> LikelihoodFit:

@@ -1,4 +1,4 @@
-"""The move that adds: a model with each effect that passes the screens, fitted and scored; the best in other variants and laws."""
+"""The move that adds: a model with each effect that passes the screens; the best in other variants and under other laws."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
     gains_any_evidence,
     gains_evidence,
     gains_training_evidence,
-    is_accepted,
     leaves_error,
     only_validation_shows,
     worst_error,
@@ -224,8 +223,6 @@ class Growth:
         large = self.grounds.error_ratio(parent) > MISSING_ERROR_RATIO
         lost = large and not any(gains_evidence(parent, tried[n]) for n in names)
         names = [frozenset(c.names) for c in tried.children(self.key)] if lost else names
-        # forms of what the parent has were tried on it: the best child tries them again, and the one that goes on
-        foremost = {*names[:1], *[n for n in names if is_accepted(parent, tried[n])][:1]}
         helping = [n for n in names if lost or gains_any_evidence(parent, tried[n])]
         under_other_law([n for n in names if gains_training_evidence(parent, tried[n])], tried, self.grounds)
-        try_variants([VariantRequest(tried[n], None if n in foremost else n - self.key) for n in helping], tried, self.grounds)
+        try_variants([VariantRequest(tried[n], n - self.key) for n in helping], tried, self.grounds)

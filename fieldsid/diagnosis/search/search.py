@@ -97,6 +97,8 @@ class Search:
         """Add an effect to a model, and drop one from the model that leads then."""
         self.grow(h)
         drop_each(self.tried.most_evident(), self.tried, self.grounds)
+        if self.may_go_on():
+            try_variants([VariantRequest(self.tried.most_evident())], self.tried, self.grounds)
         self.share_own_moments()
         self.lower_floor(self.best_admissible())
 
