@@ -26,7 +26,16 @@ from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, resi
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
-from fieldsid.diagnosis.verdict import Verdict, added_effects, excess_explained, left_of, names_added, probabilities, verdict_of, worsens
+from fieldsid.diagnosis.verdict import (
+    Verdict,
+    added_effects,
+    excess_explained,
+    left_of,
+    names_added,
+    probabilities,
+    verdict_of,
+    worsens,
+)
 from fieldsid.effects import all_effects, apart_from
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.fitting.fit_runs import records_of

@@ -1,9 +1,9 @@
 """The search over sets of effects: one best-first queue over one archive, entered from the bare model and from the whole hull.
 
-A model that is taken from the queue is expanded: an effect is added to it, the best of what comes of that is tried in other variants
-and under other laws of the speed, and what leads then is fitted without each of its effects. Two entries lead to the same sets from
-below and from above, and of each set the better optimum is kept, wherever it came from. At the end what is found is fitted without
-each of its effects until none is idle.
+A model that is taken from the queue is expanded: an effect is added to it, the best of what comes of that is tried in other
+variants and under other laws of the speed, and what leads then is fitted without each of its effects. Two entries lead to the same
+sets from below and from above, and of each set the better optimum is kept, wherever it came from. At the end what is found is
+fitted without each of its effects until none is idle.
 """
 
 from __future__ import annotations
@@ -225,14 +225,10 @@ class Search:
 
     def _accepted_sets(self) -> AcceptedSets:
         """Return the accepted sets, worked out again only where a model or the floor has changed."""
-        at = (self.floor, *self.tried.values())
-        if (
-            self._accepted is None
-            or len(at) != len(self._accepted[0])
-            or any(a is not b for a, b in zip(at, self._accepted[0], strict=True))
-        ):
-            self._accepted = at, AcceptedSets.of(self.tried, self.floor)
-        return self._accepted[1]
+        at, known = (self.floor, *self.tried.values()), self._accepted
+        if known is None or len(at) != len(known[0]) or any(a is not b for a, b in zip(at, known[0], strict=True)):
+            known = self._accepted = at, AcceptedSets.of(self.tried, self.floor)
+        return known[1]
 
     def admissible(self, h: ScoredModel) -> bool:
         """Whether every effect of a model is accepted."""
