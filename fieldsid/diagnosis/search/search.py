@@ -1,9 +1,9 @@
 """The search over sets of effects: one best-first queue over one archive, entered from the bare model and from the whole hull.
 
 A model that is taken from the queue is expanded: an effect is added to it, the best of what comes of that is tried in other
-variants and under other laws of the speed, and what leads then is fitted without each of its effects. Two entries lead to the same
-sets from below and from above, and of each set the better optimum is kept, wherever it came from. At the end what is found is
-fitted without each of its effects until none is idle.
+variants and under other laws of the speed, and what leads then is fitted without each of its effects. The two entries lead to the
+same sets from below and from above, and of each set the better optimum is kept, wherever it came from. At the end what is found
+is fitted without each of its effects until none is idle.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The second entry of a search: the whole hull, with the effects that every vehicle has, fitted at once.
 
-Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn. Steps
-from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another whatever
-each is worth alone, each from the best few of its scan points at the fit before it; what the data do not show is dropped again.
+Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn.
+Steps from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another
+whatever each is worth alone, each from the best few of its scan points at the fit before it; what the data do not show is dropped
+again.
 """
 
 from __future__ import annotations
