@@ -21,10 +21,10 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Pair
 from fieldsid.diagnosis.report.final_model import final_model
 from fieldsid.diagnosis.report.next_maneuver import next_maneuver
-from fieldsid.diagnosis.report.report_text import evidence, headline
+from fieldsid.diagnosis.report.report_text import apart_from_the_hulls_own, evidence, headline
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests, residual_tests
 from fieldsid.diagnosis.search.noiseless_search import noiseless_search
-from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
 from fieldsid.diagnosis.thresholds import MAIN_EXPLAINED_SHARE, RIVAL_PROBABILITY_RATIO
 from fieldsid.diagnosis.verdict import (
     Verdict,
@@ -48,7 +48,6 @@ from fieldsid.models.effect import effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record, left_out
 
-MAX_CANDIDATES_SHOWN = 8
 SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
 )
@@ -137,12 +136,12 @@ def _search_result(work: Search, found: ScoredModel, ml_fit: LikelihoodFit, verd
         partial(refitted, found),
         partial(residual_tests, ml_fit),
         partial(where_of, base, work.validation or work.records),
-        *(partial(getattr, h, "errors") for h in shown[:MAX_CANDIDATES_SHOWN]),
+        *(partial(getattr, h, "errors") for h in shown[:MAX_CANDIDATES]),
         *([partial(refitted, base)] if found is not base else []),
     ]
     done = work.parallel.map(lambda part: part(), parts)
     own, left, places = done[:3]
-    errors, of_base = done[3 : 3 + len(shown[:MAX_CANDIDATES_SHOWN])], own if found is base else done[-1]
+    errors, of_base = done[3 : 3 + len(shown[:MAX_CANDIDATES])], own if found is base else done[-1]
     verdict = verdict or verdict_of(work, found, left, ml_fit)
     return _SearchResult(work, found, ml_fit, left, verdict, (of_base, own), places, shown, errors)
 
@@ -156,11 +155,14 @@ def _diagnosis(
     (base_model, _), (model, flown) = end.models if named is found else (end.models[0], end.models[0])
     floor = reported_noise_floor(work.floor, end.ml_fit.noise)
     where, diverged = end.places
+    left = left_of(work, named, found, end.residual_tests, floor)
+    sentence = headline(work, verdict, found, end.residual_tests, left, floor, end.ml_fit.noise)
     return Diagnosis(
         axis=work.axis,
         verdict=verdict.word,
         effects=added_effects(work, named),
-        says=headline(work, verdict, found, end.residual_tests, floor, end.ml_fit.noise),
+        says=sentence.full,
+        short=sentence.short,
         base=base.errors,
         final=named.errors,
         noise_floor=floor,
@@ -177,7 +179,7 @@ def _diagnosis(
             *([SEARCH_ENDED] if work.budget.is_exhausted and work.leaves_unexplained() else []),
         ),
         noiseless=work.is_noiseless,
-        left=left_of(work, named, found, end.residual_tests, floor),
+        left=left,
     )
 
 
@@ -260,7 +262,9 @@ def body_of(d: Diagnosis) -> dict[str, Any]:
         "axis": d.axis.value,
         "verdict": d.verdict,
         "says": d.says,
+        "short": d.short,
         "effects": list(d.effects),
+        "unusual": list(apart_from_the_hulls_own(d.effects)[0]),
         "base": _pair(d.base),
         "final": _pair(d.final),
         "noise_floor": {"angle_rad": d.noise_floor.angle, "rate_rad_s": d.noise_floor.rate},

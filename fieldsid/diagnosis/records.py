@@ -108,6 +108,7 @@ class Left(Brief):
 class Diagnosis(Plotted):
     """The verdict, what led to it, and the model with the named effects added.
 
+    `says` is the verdict in a sentence, `short` the same with the effects by their names alone.
     `noiseless`: the logs show almost no noise, so that errors are told in their units and not over the noise floor.
     """
 
@@ -115,6 +116,7 @@ class Diagnosis(Plotted):
     verdict: str
     effects: tuple[str, ...]
     says: str
+    short: str
     base: Pair
     final: Pair
     noise_floor: Noise

@@ -12,7 +12,7 @@ from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named, times, used
 from fieldsid.cli.voice import shown_in
 from fieldsid.comparison.sufficient import is_noise
-from fieldsid.rounding import MANY, number, probability
+from fieldsid.rounding import MANY, number
 
 MODELS = "models"
 LEAST_TO_SPARE_ONE = 3
@@ -39,7 +39,7 @@ def of_diagnosis(body: Body, searched: Searched) -> Headline:
     """Return the verdict with its numbers and probability."""
     sure = _sure(body) if body["verdict"] in ("effect", "undecided") else ""
     rests = f"{_judged(body)}; {counted(len(body['candidates']), 'hypothesis', 'hypotheses')} compared"
-    return Headline(f"{body['verdict']}: {_short(body)}{sure}", rests, _after(body, searched))
+    return Headline(f"{body['verdict']}: {body['short']}{sure}", rests, _after(body, searched))
 
 
 def _judged(body: Body) -> str:
@@ -55,20 +55,13 @@ def _judged(body: Body) -> str:
 
 
 def _sure(body: Body) -> str:
-    """Return how probable the first candidate is; the evidence is no judge where it is for another, as in a log without noise."""
-    first, *others = (float(c["probability"]) for c in body["candidates"])
-    if any(p > first for p in others):
+    """Return how clear the first candidate is; the evidence is no judge where it is for another, as in a log without noise."""
+    first, *others = body["candidates"]
+    if any(float(c["probability"]) > float(first["probability"]) for c in others):
         return "; named by the error on unseen runs, not by the evidence"
-    return f", probability {probability(first)}"
-
-
-def _short(body: Body) -> str:
-    """Return the sentence of a verdict with the effects by their names alone; what each is stands in the whole sentence."""
-    says = str(body["says"])
-    before, end, after = says.rpartition("): ")
-    return (
-        f"{' and '.join(body['effects'])}: {after}" if body["effects"] and end and before.startswith(body["effects"][0]) else says
-    )
+    behind = [(float(first["log_evidence"]) - float(c["log_evidence"]), str(c["effect"])) for c in others]
+    nats, name = min((one for one in behind if one[0] > 0.0), default=(0.0, ""))
+    return f"; next best: {name}, {nats:.0f} nats behind" if name else ""
 
 
 def _after(body: Body, of: Searched) -> str:

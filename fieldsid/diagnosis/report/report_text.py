@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio, worst_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.diagnosis.records import Errors, Left, Pair
 from fieldsid.diagnosis.residual_tests.residual_tests import ResidualTests
 from fieldsid.diagnosis.search.search import Search
+from fieldsid.diagnosis.search.whole_hull import HULLS_OWN
 from fieldsid.diagnosis.thresholds import (
     EQUAL_ERROR_RATIO,
     MAX_ERROR_RATIO,
@@ -47,30 +51,71 @@ def lower_on(errors: Pair, base: Pair, floor: Noise) -> tuple[int, int]:
     return sum(EQUAL_ERROR_RATIO * now.over(floor) < was.over(floor) for now, was in pairs), len(pairs)
 
 
-def headline(search: Search, verdict: Verdict, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """The verdict in a sentence: in full, with what each effect does, and in short, with the effects by their names alone."""
+
+    full: str
+    short: str
+
+
+def headline(
+    search: Search, verdict: Verdict, found: ScoredModel, tests: ResidualTests, left: Left, floor: Noise, noise: Noise
+) -> Sentence:  # fmt: skip
     """Return the verdict in a sentence."""
+    if verdict.word in ("effect", "undecided"):
+        return _named(search, verdict, found, left, floor)
     error, base = found.selection_errors.over(floor), sized(search, search.base(), floor)
-    runs = "unseen runs" if search.validation else "the runs it was fitted to"
     if verdict.word == "sufficient":
         tail = f"; a disturbance of {noise.disturbance:.2g} rad/s^2 is there" if noise.disturbance > DISTURBED else ""
-        return f"nothing to add: the model predicts {runs} at {error:.2f} x the noise floor{tail}"
-    if verdict.word == "disturbed":
-        minor = names_added(search, found)
-        if not minor:
-            return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
-        leaves = "leaves" if len(minor) == 1 else "leave"
-        beside = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
-        return f"what is left, {base}, is for the most part {_disturbance(noise)}; {beside}"
-    if verdict.word == "unexplained":
-        return _unexplained(search, found, left, floor, noise)
-    names = " and ".join(verdict.effects)
-    says = "; ".join(_says(found, n) for n in verdict.effects)
-    fall = _fall(search, found, floor, runs)
+        says = f"nothing to add: the model predicts {_judged(search)} at {error:.2f} x the noise floor{tail}"
+    elif verdict.word == "disturbed":
+        says = _disturbed(search, found, floor, noise, base)
+    else:
+        says = _unexplained(search, found, tests, floor, noise)
+    return Sentence(says, says)
+
+
+def _judged(search: Search) -> str:
+    return "unseen runs" if search.validation else "the runs it was fitted to"
+
+
+def _disturbed(search: Search, found: ScoredModel, floor: Noise, noise: Noise, base: str) -> str:
+    minor = names_added(search, found)
+    if not minor:
+        return f"no effect of the catalogue is missing: what is left, {base}, is {_disturbance(noise)}"
+    leaves = "leaves" if len(minor) == 1 else "leave"
+    beside = f"{' and '.join(minor)} may be there besides, and {leaves} {sized(search, found, floor)}"
+    return f"what is left, {base}, is for the most part {_disturbance(noise)}; {beside}"
+
+
+def _named(search: Search, verdict: Verdict, found: ScoredModel, left: Left, floor: Noise) -> Sentence:
+    """Return what was found, apart from what every hull has; how the error falls with it; and what is left besides."""
+    unusual, own = apart_from_the_hulls_own(verdict.effects)
+    with_own = f"with the hull's own {', '.join(own)}" if own else ""
+    names = " ".join(part for part in (" and ".join(unusual), with_own) if part) if unusual else " and ".join(own)
+    says = "; ".join(_says(found, n) for n in (*unusual, *own))
+    fall = _fall(search, found, floor, _judged(search))
     if verdict.word == "undecided":
         others = {"+".join(names_added(search, r)): r for r in verdict.rivals}
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
-        return f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
-    return f"{names} ({says}): {fall}"
+        both = f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
+        return Sentence(both, both)
+    rest = _rest(left)
+    return Sentence(f"{names} ({says}): {fall}{rest}", f"{names}: {fall}{rest}")
+
+
+def apart_from_the_hulls_own(effects: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the effects that are unusual, and those that every hull has."""
+    return tuple(n for n in effects if n not in HULLS_OWN), tuple(n for n in effects if n in HULLS_OWN)
+
+
+def _rest(left: Left) -> str:
+    """Return what is left that nothing in the catalogue explains, and where; empty where nothing is."""
+    if not left.unexplained:
+        return ""
+    follows = f", and moves with {left.moves_with}" if left.moves_with else ""
+    return f"; {left.ratio:.2g} x is left that nothing in the catalogue explains: it is largest in {left.where}{follows}"
 
 
 def _unexplained(search: Search, found: ScoredModel, left: ResidualTests, floor: Noise, noise: Noise) -> str:

@@ -32,6 +32,7 @@ from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.drop_effect import drop_each
 from fieldsid.diagnosis.search.grounds import Grounds
 from fieldsid.diagnosis.search.grow import Growth
+from fieldsid.diagnosis.search.refit import refit_from_parts
 from fieldsid.diagnosis.search.speed_law_search import error_product, fit_base_output_error, other_speed_law, speed_laws
 from fieldsid.diagnosis.search.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.search.whole_hull import whole_hull
@@ -45,6 +46,9 @@ from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
 from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
+
+MAX_CANDIDATES = 8
+"""Models that a diagnosis shows beside the base."""
 
 
 @dataclass(slots=True)
@@ -86,12 +90,17 @@ class Search:
         if self.leaves_visible_error():
             hull = whole_hull(self.base(), self.catalogue, self.tried, self.grounds)
             drop_each(hull, self.tried, self.grounds)
-            self.expand(hull)
+            self.share_own_moments()
         while (leading := self._next_to_expand()) is not None:
             self.expand(leading)
-        while drop_each(found := self.best_admissible(), self.tried, self.grounds):
+        while drop_each(self.best_admissible(), self.tried, self.grounds) or self._refit_leading():
             self.share_own_moments()
-        return found
+        return self.best_admissible()
+
+    def _refit_leading(self) -> bool:
+        """Fit again from their parts the models that a table shows, where those are likelier; return whether one was better so."""
+        leading = [self.best_admissible(), *self.tried.ranked()[:MAX_CANDIDATES]]
+        return refit_from_parts(list({frozenset(h.names): h for h in leading}.values()), self.tried, self.grounds)
 
     def expand(self, h: ScoredModel) -> None:
         """Add an effect to a model, and drop one from the model that leads then."""
