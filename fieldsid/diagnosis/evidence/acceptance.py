@@ -125,14 +125,6 @@ def gains_training_evidence(without: ScoredModel, with_: ScoredModel) -> bool:
     return with_.log_likelihood - without.log_likelihood > with_.trial_penalty - without.trial_penalty
 
 
-def lacks(h: ScoredModel, best: ScoredModel) -> float:
-    """Return the log evidence that one model lacks to another, or what it lacks on the training runs alone in proportion to all.
-
-    The least of the two: what follows the training runs as the other does will mostly follow the validation runs as well.
-    """
-    return min(best.log_evidence - h.log_evidence, (best.training_evidence - h.training_evidence) / h.training_share)
-
-
 def worst_error(h: ScoredModel, floor: Noise) -> float:
     """Return the error over a noise floor on the validation or on the training runs, whichever is larger."""
     return max(h.selection_errors.over(floor), h.train.over(floor))

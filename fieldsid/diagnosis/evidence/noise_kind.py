@@ -7,8 +7,6 @@ missing.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 from fieldsid.diagnosis.data.noise_floor import reported_noise_floor
 from fieldsid.diagnosis.evidence.likelihood_fit import (
     MIN_LIKELIHOOD_GAIN,
@@ -59,24 +57,6 @@ def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:
     )
     both = max(ends, key=lambda j: j.log_likelihood)
     return both if both.log_likelihood > least else own
-
-
-def fit_other_noise(
-    h: ScoredModel, floor: Noise, noise_kinds_tried: Collection[str], parallel: ParallelMap
-) -> LikelihoodFit | None:
-    """Return a model under a kind of noise that no search has used yet, where that is likelier; None where none is.
-
-    Both kinds together are tried only where the sensor noise of the fit is coloured.
-    """
-    own = h.likelihood_fit
-    for noise_kind in (f for f in SINGLE_NOISE_KINDS if f not in noise_kinds_tried):
-        ml_fit = fit_maximum_likelihood(own.fitted.problem, own.fitted.x, floor, own.floor, noise_kind)
-        if ml_fit.log_likelihood > own.log_likelihood + ALTERNATIVE_LOG_ODDS:
-            return ml_fit
-    if JOINT_NOISE in noise_kinds_tried or not has_sensor_colour(own):
-        return None
-    both = joint_noise_fit(own, parallel)
-    return None if both is own else both
 
 
 def has_sensor_colour(ml_fit: LikelihoodFit) -> bool:

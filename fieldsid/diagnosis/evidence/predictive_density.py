@@ -84,17 +84,6 @@ def log_predictive_density(
     return max(found, key=lambda v: float(v[0].sum()))
 
 
-def most_log_density(records: Sequence[Record], floor: Noise) -> float:
-    """Return the log density of runs of which a model leaves a white residual of a floor's size: but for chance the highest."""
-    return float(
-        sum(
-            -np.count_nonzero(ok) * (0.5 + np.log(sigma))
-            for r in records
-            for ok, sigma in zip(r.ok, (floor.angle, floor.rate), strict=True)
-        )
-    )
-
-
 def _differ(plain: Sequence[FloatArray], led: Sequence[FloatArray], floor: Noise) -> bool:
     """Whether two sets of residuals differ by more than the noise could resolve."""
     sigma = np.array([[floor.angle], [floor.rate]])

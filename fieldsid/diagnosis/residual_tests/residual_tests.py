@@ -15,10 +15,8 @@ from math import factorial
 import numpy as np
 
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
-from fieldsid.diagnosis.evidence.noise_kind import joint_noise_fit
-from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.residual_tests.memory_score_test import memory_score_test
-from fieldsid.diagnosis.thresholds import COLOUR_P_EXPONENT, MIN_P_VALUE
+from fieldsid.diagnosis.thresholds import COLOUR_P_EXPONENT
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.models.model import Noise
 from fieldsid.models.record import Record
@@ -92,11 +90,6 @@ def residual_tests(ml_fit: LikelihoodFit) -> ResidualTests:
         ratio,
         name,
     )
-
-
-def residuals_reject(ml_fit: LikelihoodFit, parallel: ParallelMap) -> bool:
-    """Whether the residual tests reject that a fit's residuals are a disturbance or coloured sensor noise."""
-    return residual_tests(joint_noise_fit(ml_fit, parallel)).p < MIN_P_VALUE
 
 
 def _training(ml_fit: LikelihoodFit) -> list[Innovations]:

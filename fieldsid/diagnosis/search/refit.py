@@ -1,4 +1,4 @@
-"""The better optimum of a set from its parts: a model holds the optimum of each set of one effect fewer, and is never less likely."""
+"""The better optimum of a set from its parts: a model holds the optimum of each set of one effect fewer."""
 
 from __future__ import annotations
 

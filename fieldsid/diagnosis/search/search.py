@@ -93,12 +93,30 @@ class Search:
             self.share_own_moments()
         while (leading := self._next_to_expand()) is not None:
             self.expand(leading)
-        while drop_each(self.best_admissible(), self.tried, self.grounds) or self._refit_leading():
+        while self._eliminate(found := self.best_admissible()):
             self.share_own_moments()
-        return self.best_admissible()
+        return found
+
+    def _eliminate(self, found: ScoredModel) -> bool:
+        """Fit what is found without each of its effects, the others in their variants; return whether anything was fitted.
+
+        An effect may stand for a variant of another: a dead time for the inertia of a servo.
+        """
+        if drop_each(found, self.tried, self.grounds):
+            asked = []
+            for gone, without in self.tried.without_each(found):
+                alike = {e.name for e in without.effects if e.name in self._mistaken_for(gone) and e.variants}
+                asked += [VariantRequest(without, alike)] if alike else []
+            try_variants(asked, self.tried, self.grounds)
+            return True
+        return self._refit_leading()
+
+    def _mistaken_for(self, name: str) -> set[str]:
+        """Return the effects that one of the catalogue may be mistaken for."""
+        return {n for e in self.catalogue if e.name == name for n in e.mistaken_for}
 
     def _refit_leading(self) -> bool:
-        """Fit again from their parts the models that a table shows, where those are likelier; return whether one was better so."""
+        """Fit the models that a table shows again from their parts, where those are likelier; return whether that was better."""
         leading = [self.best_admissible(), *self.tried.ranked()[:MAX_CANDIDATES]]
         return refit_from_parts(list({frozenset(h.names): h for h in leading}.values()), self.tried, self.grounds)
 
