@@ -82,9 +82,6 @@ def simulate(
     parts = effects_of(model) if effects is None else effects
     values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
     values["damping_exponent"] = model.law.damping_exponent
-    for effect in parts:
-        if effect.stand_in is not None and record.measures(effect.needs):
-            values = {n: v for n, v in values.items() if n not in effect.stand_in.units}
     if state is None:
         state = (
             float(record.angle[np.argmax(record.angle_ok)]),
@@ -125,7 +122,7 @@ def command_record(
     """
     t = np.ascontiguousarray(time, dtype=np.float64)
     seen = np.full(t.size, measures)
-    steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth", "cross")} | {"surge": np.full(t.size, speed)}
+    steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth")} | {"surge": np.full(t.size, speed)}
     return Record(
         name=name,
         axis=axis,
@@ -137,6 +134,8 @@ def command_record(
         rate=np.zeros(t.size),
         angle_ok=seen,
         rate_ok=seen,
+        cross=np.zeros(t.size),
+        cross_ok=np.zeros(t.size, dtype=bool),
         signals=MappingProxyType(steady | dict(signals)),
         speed=speed,
     )
