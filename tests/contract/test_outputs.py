@@ -1,6 +1,6 @@
 """Outputs are outputs: what the hull's own motion makes is measured, and never drives the motion that made it.
 
-Angle, rate, sway and heave are outputs of a model; surge and depth, as far as they are inputs, act through their own channel alone.
+Angle, rate, sway and heave are outputs of a model; surge and depth, as far as they are inputs, act through their own channel.
 """
 
 from __future__ import annotations
@@ -65,9 +65,7 @@ def column_of(channel: str, axis: Axis) -> str:
 def motion(effect: Effect, axis: Axis, record: Record) -> np.ndarray:
     """The free run of a fixed model from a fixed state along a record, angle, rate, cross state and fin (4, n)."""
     values = BASE[axis] | effect.starts()
-    model = Model(
-        axis, (effect.name,), values, {}, tuple(values), np.zeros((len(values),) * 2), SpeedLaw(1.5), Noise(0.01, 0.01)
-    )
+    model = Model(axis, (effect.name,), values, {}, tuple(values), np.zeros((len(values),) * 2), SpeedLaw(1.5), Noise(0.01, 0.01))
     path = simulate(model, record, state=(0.1, -0.05, 0.02), effects=(effect,))
     return np.array([path.angle, path.rate, path.cross, path.fin])
 

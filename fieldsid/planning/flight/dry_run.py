@@ -17,7 +17,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.operating_point import OperatingPoint, autopilot_of, operating_point
 
 Helpers = Callable[[FloatArray], Mapping[str, FloatArray]]
-"""helpers(time (n,) s) -> helper signals (n,) by role: surge, thrust, roll, depth, cross."""
+"""helpers(time (n,) s) -> helper signals (n,) by role: surge, thrust, roll, depth."""
 
 
 class ModelPlant:
