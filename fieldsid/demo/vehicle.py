@@ -76,7 +76,6 @@ def varied(role: str, time: FloatArray, speed: float) -> FloatArray:
         "thrust": 50.0 * (1.0 + 0.4 * np.sign(np.sin(2 * np.pi * time / 11.0))),
         "roll": 0.15 * np.sin(2 * np.pi * time / 9.0),
         "depth": 3.0 + 2.0 * np.sin(2 * np.pi * time / 25.0),
-        "cross": 0.2 * speed * np.sin(2 * np.pi * time / 7.0),
     }
     return np.asarray(shapes[role])
 

@@ -14,7 +14,7 @@ from operator import attrgetter
 import numpy as np
 
 from fieldsid.dynamics import integrate
-from fieldsid.models.axis import Axis
+from fieldsid.dynamics.places import CONSTANTS, CROSS_DAMPING, CROSS_RATE, DRIVES
 from fieldsid.models.effect import Core, Effect, Motion, Terms, Values, over_intervals
 from fieldsid.models.fin_path import FinPath
 from fieldsid.models.record import Record
@@ -23,12 +23,12 @@ from fieldsid.numerics.arrays import FloatArray
 MAX_RATE_STEP_PRODUCT, MAX_PIECES = 0.3, 200
 """Largest product of step and fastest linear rate of one RK4 piece (relative error below 3e-5 of a step), and most pieces."""
 DAMPING, STIFFNESS, CROSS_FACTOR, CROSS_INPUT = (
-    integrate.DRIVES.index(name) for name in ("damping", "stiffness", "cross_factor", "cross_push")
+    DRIVES.index(name) for name in ("damping", "stiffness", "cross_factor", "cross_push")
 )
-MOMENT, FLOW = ((integrate.DRIVES.index(f"{name}_start"), integrate.DRIVES.index(f"{name}_end")) for name in ("moment", "flow"))
+MOMENT = (DRIVES.index("moment_start"), DRIVES.index("moment_end"))
 """The places of the core's drives."""
 NO_CORE, NO_TERMS = Core(), Terms()
-_CONSTANTS = attrgetter(*integrate.CONSTANTS)
+_CONSTANTS = attrgetter(*CONSTANTS)
 MAX_MOMENT_ITERATIONS = 30
 MOMENT_TOLERANCE = 1e-9
 
@@ -49,7 +49,7 @@ class Base:
 
 @dataclass(frozen=True, slots=True)
 class KernelInputs:
-    """Arrays of the core: drive (n-1, 8), constants (18,), pieces per interval; what they came from: fin path, terms, core."""
+    """Arrays of the core: drive (n-1, 6), constants (16,), pieces per interval; what they came from: fin path, terms, core."""
 
     drive: FloatArray
     constants: FloatArray
@@ -90,18 +90,12 @@ def assemble(record: Record, effects: Sequence[Effect], base: Base, values: Valu
     fin = fin_path(record, effects, values)
     terms = combined_terms(record, effects, values)
     core = combined_core(effects, values, scale)
-    drive = np.empty((len(record) - 1, len(integrate.DRIVES)))
+    drive = np.empty((len(record) - 1, len(DRIVES)))
     drive[:, DAMPING] = damping = damping_of(base, terms)
     drive[:, STIFFNESS] = base.stiffness
     drive[:, MOMENT[0]], drive[:, MOMENT[1]] = moments_of(base, fin, terms)
     drive[:, CROSS_FACTOR] = cross_factor_of(terms)
     drive[:, CROSS_INPUT] = cross_input_of(fin, core)
-    if core.crossflow != 0.0:
-        # pitch: the local normal speed is w - x q, so that the flow seen by +q is -w
-        cross = record["cross"] if record.axis is Axis.YAW else -record["cross"]
-        drive[:, FLOW[0]], drive[:, FLOW[1]] = cross[:-1], cross[1:]
-    else:
-        drive[:, FLOW[0] : FLOW[1] + 1] = 0.0
     constants = constants_of(core)
     return KernelInputs(drive, constants, _pieces(record, damping, base.stiffness, constants), fin, terms, core)
 
@@ -134,7 +128,7 @@ def cross_input_of(fin: FinPath, core: Core) -> FloatArray | float:
 
 
 def constants_of(core: Core) -> FloatArray:
-    """Return a core's coefficients as the vector (18,) that the kernel takes; the fin's input to the cross state is a drive."""
+    """Return a core's coefficients as the vector (16,) that the kernel takes; the fin's input to the cross state is a drive."""
     return np.array(_CONSTANTS(core))
 
 
@@ -214,7 +208,7 @@ def pieces_for(step: float, *rates: float) -> int:
 
 
 def _pieces(record: Record, damping: FloatArray | float, stiffness: FloatArray | float, constants: FloatArray) -> int:
-    cross = abs(float(constants[7])), sqrt(abs(float(constants[8])))
+    cross = abs(float(constants[CROSS_DAMPING])), sqrt(abs(float(constants[CROSS_RATE])))
     return pieces_for(record.longest, _largest(damping), sqrt(_largest(stiffness)), *cross)
 
 

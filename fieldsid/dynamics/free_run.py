@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.dynamics.assemble import Base, assemble, integrate_record, measured, with_moments
-from fieldsid.errors import DivergenceError, ModelError
+from fieldsid.errors import DivergenceError, EffectError, ModelError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, Motion, as_fitted, effect_held
 from fieldsid.models.model import Model
@@ -35,11 +35,18 @@ class Trajectory:
 def effects_of(model: Model) -> tuple[Effect, ...]:
     """Return the effects that a model holds, in the forms it was fitted in.
 
-    Raises EffectError for one not known here, ModelError where the model does not give a coefficient of one.
+    Raises EffectError for one not known here or not in this form, ModelError where the model does not give a coefficient of one.
     """
     held = tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
+    known = {*NAMES[model.axis].base, *(c.name for e in held for c in e.shared)}
     for effect in held:
         lacking = [c.name for c in effect.shared if c.name not in model.values]
+        if lacking and (strange := [n for n in model.values if n not in known]):
+            raise EffectError(
+                f"the model holds `{effect.name}` in a form that is no longer known: with `{strange[0]}`, without `{lacking[0]}`",
+                found=", ".join(model.values),
+                hint=f"identify again: `sysid identify RUN... --axis {model.axis.value} --effects {','.join(model.effects)}`",
+            )
         if lacking:
             raise ModelError(
                 f"the model holds `{effect.name}`, and no value of its `{lacking[0]}`",
@@ -82,9 +89,6 @@ def simulate(
     parts = effects_of(model) if effects is None else effects
     values = {c.name: c.start for e in parts for c in e.nuisance} | dict(model.values) | dict(nuisance)
     values["damping_exponent"] = model.law.damping_exponent
-    for effect in parts:
-        if effect.stand_in is not None and record.measures(effect.needs):
-            values = {n: v for n, v in values.items() if n not in effect.stand_in.units}
     if state is None:
         state = (
             float(record.angle[np.argmax(record.angle_ok)]),
@@ -125,7 +129,7 @@ def command_record(
     """
     t = np.ascontiguousarray(time, dtype=np.float64)
     seen = np.full(t.size, measures)
-    steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth", "cross")} | {"surge": np.full(t.size, speed)}
+    steady = {role: np.zeros(t.size) for role in ("thrust", "roll", "depth")} | {"surge": np.full(t.size, speed)}
     return Record(
         name=name,
         axis=axis,
@@ -137,6 +141,8 @@ def command_record(
         rate=np.zeros(t.size),
         angle_ok=seen,
         rate_ok=seen,
+        cross=np.zeros(t.size),
+        cross_ok=np.zeros(t.size, dtype=bool),
         signals=MappingProxyType(steady | dict(signals)),
         speed=speed,
     )

@@ -9,20 +9,13 @@ from fieldsid.dynamics.linear_kernel import linear_motion, linear_sensitivities
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion, nonlinear_sensitivities
 from fieldsid.numerics.arrays import FloatArray, IntArray
 
-DRIVES = ("damping", "stiffness", "moment_start", "moment_end", "cross_factor", "cross_push", "flow_start", "flow_end")
-CONSTANTS = (
-    "quadratic", "crossflow", "length", "heading_sin", "heading_cos", "righting_sin", "righting_cos",
-    "cross_damping", "cross_rate", "cross_quadratic", "beyond_square", "heading_sin2", "heading_cos2", "heading_turn",
-    "cross_share", "strip_moment", "strip_force", "strip_flow",
-)  # fmt: skip
-
 
 def integrate_motion(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
 ) -> None:
     """Fill out (n, 3) with angle, rate and cross state; a diverged motion is NaN from there on.
 
-    steps (n-1,) s, drive (n-1, 8) in the order of DRIVES, c (18,) in that of CONSTANTS, start (3,).
+    steps (n-1,) s, drive (n-1, 6) in the order of DRIVES, c (16,) in that of CONSTANTS (dynamics/places.py), start (3,).
     """
     if not linear_motion(steps, drive, c, start, pieces, out):
         nonlinear_motion(steps, drive, c, start, pieces, out)
@@ -44,8 +37,8 @@ def integrate_with_sensitivities(
 ) -> None:
     """Fill out (n, 3) and sens (P, 2, n): derivatives of angle and rate by P parameters.
 
-    A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says; none goes
-    with the flow. d_c (P, 18) are those of the constants, d_start (P, 3) those of the initial state.
+    A parameter's derivative of a drive is factor (P, 6) times the row of columns (C, n-1) that place (P, 6) says.
+    d_c (P, 16) are those of the constants, d_start (P, 3) those of the initial state.
     """
     if not linear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens):
         nonlinear_sensitivities(steps, drive, c, start, pieces, columns, place, factor, d_c, d_start, out, sens)

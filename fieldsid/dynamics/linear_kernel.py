@@ -9,6 +9,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from fieldsid.dynamics.places import (
+    CROSS_DAMPING,
+    CROSS_QUADRATIC,
+    CROSS_RATE,
+    HEADING_COS,
+    HEADING_COS2,
+    HEADING_SIN,
+    HEADING_SIN2,
+    QUADRATIC,
+    RIGHTING_COS,
+    RIGHTING_SIN,
+    STRIP_FORCE,
+    STRIP_MOMENT,
+)  # fmt: skip
 from fieldsid.numerics.arrays import FloatArray, IntArray
 from fieldsid.numerics.jit import inner, jit
 
@@ -71,20 +85,21 @@ def set_all_diverged(sens: FloatArray, first: int) -> None:
 
 @inner
 def reverses(c: FloatArray) -> bool:
-    """Whether any of the constants (18,) goes with the sine or the cosine of the angle."""
-    return bool(abs(c[3]) + abs(c[4]) + abs(c[5]) + abs(c[6]) + abs(c[11]) + abs(c[12]) != 0.0)
+    """Whether any of the constants (16,) goes with the sine or the cosine of the angle."""
+    once = abs(c[HEADING_SIN]) + abs(c[HEADING_COS]) + abs(c[RIGHTING_SIN]) + abs(c[RIGHTING_COS])
+    return bool(once + abs(c[HEADING_SIN2]) + abs(c[HEADING_COS2]) != 0.0)
 
 
 @inner
 def crosses_limit_by(c: FloatArray) -> bool:
-    """Whether any of the constants (18,) drives the cross state or damps it."""
-    return bool(abs(c[7]) + abs(c[8]) + abs(c[9]) + abs(c[16]) != 0.0)
+    """Whether any of the constants (16,) drives the cross state or damps it."""
+    return bool(abs(c[CROSS_DAMPING]) + abs(c[CROSS_RATE]) + abs(c[CROSS_QUADRATIC]) + abs(c[STRIP_FORCE]) != 0.0)
 
 
 @inner
 def of_strips(c: FloatArray) -> bool:
-    """Whether any of the constants (18,) is of the flow that the cross state makes along the hull."""
-    return bool(abs(c[15]) + abs(c[16]) != 0.0)
+    """Whether any of the constants (16,) is of the flow that the cross state makes along the hull."""
+    return bool(abs(c[STRIP_MOMENT]) + abs(c[STRIP_FORCE]) != 0.0)
 
 
 @inner
@@ -99,14 +114,14 @@ def crosses_limit(drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
 @inner
 def is_linear(steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray) -> bool:
     """Whether a motion is linear in (y, p) alone, and goes by even intervals."""
-    if c[0] != 0.0 or c[1] != 0.0 or c[15] != 0.0:
+    if c[QUADRATIC] != 0.0 or c[STRIP_MOMENT] != 0.0:
         return False
     return is_even(steps, drive) and not (reverses(c) or crosses_limit(drive, c, start))
 
 
 @inner
 def is_even(steps: FloatArray, drive: FloatArray) -> bool:
-    """Whether steps (n-1,), damping and stiffness, the first two of the drives (n-1, 8), are alike over many intervals."""
+    """Whether steps (n-1,), damping and stiffness, the first two of the drives (n-1, 6), are alike over many intervals."""
     if steps.shape[0] < FEWEST_INTERVALS:
         return False
     for i in range(steps.shape[0]):

@@ -1,15 +1,14 @@
 """The compiled core of any motion: angle, rate and one cross state by RK4 over each interval, with exact tangents of that map.
 
     y' = p
-    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - X F(w/L, p) - N F(s x/g, p) + c x
+    p' = -a p - k y + m(t) - Q p|p| (|p|/0.2)^o - N F(s x/g, p) + c x
          + hs sin z + hc cos z + hs2 sin 2z + hc2 cos 2z + rs (z - sin z) + rc (cos z - 1)
     z = y - ht (t - the middle of the run)
     x' = -e g x - (D/g) x|x| - f g^2 p - Y g G(s x/g, p) + q
     F(alpha, p) = 32 int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| xi dxi        (F(0, p) = p |p|)
     G(alpha, p) = int_{-1/2}^{1/2} (alpha + xi p) |alpha + xi p| dxi              (G(alpha, 0) = alpha |alpha|)
-a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m and w run straight from its
-start to its end. The tangents are the
-derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
+a, k, q and the cross factor g (speed over the run's speed) are held over an interval; m runs straight from its start to its
+end. The tangents are the derivatives of the discrete map itself, so a least-squares step has no truncation error of its own.
 """
 
 from __future__ import annotations
@@ -26,6 +25,24 @@ from fieldsid.dynamics.linear_kernel import (
     set_all_diverged,
     set_diverged,
 )
+from fieldsid.dynamics.places import (
+    BEYOND_SQUARE,
+    CROSS_DAMPING,
+    CROSS_QUADRATIC,
+    CROSS_RATE,
+    CROSS_SHARE,
+    HEADING_COS,
+    HEADING_COS2,
+    HEADING_SIN,
+    HEADING_SIN2,
+    HEADING_TURN,
+    QUADRATIC,
+    RIGHTING_COS,
+    RIGHTING_SIN,
+    STRIP_FLOW,
+    STRIP_FORCE,
+    STRIP_MOMENT,
+)  # fmt: skip
 from fieldsid.models.effect import ZERO_RATE_RAD_S
 from fieldsid.numerics.arrays import FloatArray, IntArray
 from fieldsid.numerics.jit import inner, jit
@@ -33,12 +50,12 @@ from fieldsid.numerics.jit import inner, jit
 SMALLEST_SPEED_RATIO = 0.01
 """Speed over the run's speed below which the cross state's quadratic drag grows no more: at rest the state means nothing."""
 SMALLEST_WEIGHT = 1e-150
-AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, FLOW, BY_LENGTH, SIN, COS, ARC, BY_TURN = range(16)
-OF_X, OF_FACTOR, X_BY_P, STRIP_MOMENT, STRIP_FORCE, MOMENT_BY_FLOW, FORCE_BY_FLOW = range(16, 23)
+AT_Y, AT_P, AT_X, PART, BY_Y, BY_P, BY_X, BY_FACTOR, DRAG, BY_POWER, SIN, COS, ARC, BY_TURN = range(14)
+OF_X, OF_FACTOR, X_BY_P, AT_MOMENT, AT_FORCE, MOMENT_BY_FLOW, FORCE_BY_FLOW = range(14, 21)
 """What is kept of each stage of a step: the state and the share of the interval; the derivatives of p' by y and by p, of -x'
 by x and by the cross factor; what the derivatives of the constants multiply; the derivatives of p' by x and by the cross
 factor, of -x' by p; and, of the flow that the cross state makes, F, G/g and their derivatives by s."""
-STAGE_COLUMNS = 23
+STAGE_COLUMNS = 21
 
 
 @inner
@@ -76,7 +93,7 @@ def nonlinear_motion(
         a, k = drive[i, 0], drive[i, 1]
         fast = drive[i, 4]
         floored = max(fast, SMALLEST_SPEED_RATIO)
-        e, f_cross, hold, q = c[7] * fast, c[8] * fast**2, c[9] / floored, drive[i, 5]
+        e, f_cross, hold, q = c[CROSS_DAMPING] * fast, c[CROSS_RATE] * fast**2, c[CROSS_QUADRATIC] / floored, drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -85,21 +102,19 @@ def nonlinear_motion(
                 part = (piece + _reach(stage)) / pieces
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
-                drag = ps * abs(ps) if c[10] == 0.0 else power_drag(ps, c[10])[0]
-                f = -a * ps - k * ys + m - c[0] * drag + c[14] * xs
+                drag = ps * abs(ps) if c[BEYOND_SQUARE] == 0.0 else power_drag(ps, c[BEYOND_SQUARE])[0]
+                f = -a * ps - k * ys + m - c[QUADRATIC] * drag + c[CROSS_SHARE] * xs
                 slower = (e + hold * abs(xs)) * xs + f_cross * ps - q
-                if c[1] != 0.0:
-                    w = drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part
-                    f -= c[1] * crossflow(w / c[2], ps)[0]
                 if stripped:
-                    alpha = c[17] * xs / floored
-                    f -= c[15] * crossflow(alpha, ps)[0]
-                    slower += c[16] * fast * crossforce(alpha, ps)[0]
+                    alpha = c[STRIP_FLOW] * xs / floored
+                    f -= c[STRIP_MOMENT] * crossflow(alpha, ps)[0]
+                    slower += c[STRIP_FORCE] * fast * crossforce(alpha, ps)[0]
                 if turning:
-                    seen = ys - c[13] * (late + part * steps[i])
+                    seen = ys - c[HEADING_TURN] * (late + part * steps[i])
                     sin, cos = np.sin(seen), np.cos(seen)
-                    f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0)
-                    f += 2.0 * c[11] * sin * cos + c[12] * (1.0 - 2.0 * sin * sin)
+                    f += c[HEADING_SIN] * sin + c[HEADING_COS] * cos
+                    f += c[RIGHTING_SIN] * (seen - sin) + c[RIGHTING_COS] * (cos - 1.0)
+                    f += 2.0 * c[HEADING_SIN2] * sin * cos + c[HEADING_COS2] * (1.0 - 2.0 * sin * sin)
                 ky, kp, kx = ps, f, -slower
                 ty += _weight(stage) * ky
                 tp += _weight(stage) * kp
@@ -156,40 +171,36 @@ def _of_constant(l: int, stages: FloatArray, stage: int, fast: float, floored: f
     ps, xs = stages[AT_P, stage], stages[AT_X, stage]
     sin, cos = stages[SIN, stage], stages[COS, stage]
     of_p, of_x = 0.0, 0.0
-    if l == 0:
+    if l == QUADRATIC:
         of_p = -stages[DRAG, stage]
-    elif l == 1:
-        of_p = -stages[FLOW, stage]
-    elif l == 2:
-        of_p = stages[BY_LENGTH, stage]
-    elif l == 3:
+    elif l == HEADING_SIN:
         of_p = sin
-    elif l == 4:
+    elif l == HEADING_COS:
         of_p = cos
-    elif l == 5:
+    elif l == RIGHTING_SIN:
         of_p = stages[ARC, stage]
-    elif l == 6:
+    elif l == RIGHTING_COS:
         of_p = cos - 1.0
-    elif l == 7:
+    elif l == CROSS_DAMPING:
         of_x = fast * xs
-    elif l == 8:
+    elif l == CROSS_RATE:
         of_x = fast * fast * ps
-    elif l == 9:
+    elif l == CROSS_QUADRATIC:
         of_x = xs * abs(xs) / floored
-    elif l == 10:
+    elif l == BEYOND_SQUARE:
         of_p = -stages[BY_POWER, stage]
-    elif l == 11:
+    elif l == HEADING_SIN2:
         of_p = 2.0 * sin * cos
-    elif l == 12:
+    elif l == HEADING_COS2:
         of_p = 1.0 - 2.0 * sin * sin
-    elif l == 13:
+    elif l == HEADING_TURN:
         of_p = -stages[BY_TURN, stage]
-    elif l == 14:
+    elif l == CROSS_SHARE:
         of_p = xs
-    elif l == 15:
-        of_p = -stages[STRIP_MOMENT, stage]
-    elif l == 16:
-        of_x = stages[STRIP_FORCE, stage]
+    elif l == STRIP_MOMENT:
+        of_p = -stages[AT_MOMENT, stage]
+    elif l == STRIP_FORCE:
+        of_x = stages[AT_FORCE, stage]
     else:
         of_p, of_x = -stages[MOMENT_BY_FLOW, stage], stages[FORCE_BY_FLOW, stage]
     return of_p, of_x
@@ -215,7 +226,7 @@ def _map_constants(
 
 @inner
 def _moved_constants(d_c: FloatArray) -> IntArray:
-    """Return the places of the constants that any parameter moves; d_c (P, 18)."""
+    """Return the places of the constants that any parameter moves; d_c (P, 16)."""
     places, count = np.zeros(d_c.shape[1], dtype=np.intp), 0
     for l in range(d_c.shape[1]):
         size = 0.0
@@ -239,7 +250,7 @@ def nonlinear_sensitivities(
     n, count = steps.shape[0] + 1, d_c.shape[0]
     s, has_c = np.zeros((count, 3)), np.zeros(count)
     stages, rows, push, pull = np.zeros((STAGE_COLUMNS, 4)), np.zeros((3, 9)), np.zeros((3, 4)), np.zeros((3, 4))
-    turning, flowing, raised, late = reverses(c), c[1] != 0.0, c[10] != 0.0, -0.5 * _total(steps)
+    turning, raised, late = reverses(c), c[BEYOND_SQUARE] != 0.0, -0.5 * _total(steps)
     stripped = of_strips(c)
     crossing = crosses_limit(drive, c, start)
     for j in range(count):
@@ -248,12 +259,12 @@ def nonlinear_sensitivities(
         for l in range(d_c.shape[1]):
             has_c[j] += d_c[j, l] != 0.0
         sens[j, 0, 0], sens[j, 1, 0] = s[j, 0], s[j, 1]
-        turning, flowing, stripped = turning or reverses(d_c[j]), flowing or d_c[j, 1] != 0.0, stripped or of_strips(d_c[j])
+        turning, stripped = turning or reverses(d_c[j]), stripped or of_strips(d_c[j])
         raised, crossing = (
-            raised or d_c[j, 10] != 0.0,
+            raised or d_c[j, BEYOND_SQUARE] != 0.0,
             crossing or crosses_limit_by(d_c[j]) or s[j, 2] != 0.0 or factor[j, 5] != 0.0,
         )
-    bent = crossing or turning or flowing or raised or stripped or c[0] != 0.0
+    bent = crossing or turning or raised or stripped or c[QUADRATIC] != 0.0
     moved = _moved_constants(d_c)
     by_constant = np.zeros((3, moved.shape[0]))
     last_h, last_a, last_k = -1.0, 0.0, 0.0
@@ -264,7 +275,7 @@ def nonlinear_sensitivities(
         a, k = drive[i, 0], drive[i, 1]
         fast = drive[i, 4]
         floored = max(fast, SMALLEST_SPEED_RATIO)
-        damp, turn, hold, q = c[7] * fast, c[8] * fast * fast, c[9] / floored, drive[i, 5]
+        damp, turn, hold, q = c[CROSS_DAMPING] * fast, c[CROSS_RATE] * fast * fast, c[CROSS_QUADRATIC] / floored, drive[i, 5]
         for piece in range(pieces):
             ky, kp, kx = 0.0, 0.0, 0.0
             ty, tp, tx = 0.0, 0.0, 0.0
@@ -273,50 +284,47 @@ def nonlinear_sensitivities(
                 ys, ps, xs = y + g * ky, p + g * kp, x + g * kx
                 m = drive[i, 2] + (drive[i, 3] - drive[i, 2]) * part
                 drag, log = ps * abs(ps), 0.0
-                by_y, by_p = -k, -a - 2.0 * c[0] * abs(ps)
+                by_y, by_p = -k, -a - 2.0 * c[QUADRATIC] * abs(ps)
                 if raised:
-                    drag, log = power_drag(ps, c[10])
-                    by_p = -a - (2.0 + c[10]) * c[0] * drag / (ps if abs(ps) > ZERO_RATE_RAD_S else 1.0)
-                f = -a * ps - k * ys + m - c[0] * drag + c[14] * xs
-                if flowing:
-                    alpha = (drive[i, 6] + (drive[i, 7] - drive[i, 6]) * part) / c[2]
-                    flow, by_alpha, by_rate = crossflow(alpha, ps)
-                    f -= c[1] * flow
-                    by_p -= c[1] * by_rate
-                    stages[FLOW, stage], stages[BY_LENGTH, stage] = flow, c[1] * by_alpha * alpha / c[2]
+                    drag, log = power_drag(ps, c[BEYOND_SQUARE])
+                    by_p = -a - (2.0 + c[BEYOND_SQUARE]) * c[QUADRATIC] * drag / (ps if abs(ps) > ZERO_RATE_RAD_S else 1.0)
+                f = -a * ps - k * ys + m - c[QUADRATIC] * drag + c[CROSS_SHARE] * xs
                 if turning:
                     clock = late + part * steps[i]
-                    seen = ys - c[13] * clock
+                    seen = ys - c[HEADING_TURN] * clock
                     sin, cos = np.sin(seen), np.cos(seen)
                     sin2, cos2 = 2.0 * sin * cos, 1.0 - 2.0 * sin * sin
-                    f += c[3] * sin + c[4] * cos + c[5] * (seen - sin) + c[6] * (cos - 1.0) + c[11] * sin2 + c[12] * cos2
-                    slope = c[3] * cos - c[4] * sin + 2.0 * (c[11] * cos2 - c[12] * sin2) + c[5] * (1.0 - cos) - c[6] * sin
+                    f += c[HEADING_SIN] * sin + c[HEADING_COS] * cos + c[HEADING_SIN2] * sin2 + c[HEADING_COS2] * cos2
+                    f += c[RIGHTING_SIN] * (seen - sin) + c[RIGHTING_COS] * (cos - 1.0)
+                    slope = c[HEADING_SIN] * cos - c[HEADING_COS] * sin + 2.0 * (c[HEADING_SIN2] * cos2 - c[HEADING_COS2] * sin2)
+                    slope += c[RIGHTING_SIN] * (1.0 - cos) - c[RIGHTING_COS] * sin
                     by_y += slope
                     stages[SIN, stage], stages[COS, stage], stages[ARC, stage] = sin, cos, seen - sin
                     stages[BY_TURN, stage] = slope * clock
                 square = xs * abs(xs)
                 slower = damp * xs + hold * square + turn * ps - q
-                by_x, by_factor = damp + 2.0 * hold * abs(xs), c[7] * xs + 2.0 * fast * c[8] * ps - hold / floored * square
-                stages[OF_X, stage], stages[OF_FACTOR, stage], stages[X_BY_P, stage] = c[14], 0.0, turn
+                by_x = damp + 2.0 * hold * abs(xs)
+                by_factor = c[CROSS_DAMPING] * xs + 2.0 * fast * c[CROSS_RATE] * ps - hold / floored * square
+                stages[OF_X, stage], stages[OF_FACTOR, stage], stages[X_BY_P, stage] = c[CROSS_SHARE], 0.0, turn
                 if stripped:
-                    alpha = c[17] * xs / floored
+                    alpha = c[STRIP_FLOW] * xs / floored
                     moment, moment_by_flow, moment_by_p = crossflow(alpha, ps)
                     force, force_by_flow, force_by_p = crossforce(alpha, ps)
-                    f -= c[15] * moment
-                    slower += c[16] * fast * force
-                    by_p -= c[15] * moment_by_p
-                    by_x += c[16] * fast * force_by_flow * c[17] / floored
-                    by_factor += c[16] * (force - fast * force_by_flow * alpha / floored)
-                    stages[OF_X, stage] -= c[15] * moment_by_flow * c[17] / floored
-                    stages[OF_FACTOR, stage] = c[15] * moment_by_flow * alpha / floored
-                    stages[X_BY_P, stage] += c[16] * fast * force_by_p
-                    stages[STRIP_MOMENT, stage], stages[STRIP_FORCE, stage] = moment, fast * force
-                    stages[MOMENT_BY_FLOW, stage] = c[15] * moment_by_flow * xs / floored
-                    stages[FORCE_BY_FLOW, stage] = c[16] * fast * force_by_flow * xs / floored
+                    f -= c[STRIP_MOMENT] * moment
+                    slower += c[STRIP_FORCE] * fast * force
+                    by_p -= c[STRIP_MOMENT] * moment_by_p
+                    by_x += c[STRIP_FORCE] * fast * force_by_flow * c[STRIP_FLOW] / floored
+                    by_factor += c[STRIP_FORCE] * (force - fast * force_by_flow * alpha / floored)
+                    stages[OF_X, stage] -= c[STRIP_MOMENT] * moment_by_flow * c[STRIP_FLOW] / floored
+                    stages[OF_FACTOR, stage] = c[STRIP_MOMENT] * moment_by_flow * alpha / floored
+                    stages[X_BY_P, stage] += c[STRIP_FORCE] * fast * force_by_p
+                    stages[AT_MOMENT, stage], stages[AT_FORCE, stage] = moment, fast * force
+                    stages[MOMENT_BY_FLOW, stage] = c[STRIP_MOMENT] * moment_by_flow * xs / floored
+                    stages[FORCE_BY_FLOW, stage] = c[STRIP_FORCE] * fast * force_by_flow * xs / floored
                 stages[AT_Y, stage], stages[AT_P, stage], stages[AT_X, stage], stages[PART, stage] = ys, ps, xs, part
                 stages[BY_Y, stage], stages[BY_P, stage] = by_y, by_p
                 stages[BY_X, stage], stages[BY_FACTOR, stage] = by_x, by_factor
-                stages[DRAG, stage], stages[BY_POWER, stage] = drag, c[0] * log * drag
+                stages[DRAG, stage], stages[BY_POWER, stage] = drag, c[QUADRATIC] * log * drag
                 ky, kp, kx = ps, f, -slower
                 ty += wt * ky
                 tp += wt * kp

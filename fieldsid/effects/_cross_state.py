@@ -10,10 +10,8 @@ in rad/s (times 1 1/s), and with F and G of dynamics/nonlinear_kernel.py, unifor
     p' += strip_munk x - strip_drag F(v/L, p),   (v/L)' = ... - 32 strip_drag strip_inertia G(v/L, p)
     strip_drag = rho Cd T L^4 / (64 I),   strip_inertia = I/(m L^2),   I and m with their added parts.
 The drift to the other side, with cross_rate, cross_fin and strip_munk the other way, is the same motion.
-Of a slender hull the drag is about 0.3 Cd L/T and the share of inertia 0.03 to 0.06. Where the cross speed v is measured, its
-moment follows from that instead of a state,
-    p' += cross_moment v     or     p' += munk_moment u v
-and the model keeps the drift law of its runs, by which it is flown where v is not measured.
+Of a slender hull the drag is about 0.3 Cd L/T and the share of inertia 0.03 to 0.06. Where v is measured, its drift law gives
+start values; the motion never takes the measurement itself.
 Source: Prestero 2001, table of coefficients (the cross flow Yvv is most of a torpedo's sway drag); Fossen 2011, sections 6.4.3
 and 7.1.
 """
@@ -22,12 +20,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from types import MappingProxyType
 
-import numpy as np
-
-from fieldsid.models.effect import Coefficient, Core, StandIn, Terms, Values, Variant
-from fieldsid.models.helpers.drift_law import drift_law
+from fieldsid.models.effect import Coefficient, Core, Values, Variant
+from fieldsid.models.helpers.drift_law import drift_law, reference_speed
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
@@ -71,11 +66,17 @@ STRIP_DRAG = Coefficient("strip_drag", "1/rad", 0.0, 100.0, 3.0, step=1e-3, says
 STRIP_INERTIA = Coefficient("strip_inertia", "1", 0.0, 1.0 / 12.0, 0.04, step=1e-4, says="inertia over mass and length squared")
 STRIP_MUNK = Coefficient("strip_munk", "1/s", -50.0, 50.0, 0.0, step=1e-3, says="moment per drift speed over length")
 MUNK_POWER = Coefficient("munk_exponent", "1", -1.0, 6.0, 2.0, step=1e-3, says="power of the speed its moment goes with")
-OF_MEASURED = Coefficient("cross_moment", "rad/(m s)", -1e3, 1e3, 0.0, says="moment per m/s of the measured cross speed")
-OF_LIFT = Coefficient(
-    "munk_moment", "rad/m^2", -1e3, 1e3, 0.0, says="moment per m/s of speed and m/s of the measured cross speed"
-)
-STATE = ("cross_damping", "cross_rate")
+RATE_OVER_DAMPING = 0.2
+"""Start of cross_rate over the square of a measured cross_damping: as the scan's over the square of the hull's own rate."""
+
+
+def measured_starts(records: Sequence[Record], _residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
+    """Return the damping that the measured cross speed shows, the moment to either side; none where none is measured."""
+    law = drift_law(records, reference_speed(records))
+    if law is None:
+        return []
+    damping = 1.0 / law.time_constant
+    return [{"cross_damping": damping, "cross_rate": side * RATE_OVER_DAMPING * damping**2} for side in (-1.0, 1.0)]
 
 
 def _strip_starts(records: Sequence[Record], residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
@@ -84,38 +85,7 @@ def _strip_starts(records: Sequence[Record], residuals: Sequence[FloatArray]) ->
     return [rest | {"cross_rate": rate, "strip_drag": drag} for rate in (0.2, 0.6, 1.5) for drag in (2.0, 6.0)]
 
 
-def drift_numbers(records: Sequence[Record], reference: float) -> dict[str, float]:
-    """Return the drift law of some runs, as the numbers that a model keeps of it."""
-    law = drift_law(records, reference)
-    return {
-        "drift_damping": 1.0 / law.time_constant,
-        "drift_per_rate": law.per_rate,
-        "drift_per_fin": law.per_fin,
-        "drift_speed": reference if np.isfinite(reference) else 1.0,
-    }
-
-
-STAND_IN = StandIn(
-    MappingProxyType({"drift_damping": "1/s", "drift_per_rate": "m", "drift_per_fin": "m/(s rad)", "drift_speed": "m/s"}),
-    drift_numbers,
-)
 FORMS = (
-    Variant(
-        "its moment is that of the measured cross speed",
-        (OF_MEASURED,),
-        needs=("cross",),
-        without=STATE,
-        extra_states=(),
-        stand_in=STAND_IN,
-    ),
-    Variant(
-        "its moment is that of the measured cross speed times the speed",
-        (OF_LIFT,),
-        needs=("cross", "surge"),
-        without=STATE,
-        extra_states=(),
-        stand_in=STAND_IN,
-    ),
     Variant(
         "its drag is that of the cross flow, summed along the hull",
         (STRIP_DRAG, STRIP_INERTIA, STRIP_MUNK, OF_FIN),
@@ -130,21 +100,8 @@ FORMS = (
 )
 
 
-def terms(values: Values, record: Record) -> Terms:
-    """Return the moment (n,) rad/s^2 of the measured cross speed, in a form that takes it and has no stand-in for it."""
-    if "drift_damping" in values:
-        return Terms()
-    if "cross_moment" in values:
-        return Terms(moment=values["cross_moment"] * record["cross"])
-    if "munk_moment" in values:
-        return Terms(moment=values["munk_moment"] * record["surge"] * record["cross"])
-    return Terms()
-
-
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients at `scale` times the reference speed; p is the damping's where it has none of its own."""
-    if "cross_damping" not in values:
-        return _drift_core(values, scale)
     lift = scale ** values.get("cross_exponent", values.get("damping_exponent", 1.0))
     coupling = scale ** values["munk_exponent"] if "munk_exponent" in values else lift**2
     state = Core(
@@ -162,17 +119,4 @@ def core(values: Values, scale: float) -> Core:
         strip_moment=values["strip_drag"],
         strip_force=force,
         strip_flow=1.0 / lift,
-    )
-
-
-def _drift_core(values: Values, scale: float) -> Core:
-    """Return the cross state that stands in for a measured cross speed, x = k v; none where that is measured."""
-    if "drift_damping" not in values:
-        return Core()
-    k = values.get("cross_moment", 0.0) + values.get("munk_moment", 0.0) * values["drift_speed"] * scale
-    damping = values["drift_damping"] * scale
-    return Core(
-        cross_damping=damping,
-        cross_rate=-k * damping * values["drift_per_rate"],
-        cross_fin=k * damping * values["drift_per_fin"] * scale,
     )

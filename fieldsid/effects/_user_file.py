@@ -34,15 +34,17 @@ SIGNAL_OF: Mapping[str, str] = MappingProxyType(
     {
         "angle": "angle", "psi": "angle", "theta": "angle", "rate": "rate", "r": "rate", "q": "rate",
         "fin": "fin", "delta": "fin", "speed": "surge", "u": "surge", "roll": "roll", "phi": "roll",
-        "depth": "depth", "z": "depth", "cross": "cross", "v": "cross", "w": "cross", "thrust": "thrust", "t": "time",
+        "depth": "depth", "z": "depth", "thrust": "thrust", "t": "time",
     }
 )  # fmt: skip
 """What each name in an expression stands for; `t` counts from the run's first sample."""
 
-ONE_AXIS: Mapping[str, Axis] = MappingProxyType(
-    {"r": Axis.YAW, "v": Axis.YAW, "psi": Axis.YAW, "q": Axis.PITCH, "w": Axis.PITCH, "theta": Axis.PITCH}
+ONE_AXIS: Mapping[str, Axis] = MappingProxyType({"r": Axis.YAW, "psi": Axis.YAW, "q": Axis.PITCH, "theta": Axis.PITCH})
+CROSS_SPEED: Mapping[str, str] = MappingProxyType(
+    {"v": "sway_coupling", "w": "heave_coupling", "cross": "sway_coupling` or `heave_coupling"}
 )
-ROLES = ("surge", "roll", "depth", "cross", "thrust")
+"""Names of the hull's own cross speed, and the effect that has it as a state: measured it is an output, and drives no moment."""
+ROLES = ("surge", "roll", "depth", "thrust")
 KEYS = ("name", "says", "axes", "moment", "coefficients", "telltale", "excited_by", "mistaken_for", "source")
 COEFFICIENT_KEYS = ("unit", "low", "high", "start", "scan", "step", "per_run", "says")
 LONGEST_NAME, LONGEST_COEFFICIENT = 40, 60
@@ -140,7 +142,8 @@ def effect_of(spec: Mapping[str, Any], *, origin: str) -> Effect:
     coefficients = _coefficients(spec["coefficients"])
     if not isinstance(spec["moment"], str):
         raise EffectError("`moment` must be text", found=repr(spec["moment"])[:60], hint='write `moment: "k * r * abs(phi)"`')
-    expression = parse(spec["moment"], (*SIGNAL_OF, *(c.name for c in coefficients)))
+    expression = parse(spec["moment"], (*SIGNAL_OF, *CROSS_SPEED, *(c.name for c in coefficients)))
+    _refuse_cross_speed(expression)
     unused = [c.name for c in coefficients if c.name not in expression.names]
     if unused:
         raise EffectError(f"coefficient `{unused[0]}` is not used", found=expression.text, hint="use it in `moment` or delete it")
@@ -174,9 +177,7 @@ def _axes(given: object, expression: Expression) -> tuple[Axis, ...]:
     """Return the axes that were named, or those the expression's names leave."""
     bound = {ONE_AXIS[n] for n in expression.names if n in ONE_AXIS}
     if len(bound) > 1:
-        raise EffectError(
-            "the expression mixes yaw and pitch signals", found=expression.text, hint="use `angle`, `rate`, `cross`"
-        )
+        raise EffectError("the expression mixes yaw and pitch signals", found=expression.text, hint="use `angle`, `rate`")
     left = tuple(bound) or (Axis.YAW, Axis.PITCH)
     words = [given] if isinstance(given, str) else given
     if words is None:
@@ -201,7 +202,7 @@ def _coefficients(given: object) -> tuple[Coefficient, ...]:
 
 
 def _coefficient(name: str, body: object) -> Coefficient:
-    if name in SIGNAL_OF or name in FUNCTIONS:
+    if name in SIGNAL_OF or name in CROSS_SPEED or name in FUNCTIONS:
         raise EffectError(f"coefficient `{name}` has the name of a signal or function", found=name, hint=f"call it `k_{name}`")
     if not isinstance(body, Mapping):
         raise EffectError(f"coefficient `{name}` must have unit, low, high and start", found=repr(body)[:60])
@@ -279,6 +280,15 @@ def _known_keys(what: str, body: Mapping[str, Any], known: tuple[str, ...], *, r
         if key not in body:
             found = ", ".join(str(k) for k in body) or "nothing"
             raise EffectError(f"{what} lacks `{key}`", found=found, hint="copy templates/effect.yaml")
+
+
+def _refuse_cross_speed(expression: Expression) -> None:
+    for name in sorted(expression.names & set(CROSS_SPEED)):
+        raise EffectError(
+            f"`{name}` cannot drive a moment: it is a motion of the hull's own, an output of a model and no input",
+            found=expression.text,
+            hint=f"leave it out and add the effect `{CROSS_SPEED[name]}`, which has it as a state",
+        )
 
 
 def _refuse_base_names(axes: tuple[Axis, ...], coefficients: tuple[Coefficient, ...]) -> None:

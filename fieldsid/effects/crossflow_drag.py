@@ -1,10 +1,11 @@
-"""Drag of the cross flow summed along the hull, from the measured sway (yaw) or heave (pitch) speed.
+"""Drag of the cross flow summed along the hull, whose sway (yaw) or heave (pitch) is a state of the model.
 
-    p' += -crossflow F(v / length, p),   F(a, p) = 32 int_{-1/2}^{1/2} (a + x p) |a + x p| x dx
-so that F(0, p) = p |p|: without drift it is quadratic damping. crossflow >= 0 in 1/rad, length of the hull in m.
-What a sensor's noise leaves in v becomes a moment that was not there. So in another variant y = v/length is a state, from the law
-by which a hull drifts, and needs no length; f = speed / reference speed:
-    y' = -flow_damping f y - flow_rate f p + flow_fin f^2 delta
+    p' += -crossflow F(y, p),   F(a, p) = 32 int_{-1/2}^{1/2} (a + x p) |a + x p| x dx
+    y' = -flow_damping f y - flow_rate f p + flow_fin f^2 delta,   f = speed / reference speed
+so that F(0, p) = p |p|: without drift it is quadratic damping. y is the cross flow over the length of the hull, in rad/s;
+crossflow >= 0 in 1/rad. The drift to the other side, with flow_rate and flow_fin the other way, is the same motion. It is
+`sway_coupling` with its drag along the hull, but for the Munk moment and for what the drag takes from the drift. Beside that
+effect, or `heave_coupling`, there is one cross state, the moment x of the other: y = flow_share x.
 Source: Fossen 2011, section 6.4.3 (cross-flow drag principle), uniform section drag.
 """
 
@@ -12,24 +13,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Coefficient, Core, Effect, Stage, Values, Variant
-from fieldsid.models.helpers.drift_law import drift_law
+from fieldsid.models.helpers.drift_law import drift_law, reference_speed
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
-LENGTH = Coefficient("length", "m", 0.3, 10.0, 2.0, scan=(0.8, 2.0, 5.0), step=1e-3, says="length of hull in the cross flow")
-FLOW_DAMPING = Coefficient("flow_damping", "1/s", 0.05, 10.0, 1.0, step=1e-3, says="damping of the cross flow")
-FLOW_RATE = Coefficient("flow_rate", "1/s", -20.0, 20.0, 0.2, step=1e-3, says="cross flow over length that turning makes")
-FLOW_FIN = Coefficient("flow_fin", "1/s^2", -20.0, 20.0, 0.0, step=1e-3, says="cross flow over length that the fin makes")
+LENGTHS_M = (0.8, 2.0, 5.0)
+"""Lengths of a hull that a measured cross speed is tried over."""
+DRAG = Coefficient("crossflow", "1/rad", 0.0, 500.0, 0.1, scan=(1.0,), says="damping per rad/s of rate without drift")
+FLOW = (
+    Coefficient(
+        "flow_damping", "1/s", 0.05, 10.0, 1.0, scan=(0.3, 1.0), step=1e-3, rate_exponent=1, says="damping of the cross flow"
+    ),
+    Coefficient(
+        "flow_rate", "1/s", -20.0, 20.0, 0.2, scan=(0.2, 0.6, 1.5), step=1e-3, rate_exponent=1,
+        says="cross flow over length that turning makes",
+    ),
+    Coefficient("flow_fin", "1/s^2", -20.0, 20.0, 0.0, step=1e-3, says="cross flow over length that the fin makes"),
+)  # fmt: skip
+SHARE = Coefficient(
+    "flow_share", "s", -100.0, 100.0, 1.0, scan=(-1.0, 1.0), step=1e-3, rate_exponent=-1,
+    says="cross flow over length, per moment of the cross state",
+)  # fmt: skip
 
 
 def core(values: Values, scale: float) -> Core:
     """Return the core's coefficients; speed has a part in the drift alone, whose state is f y in 1/s."""
-    if "flow_damping" not in values:
-        return Core(crossflow=values["crossflow"], length=values["length"])
+    if "flow_share" in values:
+        return Core(strip_moment=values["crossflow"], strip_flow=values["flow_share"] / scale)
     return Core(
         strip_moment=values["crossflow"],
         strip_flow=1.0 / scale,
@@ -40,14 +52,14 @@ def core(values: Values, scale: float) -> Core:
     )
 
 
-def flow_starts(records: Sequence[Record], _residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
-    """Return the drift law that the measured cross speed shows, over some lengths of a hull."""
-    reference = float(np.mean([r.speed for r in records]))
-    law = drift_law(records, reference)
-    rate, fin = -law.per_rate / law.time_constant, law.per_fin / law.time_constant
-    return [
-        {"flow_damping": 1.0 / law.time_constant, "flow_rate": rate / length, "flow_fin": fin / length} for length in LENGTH.scan
-    ]
+def measured_starts(records: Sequence[Record], _residuals: Sequence[FloatArray]) -> list[dict[str, float]]:
+    """Return the drift law that the measured cross speed shows, over some lengths of a hull; none where none is measured."""
+    law = drift_law(records, reference_speed(records))
+    if law is None:
+        return []
+    damping = 1.0 / law.time_constant
+    flows = ({"flow_rate": -law.per_rate * damping / length, "flow_fin": law.per_fin * damping / length} for length in LENGTHS_M)
+    return [{"crossflow": DRAG.scan[0], "flow_damping": damping} | flow for flow in flows]
 
 
 EFFECT = Effect(
@@ -55,24 +67,22 @@ EFFECT = Effect(
     says="drag of the cross flow, summed along the hull, when it turns and drifts at once",
     stage=Stage.HYDRODYNAMICS,
     axes=(Axis.YAW, Axis.PITCH),
-    equation="p' += -crossflow * 32 * integral of (v/length + x p)|v/length + x p| x dx over x = -1/2 .. 1/2",
-    coefficients=(
-        Coefficient("crossflow", "1/rad", 0.0, 500.0, 0.1, scan=(0.1, 1.0, 5.0), says="damping per rad/s of rate without drift"),
-        LENGTH,
-    ),
+    equation="p' += -crossflow * 32 * integral of (y + x p)|y + x p| x dx over x = -1/2 .. 1/2; "
+    "y' = -flow_damping f y - flow_rate f p + flow_fin f^2 delta, f = speed/reference",
+    coefficients=(DRAG, *FLOW),
     telltale="too much rate is simulated in hard turns, the more so the more the vehicle drifts sideways",
     excited_by=("zigzag", "turning_circle", "stairs"),
     mistaken_for=("quadratic_damping", "sway_coupling", "heave_coupling", "stall", "speed_varying"),
     source="Fossen 2011, section 6.4.3",
-    needs=("cross",),
+    extra_states=("cross flow",),
     core=core,
+    initial_guesses=measured_starts,
     variants=(
         Variant(
-            "its cross flow is that of the law by which the hull drifts, not the one measured",
-            (FLOW_DAMPING, FLOW_RATE, FLOW_FIN),
-            initial_guesses=flow_starts,
-            without=("length",),
-            extra_states=("cross flow",),
+            "its cross flow is that of the sway or heave coupling beside it",
+            (SHARE,),
+            without=tuple(c.name for c in FLOW),
+            extra_states=(),
         ),
     ),
 )

@@ -8,7 +8,7 @@ Needs no heave sensor. Source: Prestero 2001, chapter 6 (vertical plane); the pa
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import FORMS, coefficients, core, terms
+from fieldsid.effects._cross_state import FORMS, coefficients, core, measured_starts
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect, Stage
 
@@ -25,6 +25,6 @@ EFFECT = Effect(
     source="Prestero 2001, chapter 6: the pitch model before heave is dropped",
     extra_states=("heave",),
     core=core,
-    terms=terms,
+    initial_guesses=measured_starts,
     variants=FORMS,
 )

@@ -9,7 +9,7 @@ Source: Fossen 2011, section 7.2 (second-order Nomoto: K, T1, T2, T3 are the sam
 
 from __future__ import annotations
 
-from fieldsid.effects._cross_state import FORMS, coefficients, core, terms
+from fieldsid.effects._cross_state import FORMS, coefficients, core, measured_starts
 from fieldsid.models.axis import Axis
 from fieldsid.models.effect import Effect, Stage
 
@@ -26,6 +26,6 @@ EFFECT = Effect(
     source="Fossen 2011, section 7.2: the yaw model before sway is dropped",
     extra_states=("sway",),
     core=core,
-    terms=terms,
+    initial_guesses=measured_starts,
     variants=FORMS,
 )

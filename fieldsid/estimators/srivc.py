@@ -15,6 +15,7 @@ import numpy as np
 
 from fieldsid.dynamics import integrate
 from fieldsid.dynamics.assemble import pieces_for
+from fieldsid.dynamics.places import CONSTANTS, DRIVES
 from fieldsid.errors import DataError, DivergenceError
 from fieldsid.estimators.svf_ls import base_slots, finished, median_step, parameters_of, regress
 from fieldsid.fitting.problem.estimator import Estimator, Options, Solution
@@ -110,12 +111,12 @@ def through(
     steps: FloatArray, a: float, k: float, start: FloatArray, end: FloatArray, state: FloatArray | None = None
 ) -> FloatArray:
     """Return a signal, straight over each interval, through 1/(s^2 + a s + k), and its slope: (n, 2)."""
-    drive = np.zeros((steps.size, len(integrate.DRIVES)))
+    drive = np.zeros((steps.size, len(DRIVES)))
     drive[:, 0], drive[:, 1], drive[:, 2], drive[:, 3] = a, k, start, end
     first = np.zeros(3) if state is None else np.array([state[0], state[1], 0.0])
     out = np.empty((steps.size + 1, 3))
     pieces = pieces_for(float(steps.max()), a, k**0.5)
-    integrate.integrate_motion(steps, drive, np.zeros(len(integrate.CONSTANTS)), first, pieces, out)
+    integrate.integrate_motion(steps, drive, np.zeros(len(CONSTANTS)), first, pieces, out)
     return out[:, :2]
 
 

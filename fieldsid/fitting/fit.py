@@ -192,15 +192,11 @@ def model_of(problem: Problem, solution: Solution) -> Model:
     order = [layout.names.index(n) for n in free]
     p = residual_whiteness(problem, solution.x, solution.noise)
     sigma = dict(zip(layout.names, np.sqrt(np.maximum(np.diag(solution.covariance), 0.0)).tolist(), strict=True))
-    kept, kept_units = dict[str, float](), dict[str, str]()
-    for stand_in in (e.stand_in for e in layout.effects if e.stand_in is not None):
-        kept |= stand_in.numbers(problem.records, law.reference)
-        kept_units |= stand_in.units
     return Model(
         axis=layout.axis,
         effects=tuple(e.name for e in layout.effects),
-        values={n: values[n] for n in free} | kept,
-        units={n: units[n] for n in free} | kept_units,
+        values={n: values[n] for n in free},
+        units={n: units[n] for n in free},
         free=free,
         covariance=solution.covariance[np.ix_(order, order)],
         law=law,

@@ -50,7 +50,7 @@ def a_record() -> Record:
     angle, rate = 0.1 * np.sin(time), 0.1 * np.cos(time)
     return Record(
         "none", Axis.YAW, time, fin, fin_is_held=True, fin_is_measured=False, angle=angle, rate=rate, angle_ok=every,
-        rate_ok=every, signals=dict.fromkeys((*ROLES, "cross"), 1.0 + angle), speed=1.0,
+        rate_ok=every, cross=angle, cross_ok=every, signals=dict.fromkeys(ROLES, 1.0 + angle), speed=1.0,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 Signal path: command -> ACTUATOR -> fin angle -> HYDRODYNAMICS -> motion -> SENSOR -> measurement. The core integrates
     angle' = p
-    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - crossflow F(w, p) - strip_moment F(s x/g, p)
+    p' = -a(t) p - k(t) angle + m(t) - quadratic p|p| (|p|/0.2)^beyond_square - strip_moment F(s x/g, p)
          + heading_sin sin(seen) + heading_cos cos(seen) + heading_sin2 sin(2 seen) + heading_cos2 cos(2 seen)
          + righting_sin (seen - sin seen) + righting_cos (cos seen - 1) + cross_share x
     x' = -cross_damping g x - (cross_quadratic / g) x|x| - cross_rate g^2 p - strip_force g G(s x/g, p) + cross_fin delta
@@ -74,18 +74,6 @@ class Coefficient:
 
 
 @dataclass(frozen=True, slots=True)
-class StandIn:
-    """Numbers that a model keeps of its runs, to be flown by in a plan or a turn: the hooks find them where nothing is measured.
-
-    `units` has the name and unit of each; numbers(records, reference) gives them from the runs that the model was fitted to and
-    the reference speed in m/s.
-    """
-
-    units: Mapping[str, str]
-    numbers: Callable[[Sequence[Record], float], dict[str, float]]
-
-
-@dataclass(frozen=True, slots=True)
 class Variant:
     """A variant of an effect that is not the textbook's, in a few words, with the coefficients it takes besides the effect's.
 
@@ -93,8 +81,7 @@ class Variant:
     values of the shared ones as an effect's does, from the residuals of the textbook's variant, in place of their scan grids.
     `axes` and `needs` are those of the variant, where it has fewer axes than the effect or needs more signals. `without` are
     coefficients of the effect that it does without, `beside` effects beside which alone it may show. `extra_states` are the
-    variant's, None for those of the effect; a state of its own is in place of the signals that the effect needs. `stand_in` is
-    what a model is flown by in a plan or a turn, where no signal is measured.
+    variant's, None for those of the effect.
     """
 
     says: str
@@ -105,7 +92,6 @@ class Variant:
     without: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
     extra_states: tuple[str, ...] | None = None
-    stand_in: StandIn | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +129,6 @@ class Core:
     """Coefficients of the state-dependent terms the compiled core knows; zero where an effect is absent."""
 
     quadratic: float = 0.0
-    crossflow: float = 0.0
-    length: float = 1.0
     heading_sin: float = 0.0
     heading_cos: float = 0.0
     righting_sin: float = 0.0
@@ -191,7 +175,7 @@ def power_drag(rate: FloatArray, beyond: FloatArray | float) -> FloatArray:
 
 CORE_FIELDS = tuple(Core.__dataclass_fields__)
 _VALUES = attrgetter(*CORE_FIELDS)
-FACTORS = ("length", "cross_share")
+FACTORS = ("cross_share",)
 """The coefficients of a core that are one where no effect sets them."""
 
 
@@ -217,11 +201,11 @@ class Effect:
     sensor_jvp(moves, motion, values, record) -> (P, 2, n)  sensor, optional: the derivative of measure, applied to P small
                                                             moves (P, 2, n) of the motion; without it differences are taken
     sensor_slope(name, motion, values, record) -> (2, n)    sensor, optional: that by one of the coefficients
-    `needs` lists roles a log must have: surge, thrust, roll, depth, cross.
-    suggest(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
-    the effect, in place of the scan grid. twin(values, axis) -> another start with the same response at one speed.
+    `needs` lists roles a log must have: surge, thrust, roll, depth.
+    initial_guesses(records, residuals) -> start values for the shared coefficients, from residuals [(2, n)] of a fit without
+    the effect, before those of the scan grid. equivalent_solution(values, axis) -> another with the same response at one speed.
     `variants` are other shapes, tried where the textbook's leaves something; `textbook` is the effect that one of them is of,
-    with that variant's `stand_in`, None for the textbook's own.
+    None for the textbook's own.
     `log_prior_penalty` is log evidence the effect must bring beyond others: where another says the same in simpler words,
     or where free event times make it fit anything.
     `is_of_the_water` marks a moment that knows nothing of the vehicle: what is left beside it follows no measured signal.
@@ -257,7 +241,6 @@ class Effect:
     is_of_the_water: bool = False
     heading_span: float = 0.0
     textbook: Effect | None = None
-    stand_in: StandIn | None = None
     origin: str = field(default="built in")
     definition: Definition | None = None
 
@@ -267,9 +250,9 @@ class Effect:
         return self.textbook is not None
 
     @property
-    def takes_cross_state(self) -> bool:
-        """Whether it is in a variant with a cross state, which its textbook's has not."""
-        return self.textbook is not None and bool(self.extra_states) and not self.textbook.extra_states
+    def stateless(self) -> Variant | None:
+        """Its variant without the state of its textbook's, which takes that of an effect beside it; None without one."""
+        return next((v for v in self.variants if self.extra_states and v.extra_states == ()), None)
 
     @property
     def shared(self) -> tuple[Coefficient, ...]:
@@ -311,18 +294,26 @@ def with_variant(effect: Effect, form: Variant) -> Effect:
     return replace(
         effect,
         coefficients=(*(c for c in effect.coefficients if c.name not in form.without), *form.coefficients),
-        needs=form.needs if form.extra_states else tuple(dict.fromkeys((*effect.needs, *form.needs))),
+        needs=tuple(dict.fromkeys((*effect.needs, *form.needs))),
         extra_states=effect.extra_states if form.extra_states is None else form.extra_states,
         variants=(),
         textbook=effect,
-        stand_in=form.stand_in,
     )
 
 
 def with_one_cross_state(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return effects of which no variant takes the one cross state of a model from an effect that has it by its textbook."""
-    owned = any((e if e.textbook is None else e.textbook).extra_states for e in effects)
-    return tuple(e.textbook if owned and e.textbook is not None and e.takes_cross_state else e for e in effects)
+    """Return effects of which one has a model's one cross state: what can do without takes that of one which cannot."""
+    owned = any(e.extra_states and e.stateless is None for e in effects)
+    return tuple(_beside_state(e) if owned else _with_own_state(e) for e in effects)
+
+
+def _beside_state(effect: Effect) -> Effect:
+    return effect if effect.stateless is None else with_variant(effect, effect.stateless)
+
+
+def _with_own_state(effect: Effect) -> Effect:
+    whole = effect.textbook
+    return effect if whole is None or effect.extra_states or whole.stateless is None else whole
 
 
 def variant_of(effect: Effect, known: Collection[str]) -> Variant | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -18,8 +18,6 @@ from fieldsid.logs.run import Note, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.fin_path import FinPath
-from fieldsid.models.helpers.cross_flow_speed import cross_speed
-from fieldsid.models.helpers.depth import depth_along
 from fieldsid.models.helpers.surge import causes_of, surge_behind
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.gcv_smoother import gcv_smooth
@@ -38,9 +36,10 @@ class Record(Brief):
     """Samples (n,) of one run on one axis.
 
     `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which).
-    `angle_ok` and `rate_ok` mark samples that were measured, spikes left out. `signals` holds helpers without gaps and noise
-    by role (surge, thrust, roll, depth, cross), `thrust_column` the column that the thrust is from, empty where there is
-    none. `speed` is the median of that surge in m/s, NaN when not measured.
+    Outputs of the motion are `angle`, `rate` and `cross`, the sway (yaw) or heave (pitch) in m/s, as measured, zero where not:
+    `angle_ok`, `rate_ok` and `cross_ok` mark samples that were, spikes left out. `signals` holds inputs without gaps and noise
+    by role (surge, thrust, roll, depth), none of which knows an output; `thrust_column` is the column that the thrust is from,
+    empty where there is none. `speed` is the median of that surge in m/s, NaN when not measured.
     """
 
     name: str
@@ -53,6 +52,8 @@ class Record(Brief):
     rate: FloatArray
     angle_ok: npt.NDArray[np.bool_]
     rate_ok: npt.NDArray[np.bool_]
+    cross: FloatArray
+    cross_ok: npt.NDArray[np.bool_]
     signals: Mapping[str, FloatArray]
     speed: float
     thrust_column: str = ""
@@ -93,10 +94,6 @@ class Record(Brief):
 
     def __len__(self) -> int:
         return int(self.time.size)
-
-    def measures(self, roles: Iterable[str]) -> bool:
-        """Whether the helper signals of some roles were measured; in the record of a command alone none was."""
-        return bool(self.ok.any()) and all(role in self.signals for role in roles)
 
     def path_with_lead(self, early: FloatArray | None) -> FinPath:
         """Return the path of the fin with its held commands given so much before their samples, (n,) s."""
@@ -172,7 +169,8 @@ def first_part(record: Record, samples: int) -> Record:
     part = slice(0, samples)
     early = None if record.command_lead is None else record.command_lead[part]
     goal = None if record.goal is None else record.goal[part]
-    arrays = {name: getattr(record, name)[part] for name in ("time", "fin", "angle", "rate", "angle_ok", "rate_ok")}
+    own = ("time", "fin", "angle", "rate", "cross", "angle_ok", "rate_ok", "cross_ok")
+    arrays = {name: getattr(record, name)[part] for name in own}
     return replace(
         record,
         **arrays,
@@ -204,29 +202,23 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     refuse_contradiction(run, names.angle, names.rate)
     angle, angle_ok = _measured(run, names.angle)
     rate, rate_ok = _measured(run, names.rate)
+    cross, cross_ok = _measured_cross(run, names.cross)
     if axis is Axis.YAW and angle_ok.any():
         angle = angle.copy()
         angle[angle_ok] = np.unwrap(angle[angle_ok])
     angle_ok, rate_ok = _without_spikes(angle, angle_ok), _without_spikes(rate, rate_ok)
+    cross_ok = _without_spikes(cross, cross_ok)
     held = _held_fin(run.signals[column])
-    along = axis is Axis.PITCH and run.has(ROLES["depth"]) and bool(angle_ok.any())
     thrust_column = next((c for c in THRUST_COLUMNS if run.has(c)), "")
     columns = {**ROLES, "thrust": thrust_column}
     signals = {
         role: gcv_smooth(run.time, run.signals[c], fastest_s=SHORTEST_TIME_CONSTANT_S.get(role, 0.0))
         for role, c in columns.items()
-        if run.has(c) and role != "surge" and not (along and role == "depth")
+        if run.has(c) and role != "surge"
     }
     if knows_speed(run):
-        turning = np.interp(run.time, run.time[rate_ok], rate[rate_ok]) if rate_ok.any() else None
-        causes, fastest_s = causes_of(signals.get("thrust"), turning, held), SHORTEST_TIME_CONSTANT_S["surge"]
+        causes, fastest_s = causes_of(signals.get("thrust"), held), SHORTEST_TIME_CONSTANT_S["surge"]
         signals["surge"] = surge_behind(run.time, run.signals[ROLES["surge"]], causes, fastest_s=fastest_s)
-    if run.has(names.cross):
-        signals["cross"] = cross_speed(run.time, run.signals[names.cross], rate, rate_ok, held)
-    if along:
-        pitch = np.interp(run.time, run.time[angle_ok], angle[angle_ok])
-        depth, fastest_s = run.signals[ROLES["depth"]], SHORTEST_TIME_CONSTANT_S["depth"]
-        signals["depth"] = depth_along(run.time, depth, pitch, signals.get("surge"), held, fastest_s=fastest_s)
     return Record(
         name=run.name,
         axis=axis,
@@ -238,6 +230,8 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         rate=rate,
         angle_ok=angle_ok,
         rate_ok=rate_ok,
+        cross=np.where(cross_ok, cross, 0.0),
+        cross_ok=cross_ok,
         signals=MappingProxyType(signals),
         thrust_column=thrust_column,
         goal=_held_fin(run.signals[names.goal]) if run.has(names.goal) else None,
@@ -269,6 +263,13 @@ def _measured(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         return np.zeros(len(run)), np.zeros(len(run), dtype=bool)
     ok = np.isfinite(values)
     return np.where(ok, values, 0.0), ok
+
+
+def _measured_cross(run: Run, name: str) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Return the cross speed and where it was measured: a sensor that is not fitted is logged as one value throughout."""
+    values, ok = _measured(run, name)
+    is_fitted = bool(ok.any()) and float(np.ptp(values[ok])) > 0.0
+    return (values, ok) if is_fitted else (np.zeros(len(run)), np.zeros(len(run), dtype=bool))
 
 
 def _without_spikes(values: FloatArray, ok: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -1,6 +1,6 @@
 """The identified yaw model as arrays over draws of its parameters, ready for steady turns at any speed.
 
-    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - F(v, r) - N F(s x, r) + b(u) delta + m + M(r) + c_m x
+    0 = -(a(u) + a') r - q r|r| (|r|/0.2)^o - N F(s x, r) + b(u) delta + m + M(r) + c_m x
     c(u) x + c_q(u) x|x| + Y(u) G(s x, r) = -c_r(u) r + c_d(u) delta
 with every coefficient at the speed u kept in the turn, by the model's own speed law and its effects' own scaling.
 The actuator's effects are taken as they leave a fin that was told to stay at its limit.
@@ -27,7 +27,7 @@ SCALES = np.geomspace(0.2, 5.0, 9)
 EXPONENT = "damping_exponent"
 CORE = (
     "cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow",
-    "quadratic", "crossflow", "beyond_square",
+    "quadratic", "beyond_square",
 )  # fmt: skip
 
 
@@ -57,7 +57,6 @@ class YawPlant:
     authority_ratio: FloatArray
     trim: FloatArray
     core: Mapping[str, Scaled]
-    length: FloatArray
     fin: Mapping[float, FloatArray]
     moment: FloatArray
     damping_more: FloatArray
@@ -103,7 +102,7 @@ class YawPlant:
         )
 
 
-ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "length", "moment", "damping_more", "sway_seen")
+ARRAYS = ("damping", "damping_exponent", "authority_ratio", "trim", "moment", "damping_more", "sway_seen")
 
 
 def yaw_plant(
@@ -135,7 +134,6 @@ def yaw_plant(
         authority_ratio=column([v[names.authority] / model.values[names.authority] for v in values]),
         trim=column([v[names.trim] for v in values]),
         core=_scaled_core(parts, values),
-        length=column([_core(parts, v, 1.0).length for v in values]),
         fin={s: column(steady_fins(parts, values, s * sign * fin_limit, steady.speed)) for s in (1.0, -1.0)},
         moment=straight_moment(model, parts, values, entry) + column([_mean(t.moment, 0.0) for t in free]),
         damping_more=column([_mean(t.damping, 0.0) for t in terms]),

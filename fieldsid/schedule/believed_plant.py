@@ -35,7 +35,6 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
         offset=near.offset[which],
         quadratic=zero,
         beyond_square=zero,
-        crossflow=zero,
         cross_damping=slow,
         cross_rate=by_rate,
         cross_fin=way * by_fin,

@@ -23,8 +23,8 @@ from fieldsid.plant.parameter_source import ParameterSource, draw_values
 from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, straight_moment
 
 PARTS = (
-    "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "crossflow", "cross_damping",
-    "cross_rate", "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow", "lag", "delay",
+    "damping", "stiffness", "authority", "offset", "quadratic", "beyond_square", "cross_damping", "cross_rate",
+    "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow", "lag", "delay",
     "fin_rate", "powers", "speed_loss",
 )  # fmt: skip
 POWERS = ("damping", "authority", "cross_damping", "cross_rate", "cross_fin", "cross_quadratic")
@@ -42,8 +42,7 @@ LONGEST_LAG_S = 10.0
 class LinearPlant:
     """Coefficients (d,) over draws at one speed, the estimate first.
 
-    `quadratic`, `beyond_square`, `crossflow`, `cross_quadratic`, the strips, `powers` and `speed_loss` act in time simulations
-    only.
+    `quadratic`, `beyond_square`, `cross_quadratic`, the strips, `powers` and `speed_loss` act in time simulations only.
     `offset` is the fin's trim offset (rad): the fin acts as fin + offset. `fin_rate` is inf where not limited. `powers` (d, 6)
     are the exponents of the speed, by POWERS; `speed_loss` (d, 3) is drag a_u (1/m), the fin's and the turn's loss over it.
     Where the draws are those of a vehicle in surge, sway and yaw, `hull` (d, 22) are its coefficients
@@ -58,7 +57,6 @@ class LinearPlant:
     offset: FloatArray
     quadratic: FloatArray
     beyond_square: FloatArray
-    crossflow: FloatArray
     cross_damping: FloatArray
     cross_rate: FloatArray
     cross_fin: FloatArray
@@ -236,7 +234,7 @@ def _plant_of_points(source: ParameterSource, speed: float, limits: FinLimits, d
     lag, delay, fin_rate = _actuator({}, limits, draws)
     return LinearPlant(
         source.axis, speed, base[names.damping], stiffness, authority, base[names.trim] / authority,
-        zero, zero, zero, zero + 1.0, zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate,
+        zero, zero, zero + 1.0, zero, zero, zero, zero + 1.0, zero, zero, zero, lag, delay, fin_rate,
         _powers(zero + 1.0, {}), np.zeros((draws, 3)),
     )  # fmt: skip
 
@@ -289,7 +287,6 @@ def _plant_of_model(
         offset=trim / authority,
         quadratic=cored("quadratic"),
         beyond_square=cored("beyond_square"),
-        crossflow=cored("crossflow"),
         cross_damping=np.where(coupled > 0, coupled, 1.0),
         cross_rate=cored("cross_rate"),
         cross_fin=cored("cross_fin"),
@@ -338,6 +335,6 @@ def _counted(effect: Effect, model: Model) -> bool:
         return True
     if effect.core is not None:
         core = effect.core({EXPONENT: model.law.damping_exponent} | dict(model.values), 1.0)
-        return all(getattr(core, n) == getattr(Core(), n) for n in CORE_FIELDS if n not in PARTS and n != "length")
+        return all(getattr(core, n) == getattr(Core(), n) for n in CORE_FIELDS if n not in PARTS)
     own = {c.name for c in effect.every if c.name in model.values}
     return own <= set(ACTUATOR) or follows_the_run(effect)

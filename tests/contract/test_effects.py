@@ -23,7 +23,7 @@ HOOKS = {
     Stage.SENSOR: {"measure", "sensor_jvp", "sensor_slope"},
 }
 MANEUVERS = set(all_maneuvers())
-ROLES = {"surge", "thrust", "roll", "depth", "cross"}
+ROLES = {"surge", "thrust", "roll", "depth"}
 # Values at which an effect is absent, where that is not zero for every shared coefficient.
 ABSENT = {"rate_limit": {"max_rate": math.inf}, "stall": {"stall_angle": 10.0, "slope_after": 0.0}}
 
@@ -39,13 +39,13 @@ def record(axis: Axis, *, held: bool = True) -> Record:
     t = time - time[0]
     fin = 0.26 * np.sign(np.sin(1.3 * t)) + 0.1 * np.sin(0.37 * t)
     signals = {"surge": 1.5 + 0.2 * np.sin(t), "thrust": 60.0 + 10.0 * np.sin(0.5 * t), "roll": 0.1 * np.cos(t)}
-    signals |= {"depth": 2.0 + 0.1 * t, "cross": 0.1 * np.sin(0.7 * t)}
+    signals |= {"depth": 2.0 + 0.1 * t}
     for array in (time, fin, *signals.values()):
         array.setflags(write=False)
     return Record(
         name="made", axis=axis, time=time, fin=fin, fin_is_held=held, fin_is_measured=not held,
         angle=np.zeros(400), rate=np.zeros(400), angle_ok=np.ones(400, bool), rate_ok=np.ones(400, bool),
-        signals=MappingProxyType(signals), speed=1.5,
+        cross=0.1 * np.sin(0.7 * t), cross_ok=np.ones(400, bool), signals=MappingProxyType(signals), speed=1.5,
     )  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def test_an_absent_effect_changes_nothing(effect, held):
     values = absent(effect)
     if effect.name in ("crossflow_drag", "sway_coupling", "heave_coupling"):
         core = effect.core(values, 1.0)
-        assert core.crossflow == core.cross_rate == core.cross_fin == 0.0
+        assert core.strip_moment == core.cross_rate == core.cross_fin == 0.0
         return
     for name, array in outputs(effect, values, log).items():
         wanted = 1.0 if name in FACTORS else untouched(name, log)

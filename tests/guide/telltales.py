@@ -29,7 +29,7 @@ STRENGTHS: Mapping[str, tuple[str, Mapping[str, float]]] = {
     "backlash": ("stairs", {"gap": 0.08}),
     "clock_offset": ("square_pulses", {"offset": -0.25}),
     "compass_deviation": ("turning_circle", {"deviation_sin": 0.05, "deviation_cos": 0.0}),
-    "crossflow_drag": ("zigzag", {"crossflow": 3.0, "length": 2.0}),
+    "crossflow_drag": ("zigzag", {"crossflow": 3.0, "flow_damping": 0.8, "flow_rate": 0.5}),
     "current": ("turning_circle", {"current_sin": 0.02, "current_cos": 0.0}),
     "deadband": ("stairs", {"width": 0.05}),
     "delay": ("square_pulses", {"delay": 0.3}),
@@ -53,7 +53,7 @@ STRENGTHS: Mapping[str, tuple[str, Mapping[str, float]]] = {
 }
 HELPER = {
     "surge": ("speed [m/s]", 1.0), "thrust": ("thrust [%]", 1.0), "roll": ("roll [deg]", np.degrees(1.0)),
-    "depth": ("depth [m]", 1.0), "cross": ("cross [m/s]", 1.0),
+    "depth": ("depth [m]", 1.0),
 }  # fmt: skip
 
 

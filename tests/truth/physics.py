@@ -130,6 +130,8 @@ HIDDEN_EFFECTS = (
     HiddenEffect("stall", {"stall_angle": 0.15, "stall_slope": 0.2},
         {"stall_angle": 0.15, "slope_after": 0.2}, "multisine", near=0.05),
     HiddenEffect("quadratic_damping", {"quadratic": 2.0}, {"quadratic": 2.0}, "zigzag"),
+    HiddenEffect("crossflow_drag", {"crossflow": 6.0, "length": 1.8, "cross_damping": 1.1, "cross_rate": 0.99},
+        {"crossflow": 6.0, "flow_damping": 1.1, "flow_rate": 0.55}, "multisine", near=0.05),
     HiddenEffect("speed_varying", {"speed_varying": 1.0, "surge_loss": 6.0}, {"speed_share": 1.0}, "circle", near=0.1),
     HiddenEffect("trim_drift", {"drift": 0.0015}, {"drift": 0.09}),
     HiddenEffect("step_change", {"step_time": 20.0, "step_loss": 0.3, "step_moment": 0.03}, {"loss": 0.3, "moment_step": 0.03}),

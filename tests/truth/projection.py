@@ -52,7 +52,12 @@ def of_own_bank(case, reference):
         "asymmetric_fin": lambda: {"asymmetry": q["asymmetry"]},
         "stall": lambda: {"stall_angle": q["stall_angle"], "slope_after": q["stall_slope"]},
         "quadratic_damping": lambda: {"quadratic": q["quadratic"]},
-        "crossflow_drag": lambda: {"crossflow": q["crossflow"], "length": q["length"]},
+        "crossflow_drag": lambda: {
+            "crossflow": q["crossflow"],
+            "flow_damping": q["cross_damping"] * u,
+            "flow_rate": q["cross_rate"] * u / q["length"],
+            "flow_fin": 0.0,
+        },
         "speed_varying": lambda: {"speed_share": 1.0},
         "trim_drift": lambda: {"drift": 60.0 * q["drift"]},
         "step_change": lambda: {"loss": q["step_loss"], "moment_step": q["step_moment"]},

@@ -81,6 +81,8 @@ def part_of(record: Record, samples: slice) -> Record:
         rate=record.rate[samples],
         angle_ok=record.angle_ok[samples],
         rate_ok=record.rate_ok[samples],
+        cross=record.cross[samples],
+        cross_ok=record.cross_ok[samples],
         signals={k: v[samples] for k, v in record.signals.items()},
         speed=record.speed,
     )

@@ -173,10 +173,12 @@ def screen_effect(linearisation: Linearisation, effect: Effect) -> ScreenResult:
 def screen_points(linearisation: Linearisation, effect: Effect) -> list[ScreenResult]:
     """Return the screen results at every point of an effect's shared scan grid, the best first."""
     problem, begun = with_effect(linearisation.problem, linearisation.x, effect, {})
+    effect = problem.layout.effects[-1]  # beside another with a cross state it is in its variant without one
     new, screened_points = _new_slots(problem, effect), []
+    low, high = problem.layout.low[new], problem.layout.high[new]
     for values in scan_points(linearisation, effect):
         x = begun.copy()
-        x[new] = [values.get(problem.layout.every[i], x[i]) for i in new]
+        x[new] = np.clip([values.get(problem.layout.every[i], x[i]) for i in new], low, high)
         for c in effect.nuisance:
             x = _best_per_run(linearisation, problem, x, new, c)
         screened_points.append(ScreenResult(effect, *_first_order(linearisation, problem, x, new), problem))
@@ -184,10 +186,11 @@ def screen_points(linearisation: Linearisation, effect: Effect) -> list[ScreenRe
 
 
 def scan_points(linearisation: Linearisation, effect: Effect) -> list[dict[str, float]]:
-    """Return the scan points of an effect's shared coefficients: its initial guesses, else the points of its grids."""
-    if effect.initial_guesses is not None and (
-        suggested := effect.initial_guesses(linearisation.problem.records, linearisation.residuals)
-    ):
+    """Return the scan points of an effect's shared coefficients: its initial guesses, then the points of its grids if any."""
+    suggested = (
+        [] if effect.initial_guesses is None else effect.initial_guesses(linearisation.problem.records, linearisation.residuals)
+    )
+    if suggested and not any(c.scan for c in effect.shared):
         return suggested
     pace = hull_rate(linearisation.problem, linearisation.x)
     scans = [[np.clip(v * pace**c.rate_exponent, c.low, c.high) for v in c.scan] or [_screen_value(c)] for c in effect.shared]
@@ -196,7 +199,9 @@ def scan_points(linearisation: Linearisation, effect: Effect) -> list[dict[str, 
     step = -(-len(points) // MAX_SCAN_POINTS)
     points = points[::step]
     weak = {c.name for c in effect.shared if c.scan and (c.low < 0.0 < c.high or (c.low == 0.0 and shifts_time(effect)))}
-    return points + [{n: WEAK_START_SHARE * v if n in weak else v for n, v in point.items()} for point in points if weak]
+    return (
+        suggested + points + [{n: WEAK_START_SHARE * v if n in weak else v for n, v in point.items()} for point in points if weak]
+    )
 
 
 def shifts_time(effect: Effect) -> bool:

@@ -11,7 +11,9 @@ from fieldsid.dynamics import integrate
 from fieldsid.dynamics.assemble import (
     CROSS_FACTOR,
     CROSS_INPUT,
+    DAMPING,
     MOMENT,
+    STIFFNESS,
     Base,
     KernelInputs,
     combined_core,
@@ -23,8 +25,15 @@ from fieldsid.dynamics.assemble import (
     measured,
     scaled_fin,
 )
-from fieldsid.dynamics.assemble import DAMPING as OF_DAMPING
-from fieldsid.dynamics.assemble import STIFFNESS as OF_STIFFNESS
+from fieldsid.dynamics.places import (
+    CONSTANTS,
+    CROSS_DAMPING,
+    CROSS_QUADRATIC,
+    CROSS_RATE,
+    DRIVES,
+    STRIP_FLOW,
+    STRIP_FORCE,
+)
 from fieldsid.fitting.problem.parameters import START_NAMES, ParameterLayout
 from fieldsid.models.axis import NAMES
 from fieldsid.models.effect import TERM_PARTS, Core, Effect, Motion, Terms, Values, over_intervals
@@ -34,15 +43,8 @@ from fieldsid.models.speed_law import over_reference
 from fieldsid.numerics.arrays import FloatArray
 
 CROSS = START_NAMES.index("rate_before")
-DAMPING, RATE, SQUARE, FORCE, FLOW = (
-    integrate.CONSTANTS.index(name) for name in ("cross_damping", "cross_rate", "cross_quadratic", "strip_force", "strip_flow")
-)
 EXPONENT_STEP = 1e-4
 """Half width of the central difference by the exponent of the speed law."""
-
-DRIVE_COUNT = max(OF_DAMPING, OF_STIFFNESS, CROSS_FACTOR, CROSS_INPUT, *MOMENT) + 1
-CONSTANT_COUNT = len(integrate.CONSTANTS)
-"""Number of drives that a parameter may change (the flow is none of them), and of constants of the kernel."""
 
 DriveDerivatives = Mapping[int, tuple[float, FloatArray | None]]
 """The derivatives of the drives by one number: a factor, and the (n-1,) that it multiplies, none where that is one."""
@@ -100,7 +102,7 @@ class Sensitivities:
             drives.append({MOMENT[0]: (b, start), MOMENT[1]: (b, end), CROSS_INPUT: (a.core.cross_fin, path.mean - a.fin.mean)})
         whole, d_c, sens = (
             slice(0, len(self.record) - 1),
-            np.zeros((count, CONSTANT_COUNT)),
+            np.zeros((count, len(CONSTANTS))),
             np.empty((count, 2, len(self.record))),
         )
         out = self._integrate_with_sensitivities(whole, drives, d_c, self.start, np.zeros((count, 3)), sens)
@@ -108,16 +110,16 @@ class Sensitivities:
         return sens
 
     def _input_jacobians(self, slots: tuple[int, ...]) -> tuple[list[DriveDerivatives], FloatArray, FloatArray]:
-        """Return the derivatives by the parameters: of the drives, of the constants (P, 18), of the initial states (P, 3)."""
+        """Return the derivatives by the parameters: of the drives, of the constants (P, 16), of the initial states (P, 3)."""
         count = len(slots)
         drives: list[DriveDerivatives] = []
-        d_c, d_start = np.zeros((count, CONSTANT_COUNT)), np.zeros((count, 3))
+        d_c, d_start = np.zeros((count, len(CONSTANTS))), np.zeros((count, 3))
         hidden = "rate_before" in self.values
         for j, slot in enumerate(slots):
             name = self.layout.every[slot]
             if name in START_NAMES:
                 part = START_NAMES.index(name)
-                d_start[j, part] = 1.0 if part < CROSS else self._steady_cross_derivative(self.arrays.constants[RATE])
+                d_start[j, part] = 1.0 if part < CROSS else self._steady_cross_derivative(self.arrays.constants[CROSS_RATE])
                 drives.append({})
                 continue
             push, constants = self._input_jacobian(name)
@@ -132,15 +134,17 @@ class Sensitivities:
         return combined_core(self.layout.effects, values, self.scales[0])
 
     def _initial_state_derivative(self, d_c: FloatArray) -> float:
-        """Return the derivative of the initial cross state by the kernel's constants (18,), the rate before the run fixed."""
+        """Return the derivative of the initial cross state by the kernel's constants (16,), the rate before the run fixed."""
         x, before, c = self.start[CROSS], self.values.get("rate_before", 0.0), self.arrays.constants
-        square = d_c[SQUARE] + d_c[FORCE] * c[FLOW] ** 2 + 2.0 * c[FORCE] * c[FLOW] * d_c[FLOW]
-        return self._steady_cross_derivative(d_c[RATE] * before + d_c[DAMPING] * x + square * x * abs(x))
+        square = (
+            d_c[CROSS_QUADRATIC] + d_c[STRIP_FORCE] * c[STRIP_FLOW] ** 2 + 2.0 * c[STRIP_FORCE] * c[STRIP_FLOW] * d_c[STRIP_FLOW]
+        )
+        return self._steady_cross_derivative(d_c[CROSS_RATE] * before + d_c[CROSS_DAMPING] * x + square * x * abs(x))
 
     def _steady_cross_derivative(self, push: float) -> float:
         """Return the derivative of the initial cross state by a small input of its equation."""
         c = self.arrays.constants
-        damping, square = c[DAMPING], c[SQUARE] + c[FORCE] * c[FLOW] ** 2
+        damping, square = c[CROSS_DAMPING], c[CROSS_QUADRATIC] + c[STRIP_FORCE] * c[STRIP_FLOW] ** 2
         stiff = damping + 2.0 * square * abs(self.start[CROSS])
         return -float(push) / float(stiff) if damping > 0.0 else 0.0
 
@@ -155,7 +159,7 @@ class Sensitivities:
     ) -> FloatArray:
         """Return motion (m + 1, 3) over the m intervals of a part, and fill sens (P, 2, m + 1)."""
         a, steps = self.arrays, self.record.steps[part]
-        place, factor = np.zeros((len(drives), DRIVE_COUNT), dtype=np.intp), np.zeros((len(drives), DRIVE_COUNT))
+        place, factor = np.zeros((len(drives), len(DRIVES)), dtype=np.intp), np.zeros((len(drives), len(DRIVES)))
         columns: dict[int, FloatArray] = {}
         known = {id(None): 0}
         for j, own in enumerate(drives):
@@ -174,7 +178,7 @@ class Sensitivities:
         return out
 
     def _input_jacobian(self, name: str) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives by a parameter, and of the constants (18,) where there are any."""
+        """Return the derivatives of the drives by a parameter, and of the constants (16,) where there are any."""
         names = NAMES[self.layout.axis]
         share, ratio = self.scales
         exponent = self.values.get("damping_exponent", 1.0)
@@ -185,13 +189,13 @@ class Sensitivities:
         if name == names.authority or name.startswith(f"{names.authority}@"):
             return self._authority(name, ratio**2), None
         if name == names.stiffness:
-            return {OF_STIFFNESS: UNIT_DRIVE}, None
+            return {STIFFNESS: UNIT_DRIVE}, None
         if name == names.trim:
             return self._trim(), None
         return self._of_effect(name)
 
     def _damping_exponent(self, factor: float, exponent: float) -> tuple[DriveDerivatives, FloatArray | None]:
-        """Return the derivatives of the drives, and of the constants (18,), by the exponent of the speed law."""
+        """Return the derivatives of the drives, and of the constants (16,), by the exponent of the speed law."""
         of_damping = self._damping(factor)
         if all(e.core is None for e in self.layout.effects):
             return of_damping, None
@@ -202,7 +206,7 @@ class Sensitivities:
 
     def _damping(self, factor: float) -> DriveDerivatives:
         shape = self.arrays.terms.damping_factor
-        return {OF_DAMPING: (factor, None if shape is None else over_intervals(shape))}
+        return {DAMPING: (factor, None if shape is None else over_intervals(shape))}
 
     def _trim(self) -> DriveDerivatives:
         """Return the derivatives of the drives by the trim: a constant moment, or one that scales with the authority."""
@@ -303,9 +307,9 @@ class Sensitivities:
         if change.moment is not None:
             _add_moment(changes, change.moment)
         if change.damping_factor is not None:
-            _add(changes, OF_DAMPING, base.damping * over_intervals(change.damping_factor))
+            _add(changes, DAMPING, base.damping * over_intervals(change.damping_factor))
         if change.damping is not None:
-            _add(changes, OF_DAMPING, over_intervals(change.damping))
+            _add(changes, DAMPING, over_intervals(change.damping))
         if change.cross_factor is not None:
             changes[CROSS_FACTOR] = over_intervals(change.cross_factor)
         return changes

@@ -1,8 +1,8 @@
-"""How a hull's measured sway or heave follows its turning and its fin, from all runs together.
+"""How a hull's measured sway or heave follows its turning and its fin, from all runs together: where a fit of it may start.
 
     T v' + v = x r + y delta at the reference speed; at f times that speed T falls with 1/f and y grows with f
-v in m/s, r in rad/s, delta in rad; a start, a constant and what the sensor adds are each run's own.
-Source: Fossen 2011, section 7.1 (the linear sway mode of manoeuvring: lift on hull and fin).
+v in m/s, r in rad/s, delta in rad; a start, a constant and what the sensor adds are each run's own. Only measured samples count.
+Source: Fossen 2011, section 7.1 (the linear sway mode of manoeuvring).
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fieldsid.models.helpers.cross_flow_speed import TIME_CONSTANTS_S
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.first_order_lag import first_order_lag, held_first_order_lag
+
+TIME_CONSTANTS_S = np.geomspace(0.1, 20.0, 24)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,18 +29,26 @@ class DriftLaw:
     per_fin: float
 
 
-def drift_law(records: Sequence[Record], reference: float) -> DriftLaw:
-    """Return the drift law of runs with a measured cross speed; `reference` in m/s, NaN where no speed is known."""
+def reference_speed(records: Sequence[Record]) -> float:
+    """Return the mean speed of some runs in m/s, NaN where one is not known."""
+    return float(np.mean([r.speed for r in records]))
+
+
+def drift_law(records: Sequence[Record], reference: float) -> DriftLaw | None:
+    """Return the drift law of the runs with a measured cross speed, None where no run has one; `reference` in m/s or NaN."""
+    seen = [r for r in records if r.cross_ok.any()]
+    if not seen:
+        return None
     lags = np.array([TIME_CONSTANTS_S[0], *TIME_CONSTANTS_S, TIME_CONSTANTS_S[-1]])
-    left = [_fitted(records, reference, lag)[2] for lag in TIME_CONSTANTS_S.tolist()]
+    left = [_fitted(seen, reference, lag)[2] for lag in TIME_CONSTANTS_S.tolist()]
     near = int(np.argmin(left)) + 1
     best = minimize_scalar(
-        lambda log_lag: _fitted(records, reference, float(np.exp(log_lag)))[2],
+        lambda log_lag: _fitted(seen, reference, float(np.exp(log_lag)))[2],
         bounds=(float(np.log(lags[near - 1])), float(np.log(lags[near + 1]))),
         method="bounded",
     )
     lag = float(np.exp(best.x)) if best.fun < left[near - 1] else float(lags[near])
-    per_rate, per_fin, _ = _fitted(records, reference, lag)
+    per_rate, per_fin, _ = _fitted(seen, reference, lag)
     return DriftLaw(lag, per_rate, per_fin)
 
 
@@ -54,9 +63,9 @@ def _fitted(records: Sequence[Record], reference: float, lag: float) -> tuple[fl
 
 
 def _without_own(record: Record, reference: float, lag: float) -> tuple[FloatArray, FloatArray]:
-    """Return a run's columns of x and y, (n, 2), and its cross speed (n,), its own start and constant projected out."""
+    """Return a run's columns of x and y (m, 2) and its measured cross speed (m,), its own start and constant projected out."""
     f = record.speed / reference if record.speed > 0.0 and reference > 0.0 else 1.0
-    time, own_lag = record.time, lag / f
+    time, own_lag, seen = record.time, lag / f, record.cross_ok
     rate = (
         np.interp(time, time[record.rate_ok], record.rate[record.rate_ok])
         if record.rate_ok.any()
@@ -66,8 +75,7 @@ def _without_own(record: Record, reference: float, lag: float) -> tuple[FloatArr
         fin = held_first_order_lag(record.fin[:-1], np.exp(-record.steps / own_lag), float(record.fin[0]))
     else:
         fin = first_order_lag(record.steps, record.fin, own_lag)
-    shared = np.column_stack([first_order_lag(record.steps, rate, own_lag), f * fin])
-    own = np.linalg.qr(np.column_stack([np.ones(time.size), np.exp(-(time - time[0]) / own_lag)]))[0]
-    out = np.column_stack([shared, record["cross"]])
-    out = out - own @ (own.T @ out)
+    shared = np.column_stack([first_order_lag(record.steps, rate, own_lag), f * fin, record.cross])[seen]
+    own = np.linalg.qr(np.column_stack([np.ones(time.size), np.exp(-(time - time[0]) / own_lag)])[seen])[0]
+    out = shared - own @ (own.T @ shared)
     return out[:, :2], out[:, 2]

@@ -1,9 +1,10 @@
-"""The measured surge without its noise: what thrust, turning and the fin have made of it, and what is left smoothed.
+"""The measured surge without its noise: what thrust and fin have made of it, and what is left smoothed.
 
-    T u' + u = c thrust + d sqrt(thrust) + e r^2 + f delta^2,   measured: u + a + b t + the rest
-A hull gathers way behind its propeller by a time T, in s, and loses it in a turn, by its drift and by the fin's own drag. All
-of these are known far better than the speed: what follows them need not be smoothed. Steady speed goes with the root of a
-thrust and with a propeller's speed itself.
+    T u' + u = c thrust + d sqrt(thrust) + f delta^2,   measured: u + a + b t + the rest
+A hull gathers way behind its propeller by a time T, in s, and loses it by the fin's own drag. These are known far better than
+the speed: what follows them need not be smoothed. What it loses by turning is smoothed: the measured rate is an output of the
+motion, and its noise must not come back through an input. Steady speed goes with the root of a thrust and with a propeller's
+speed itself.
 Source: Fossen 2011, section 6.4 (the surge mode of manoeuvring).
 """
 
@@ -33,7 +34,6 @@ def surge_behind(time: FloatArray, surge: FloatArray, causes: Sequence[FloatArra
     return gcv_smooth(time, surge, fastest_s=fastest_s, beside=columns)
 
 
-def causes_of(thrust: FloatArray | None, rate: FloatArray | None, fin: FloatArray) -> list[FloatArray]:
-    """Return what may move a hull's surge, (n,) each: of its thrust in any unit, its turn rate and its fin angle."""
-    own = [] if thrust is None else [thrust, np.sqrt(np.abs(thrust)) * np.sign(thrust)]
-    return [*own, *([] if rate is None else [rate**2]), fin**2]
+def causes_of(thrust: FloatArray | None, fin: FloatArray) -> list[FloatArray]:
+    """Return what may move a hull's surge, (n,) each: of its thrust in any unit and its fin angle."""
+    return [*([] if thrust is None else [thrust, np.sqrt(np.abs(thrust)) * np.sign(thrust)]), fin**2]

@@ -21,7 +21,7 @@ from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
 
 FOLDER = "plan/priors"
-HELD_BY = ("quadratic", "crossflow", "strip_moment")
+HELD_BY = ("quadratic", "strip_moment")
 """Core terms whose damping grows with the rate: they hold a hull that is unstable at small angles."""
 WIDEST = 3.0
 """Draws stay within this many standard deviations."""

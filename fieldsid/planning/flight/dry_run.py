@@ -17,7 +17,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.operating_point import OperatingPoint, autopilot_of, operating_point
 
 Helpers = Callable[[FloatArray], Mapping[str, FloatArray]]
-"""helpers(time (n,) s) -> helper signals (n,) by role: surge, thrust, roll, depth, cross."""
+"""helpers(time (n,) s) -> helper signals (n,) by role: surge, thrust, roll, depth."""
 
 
 class ModelPlant:
@@ -70,8 +70,7 @@ def dry_run(
     # the loop saw what had been measured by then; the log of a clock that runs early holds what came after as well
     logged, count = plant.logged(), flight.time.size
     run = run_of(model, flight.time, fin, logged.angle[:count], logged.rate[:count], speed=speed, name=maneuver.name)
-    columns = {**ROLES, "cross": NAMES[model.axis].cross}
-    return replace(run, signals={**run.signals, **{columns[role]: values[: len(run)] for role, values in given.items()}})
+    return replace(run, signals={**run.signals, **{ROLES[role]: values[: len(run)] for role, values in given.items()}})
 
 
 def run_of(

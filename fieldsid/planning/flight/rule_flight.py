@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.dynamics import integrate
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
+from fieldsid.dynamics.places import CONSTANTS, DRIVES
 from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
@@ -24,7 +24,7 @@ def advance_all(
 ) -> None:  # fmt: skip
     """Move states (m, 3) on by the interval `at` with fins (m,) about trim (m,), and fill moved (2, m) with angles and rates.
 
-    drive (m, n-1, 8) before the fin, push (m, n-1, 3), off (m, n-1, 2) the fin's angle less its command at both ends.
+    drive (m, n-1, 6) before the fin, push (m, n-1, 3), off (m, n-1, 2) the fin's angle less its command at both ends.
     """
     steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[2]))
     for i in range(state.shape[0]):
@@ -84,8 +84,8 @@ class OperatingPointPlant:
 def plant_of(scenes: Sequence[OperatingPoint], n: int, rate_hz: float, moments: FloatArray | None) -> OperatingPointPlant:
     """Return scenes at rest as one plant over n samples; moments (m, n) rad/s^2 disturb them."""
     count = len(scenes)
-    drive, push = np.empty((count, n - 1, len(integrate.DRIVES))), np.empty((count, n - 1, 3))
-    constants = np.empty((count, len(integrate.CONSTANTS)))
+    drive, push = np.empty((count, n - 1, len(DRIVES))), np.empty((count, n - 1, 3))
+    constants = np.empty((count, len(CONSTANTS)))
     pieces = 1
     for i, scene in enumerate(scenes):
         ready = prepared(scene, n, rate_hz)

@@ -13,9 +13,9 @@ from fieldsid.dynamics.drag_laws import crossflow, crossforce, power_drag
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import inner, jit
 
-PLANT_COLUMNS = 27
-"""Columns of a plant's row: damping, stiffness, authority, offset, quadratic, beyond_square, crossflow, cross_damping,
-cross_rate, cross_fin, cross_quadratic, exp(-step/lag), delay in steps, largest fin move in a step; the powers of the speed of
+PLANT_COLUMNS = 26
+"""Columns of a plant's row: damping, stiffness, authority, offset, quadratic, beyond_square, cross_damping, cross_rate,
+cross_fin, cross_quadratic, exp(-step/lag), delay in steps, largest fin move in a step; the powers of the speed of
 damping, authority, cross_damping, cross_rate, cross_fin, cross_quadratic; drag, fin's and turn's loss of speed; cross_share,
 strip_moment, strip_force, strip_flow."""
 GAIN_COLUMNS = 8
@@ -27,10 +27,9 @@ SLOWEST_SHARE = 0.05
 
 
 @inner
-def drag(p: float, of_power: float, beyond: float, square: float) -> float:
-    """Return the drag at a rate: of_power p|p| (|p|/0.2)^beyond + square p|p|."""
-    value = square * p * abs(p)
-    return value if of_power == 0.0 else value + of_power * power_drag(p, beyond)[0]
+def drag(p: float, quadratic: float, beyond: float) -> float:
+    """Return the drag at a rate: quadratic p|p| (|p|/0.2)^beyond."""
+    return quadratic * (p * abs(p) if beyond == 0.0 else power_drag(p, beyond)[0])
 
 
 @inner
@@ -63,7 +62,7 @@ def at_rest(row: FloatArray, now: FloatArray) -> tuple[float, float, float]:
 def at_speed(row: FloatArray, ratio: float, out: FloatArray) -> None:
     """Fill out (6,) with damping, authority and the cross state's four coefficients at a speed over the first one."""
     for j in range(6):
-        value, power = row[0] if j == 0 else row[5 + j], row[14 + j]
+        value, power = row[0] if j == 0 else row[4 + j], row[13 + j]
         # a law's powers are whole but for a fitted one, and a product takes a tenth of the time
         factor = 1.0 if power == 0.0 else ratio if power == 1.0 else ratio * ratio if power == 2.0 else ratio**power
         out[j] = (row[2] if j == 1 else value) * factor
@@ -83,11 +82,11 @@ def commanded(now: FloatArray, target: float, y: float, p: float, integral: floa
 @inner
 def along_hull(row: FloatArray, c: FloatArray, x: float, p: float) -> tuple[float, float]:
     """Return the moment of the cross state with that of the flow it makes along the hull, and what that flow takes from it."""
-    if row[24] == 0.0 and row[25] == 0.0:
-        return row[23] * x, 0.0
-    faster = c[2] / row[7]
-    alpha = row[26] * x / faster
-    return row[23] * x - row[24] * crossflow(alpha, p)[0], row[25] * faster * crossforce(alpha, p)[0]
+    if row[23] == 0.0 and row[24] == 0.0:
+        return row[22] * x, 0.0
+    faster = c[2] / row[6]
+    alpha = row[25] * x / faster
+    return row[22] * x - row[23] * crossflow(alpha, p)[0], row[24] * faster * crossforce(alpha, p)[0]
 
 
 @inner
@@ -96,17 +95,14 @@ def moved(
 ) -> tuple[float, float, float, float]:
     """Return angle, rate and cross state after a step by the midpoint rule, and the rate midway."""
     y, p, x = state
-    of_power, beyond, square = row[4], row[5], row[6]
-    if beyond == 0.0:
-        of_power, square = 0.0, row[4] + row[6]
-    a, b, k, h = c[0], c[1], row[1], 0.5 * step
+    a, b, k, h, quadratic, beyond = c[0], c[1], row[1], 0.5 * step, row[4], row[5]
     moment = b * held + push
     turned, slowed = along_hull(row, c, x, p)
-    pp = -a * p - k * y + moment - drag(p, of_power, beyond, square) + turned
+    pp = -a * p - k * y + moment - drag(p, quadratic, beyond) + turned
     px = -(c[2] + c[5] * abs(x)) * x - c[3] * p + c[4] * held - slowed
     ym, pm, xm = y + h * p, p + h * pp, x + h * px
     turned, slowed = along_hull(row, c, xm, pm)
-    p += step * (-a * pm - k * ym + moment - drag(pm, of_power, beyond, square) + turned)
+    p += step * (-a * pm - k * ym + moment - drag(pm, quadratic, beyond) + turned)
     x += step * (-(c[2] + c[5] * abs(xm)) * xm - c[3] * pm + c[4] * held - slowed)
     return y + step * pm, p, x, pm
 
@@ -123,7 +119,7 @@ def close_loop(
     push: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill out (n, t, 4) with angle, fin, depth and speed of n plants (n, 27) under the gains of table (k, 8).
+    """Fill out (n, t, 4) with angle, fin, depth and speed of n plants (n, 26) under the gains of table (k, 8).
 
     push (t,) is a disturbance moment in rad/s^2. With depth_step other than zero the reference is depth gain (z - depth_step),
     limited; else `reference` rad. What diverges is inf from there on.
@@ -131,7 +127,7 @@ def close_loop(
     now, scaled = np.empty(table.shape[1]), np.empty(6)
     for case in range(plants.shape[0]):
         row = plants[case]
-        decay, late, most, slowing = row[11], int(row[12]), row[13], row[20]
+        decay, late, most, slowing = row[10], int(row[11]), row[12], row[19]
         gains_at(table, speed, now)
         at_speed(row, 1.0, scaled)
         p = x = z = 0.0
@@ -158,6 +154,6 @@ def close_loop(
             y, p, x, middle = moved(row, scaled, held, push[i], step, (y, p, x))
             z -= u * 0.5 * (before + y) * step
             if slowing > 0.0:
-                lost = u * u * (1.0 + row[21] * held * held) + row[22] * middle * middle
+                lost = u * u * (1.0 + row[20] * held * held) + row[21] * middle * middle
                 u = max(u + step * slowing * (speed * speed - lost), SLOWEST_SHARE * speed)
             fin = new

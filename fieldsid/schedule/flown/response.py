@@ -152,7 +152,7 @@ def _run(plant: LinearPlant, rows: Sequence[Row] | Row, flight: _Flight, push: F
     plants = np.column_stack(
         [
             plant.damping, plant.stiffness, plant.authority, plant.offset + flight.offset, plant.quadratic, plant.beyond_square,
-            plant.crossflow, plant.cross_damping, plant.cross_rate, plant.cross_fin, plant.cross_quadratic,
+            plant.cross_damping, plant.cross_rate, plant.cross_fin, plant.cross_quadratic,
             np.exp(-flight.step / np.maximum(plant.lag, FASTEST_LAG_S)), np.round(plant.delay / flight.step),
             np.minimum(plant.fin_rate, 1e6) * flight.step, plant.powers, plant.speed_loss, plant.cross_share, plant.strip_moment,
             plant.strip_force, plant.strip_flow,

@@ -43,7 +43,7 @@ def steady_turn(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side:
     rate = np.zeros_like(surge)
     moments = _moment_tables(plant)
     for _ in range(MAX_TURN_ITERATIONS):
-        rate = balance(plant, speed_loss, surge, fin, side, moments)
+        rate = balance(plant, surge, fin, side, moments)
         new = start / speed_loss.factor(fin, np.nan_to_num(rate) / surge)
         change = float(np.max(np.abs(new - surge) / start))
         surge = new
@@ -55,9 +55,7 @@ def steady_turn(plant: YawPlant, speed_loss: SpeedLoss, entry: FloatArray, side:
     return SteadyTurn(rate, surge, path, radius)
 
 
-def balance(
-    plant: YawPlant, speed_loss: SpeedLoss, surge: FloatArray, fin: FloatArray, side: float, moments: Mapping[str, FloatArray]
-) -> FloatArray:
+def balance(plant: YawPlant, surge: FloatArray, fin: FloatArray, side: float, moments: Mapping[str, FloatArray]) -> FloatArray:
     """Return the steady rate (d, s) toward `side` at a surge speed (d, s), NaN where there is none."""
     scale = plant.scale(surge)
     core = {n: c.at(scale) for n, c in plant.core.items()}
@@ -67,10 +65,10 @@ def balance(
     linear = plant.damping_at(surge) + core["cross_rate"] * inverse
     push = plant.authority_at(surge) * fin + plant.trim_at(surge) + plant.moment + core["cross_fin"] * inverse * fin
     drive = side * push
-    curved = ("crossflow", "cross_quadratic", "beyond_square", "strip_moment", "strip_force")
+    curved = ("cross_quadratic", "beyond_square", "strip_moment", "strip_force")
     if not moments and not any(np.any(core[name]) for name in curved):
         return side * _quadratic_root(linear, core["quadratic"], drive)
-    return side * _bisected(plant, speed_loss, core, linear, drive, side * fin, side, moments)
+    return side * _bisected(plant, core, linear, drive, side * fin, side, moments)
 
 
 def _quadratic_root(linear: FloatArray, quadratic: FloatArray, drive: FloatArray) -> FloatArray:
@@ -86,7 +84,6 @@ def _quadratic_root(linear: FloatArray, quadratic: FloatArray, drive: FloatArray
 
 def _bisected(
     plant: YawPlant,
-    speed_loss: SpeedLoss,
     core: Mapping[str, FloatArray],
     linear: FloatArray,
     drive: FloatArray,
@@ -98,9 +95,7 @@ def _bisected(
     high = np.full_like(low, MAX_RATE_RAD_S)
 
     def surplus(rate: FloatArray) -> FloatArray:
-        drift = -speed_loss.drift_per_rate * rate / plant.length
-        left = drive - linear * rate
-        left = left - core["quadratic"] * power_drag(rate, core["beyond_square"]) - core["crossflow"] * strip_moment(drift, rate)
+        left = drive - linear * rate - core["quadratic"] * power_drag(rate, core["beyond_square"])
         if np.any(core["cross_quadratic"]) or np.any(core["strip_moment"]) or np.any(core["strip_force"]):
             push = core["cross_fin"] * fin - core["cross_rate"] * rate
             settled = _settled(core, push, rate)

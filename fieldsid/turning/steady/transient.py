@@ -74,8 +74,6 @@ def _slope(state: FloatArray, plant: YawPlant, speed_loss: SpeedLoss, entry: Flo
     moment = moment - core["strip_moment"] * strip_moment(along_hull, rate)
     drift = (core["cross_fin"] * fin - core["cross_rate"] * rate - core["strip_force"] * strip_force(along_hull, rate)[0]) / scale
     drift = drift - (core["cross_damping"] + core["cross_quadratic"] * scale * np.abs(state[6])) * state[6]
-    if np.any(core["crossflow"]):
-        moment = moment - core["crossflow"] * strip_moment(-speed_loss.drift_per_rate[0] * rate / plant.length[0], rate)
     drag, turn, loss = speed_loss.drag[0], speed_loss.turn[0], speed_loss.fin[0]
     slower = drag * (entry**2 - surge**2 * (1.0 + loss * fin**2) - turn * rate**2)
     sway = -speed_loss.drift_per_rate[0] * rate

@@ -57,7 +57,7 @@ class Effect(Shape):
     forms: list[Form]
     """Other shapes of it."""
     needs: list[str]
-    """Signals the log must have: surge, thrust, roll, depth, cross."""
+    """Signals the log must have: surge, thrust, roll, depth."""
     extra_states: list[str]
     """States it adds to the model."""
     telltale: str

@@ -10,18 +10,19 @@ from fieldsid.dynamics import integrate
 from fieldsid.dynamics.assemble import pieces_for
 from fieldsid.dynamics.linear_kernel import accumulate_normal_equations, is_even, linear_motion, linear_sensitivities
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion, nonlinear_sensitivities
+from fieldsid.dynamics.places import CONSTANTS, DRIVES
 from fieldsid.numerics.jit import plain_of
 
 N, H = 80, 0.05
 C = dict(
     zip(
-        integrate.CONSTANTS,
-        (0.8, 0.4, 1.6, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1),
+        CONSTANTS,
+        (0.8, 0.05, -0.04, 0.2, 0.1, 0.9, 0.3, 1.4, -0.3, 0.03, 0.06, 0.4, 0.7, 0.9, 1.2, 1.1),
         strict=True,
     )
 )
-LINEAR = np.array([0.0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0])
-COUNT = len(integrate.CONSTANTS)
+LINEAR = np.array([1.0 * (name == "cross_share") for name in CONSTANTS])
+COUNT = len(CONSTANTS)
 
 
 def NOTHING(count):  # noqa: N802
@@ -31,12 +32,11 @@ def NOTHING(count):  # noqa: N802
 
 def drive(seed=4):
     rng = np.random.default_rng(seed)
-    out = np.zeros((N - 1, 8))
+    out = np.zeros((N - 1, 6))
     out[:, 0], out[:, 1] = 1.1 + 0.2 * rng.random(N - 1), 0.3
     level = np.repeat(rng.uniform(-0.3, 0.3, N // 10 + 1), 10)[: N - 1]
     out[:, 2], out[:, 3] = level, level + 0.02
     out[:, 4], out[:, 5] = 1.0 + 0.1 * rng.random(N - 1), 0.05
-    out[:, 6], out[:, 7] = 0.1 * np.sin(np.arange(N - 1) * 0.1), 0.1 * np.sin(np.arange(1, N) * 0.1)
     return out
 
 
@@ -44,15 +44,13 @@ def oracle(rows, c, start):
     """Interval by interval with DOP853: inputs are smooth inside each."""
     xi = (np.arange(800) + 0.5) / 800 - 0.5
     path, y = [np.array(start)], np.array(start)
-    for i, (a, k, m0, m1, g, q, w0, w1) in enumerate(rows):
+    for i, (a, k, m0, m1, g, q) in enumerate(rows):
 
-        def slope(t, s, i=i, a=a, k=k, m0=m0, m1=m1, g=g, q=q, w0=w0, w1=w1):
+        def slope(t, s, i=i, a=a, k=k, m0=m0, m1=m1, g=g, q=q):
             part = t / H
             seen = s[0] - c["heading_turn"] * ((i + part) * H - 0.5 * (N - 1) * H)
-            flow = (w0 + (w1 - w0) * part) / c["length"] + xi * s[1]
-            drag = 32.0 * np.mean(flow * np.abs(flow) * xi)
             own = c["strip_flow"] * s[2] / g + xi * s[1]
-            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part - c["crossflow"] * drag + c["cross_share"] * s[2]
+            p = -a * s[1] - k * s[0] + m0 + (m1 - m0) * part + c["cross_share"] * s[2]
             p -= c["strip_moment"] * 32.0 * np.mean(own * np.abs(own) * xi)
             p -= c["quadratic"] * np.sign(s[1]) * 0.2**2 * (abs(s[1]) / 0.2) ** (2.0 + c["beyond_square"])
             p += c["heading_sin"] * np.sin(seen) + c["heading_cos"] * np.cos(seen)
@@ -82,7 +80,7 @@ def test_the_compiled_core_gives_the_numbers_of_its_python_source():
 
 
 def test_a_motion_without_bound_is_nan_from_there_on():
-    rows, out = np.zeros((N - 1, 8)), np.empty((N, 3))
+    rows, out = np.zeros((N - 1, 6)), np.empty((N, 3))
     rows[:, 0], rows[:, 2:4] = -40.0, 1.0
     integrate.integrate_motion(np.full(N - 1, H), rows, LINEAR, np.zeros(3), 8, out)
     first = int(np.argmax(np.isnan(out[:, 1])))
@@ -100,7 +98,7 @@ def test_the_linear_core_leaves_the_residual_of_the_general_one(a, k):
     pieces = pieces_for(0.08, abs(a), k**0.5)
     square = np.zeros((8, 7))
     accumulate_normal_equations(steps, fin, measured, weight, np.array([a, k, -0.8, 0.01, 0.1, 0.05]), pieces, square)
-    rows, out = np.zeros((N - 1, 8)), np.empty((N, 3))
+    rows, out = np.zeros((N - 1, 6)), np.empty((N, 3))
     rows[:, 0], rows[:, 1], rows[:, 2], rows[:, 3] = a, k, -0.8 * fin[0] + 0.01, -0.8 * fin[1] + 0.01
     integrate.integrate_motion(steps, rows, LINEAR, np.array([0.1, 0.05, 0.0]), pieces, out)
     left = measured - out[:, :2].T
@@ -115,7 +113,7 @@ def test_the_tangents_of_every_constant_are_its_central_differences():
     integrate.integrate_with_sensitivities(
         steps, rows, c, start, 2, *NOTHING(count), np.eye(count), np.zeros((count, 3)), out, sens
     )
-    for j, name in enumerate(integrate.CONSTANTS):
+    for j, name in enumerate(CONSTANTS):
         ends = []
         for side in (1.0, -1.0):
             moved, path = c.copy(), np.empty((N, 3))
@@ -134,9 +132,9 @@ def clock(kind):
 
 
 def pushed():
-    """Four parameters that push one drive each: columns (5, n-1), places and factors (4, 6), and the drives (4, n-1, 8)."""
+    """Four parameters that push one drive each: columns (5, n-1), places and factors (4, 6), and the drives (4, n-1, 6)."""
     columns = np.stack([np.ones(N - 1), *(1.0 + 0.1 * np.cos(np.arange(N - 1) * (1 + i)) for i in range(4))])
-    places, factors, pushes = np.zeros((4, 6), dtype=np.intp), np.zeros((4, 6)), np.zeros((4, N - 1, 8))
+    places, factors, pushes = np.zeros((4, 6), dtype=np.intp), np.zeros((4, 6)), np.zeros((4, N - 1, 6))
     for i in range(4):
         places[i, i], factors[i, i], pushes[i, :, i] = i + 1, 0.5, 0.5 * columns[i + 1]
     return columns, places, factors, pushes
@@ -147,7 +145,7 @@ def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear
     """Where damping, stiffness and step stay the map is worked out once, but not what goes with the motion."""
     rows, start = drive(), np.array([0.1, -0.05, 0.0])
     steps, rows[:, 0] = clock(kind)
-    rows[:, 4], rows[:, 5:] = 1.0, 0.0
+    rows[:, 4], rows[:, 5] = 1.0, 0.0
     columns, places, factors, pushes = pushed()
     out, sens = np.empty((N, 3)), np.empty((4, 2, N))
     none = np.zeros((4, COUNT)), np.zeros((4, 3))
@@ -158,7 +156,7 @@ def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear
             path = np.empty((N, 3))
             integrate.integrate_motion(steps, rows + side * 1e-5 * pushes[place], LINEAR, start, 2, path)
             ends.append(path[:, :2].T)
-        np.testing.assert_allclose(sens[place], (ends[0] - ends[1]) / 2e-5, atol=1e-8, err_msg=integrate.DRIVES[place])
+        np.testing.assert_allclose(sens[place], (ends[0] - ends[1]) / 2e-5, atol=1e-8, err_msg=DRIVES[place])
 
 
 @pytest.mark.parametrize("pieces", [1, 3])
@@ -166,7 +164,7 @@ def test_the_tangents_of_the_drives_are_their_central_differences_along_a_linear
 def test_the_linear_core_moves_as_the_general_one(pieces, what):
     rows, start, columns, places, factors, _ = drive(), np.array([0.1, -0.05, 0.0]), *pushed()
     steps, rows[:, 0] = np.full(N - 1, H), -9.0 if what == "one without bound" else 1.1
-    rows[:, 4], rows[:, 5:] = 1.0, 0.0
+    rows[:, 4], rows[:, 5] = 1.0, 0.0
     d_start = np.eye(4, 3) if what == "a single run's own start" else np.zeros((4, 3))
     d_start[:, 2], none = 0.0, np.zeros((4, COUNT))
     found = []
@@ -186,14 +184,14 @@ def test_the_linear_core_moves_as_the_general_one(pieces, what):
             np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-12)
 
 
-MULTIPLY_ONLY = {"length", "beyond_square", "heading_turn", "cross_share", "strip_flow"}
+MULTIPLY_ONLY = {"beyond_square", "heading_turn", "cross_share", "strip_flow"}
 
 
-@pytest.mark.parametrize("name", [n for n in integrate.CONSTANTS if n not in MULTIPLY_ONLY])
+@pytest.mark.parametrize("name", [n for n in CONSTANTS if n not in MULTIPLY_ONLY])
 def test_a_motion_that_any_constant_bends_is_not_taken_for_a_linear_one(name):
     """Nor are its tangents, where only a parameter's derivative is of the constant."""
-    steps, rows, c, start, at = np.full(N - 1, H), drive(), LINEAR.copy(), np.zeros(3), integrate.CONSTANTS.index(name)
-    rows[:, 0], rows[:, 4], rows[:, 5:] = 1.1, 1.0, 0.0
+    steps, rows, c, start, at = np.full(N - 1, H), drive(), LINEAR.copy(), np.zeros(3), CONSTANTS.index(name)
+    rows[:, 0], rows[:, 4], rows[:, 5] = 1.1, 1.0, 0.0
     out, sens = np.empty((N, 3)), np.empty((1, 2, N))
     assert linear_motion(steps, rows, c, start, 1, out)
     d_c, none = np.zeros((1, COUNT)), np.zeros((1, 3))
@@ -207,7 +205,7 @@ def test_a_motion_that_any_constant_bends_is_not_taken_for_a_linear_one(name):
 @pytest.mark.parametrize("what", ["a cross state", "a cross push", "a parameter's cross state", "a parameter's cross push"])
 def test_a_motion_with_a_cross_state_is_not_taken_for_a_linear_one(what):
     steps, rows, start, (columns, place, factor) = np.full(N - 1, H), drive(), np.zeros(3), NOTHING(1)
-    rows[:, 0], rows[:, 4], rows[:, 5:] = 1.1, 1.0, 0.0
+    rows[:, 0], rows[:, 4], rows[:, 5] = 1.1, 1.0, 0.0
     d_start = np.zeros((1, 3))
     start[2] = 0.1 * (what == "a cross state")
     rows[7, 5] = 0.1 * (what == "a cross push")
@@ -220,7 +218,7 @@ def test_a_motion_with_a_cross_state_is_not_taken_for_a_linear_one(what):
 
 
 def test_few_intervals_or_unlike_ones_are_not_even():
-    rows, steps = np.ones((N - 1, 8)), np.full(N - 1, H)
+    rows, steps = np.ones((N - 1, 6)), np.full(N - 1, H)
     assert is_even(steps, rows)
     assert not is_even(steps[:8], rows[:8])
     assert not is_even(np.linspace(H, 1.001 * H, N - 1), rows)

@@ -30,6 +30,8 @@ def record(time, fin, *, held: bool) -> Record:
         none,
         ok,
         ok,
+        none,
+        ~ok,
         MappingProxyType({}),
         1.0,
     )

@@ -19,7 +19,7 @@ def record(time, *, axis: Axis = Axis.YAW, speed: float = 2.0, **signals) -> Rec
     time = np.asarray(time, float)
     none, ok = np.zeros(time.size), np.ones(time.size, bool)
     helpers = MappingProxyType({k: np.asarray(v, float) for k, v in signals.items()})
-    return Record("made", axis, time, none, True, False, none, none, ok, ok, helpers, speed)
+    return Record("made", axis, time, none, True, False, none, none, ok, ok, none, ~ok, helpers, speed)
 
 
 def terms(name: str, log: Record, **values: float):
@@ -88,13 +88,17 @@ def test_the_cross_state_scales_with_speed_as_lift_does():
 def test_each_core_effect_sets_its_own_terms_only():
     core = pick_effect("quadratic_damping").core({"quadratic": 3.0}, 2.0)
     assert core.quadratic == 3.0
-    assert core.crossflow == core.cross_rate == core.heading_sin == 0.0
+    assert core.strip_moment == core.cross_rate == core.heading_sin == 0.0
     core = pick_effect("current").core({"current_sin": 0.1, "current_cos": 0.2}, 2.0)
     assert (core.heading_sin, core.heading_cos) == (0.1, 0.2)
     core = pick_effect("large_angle_righting").core({"righting_sin": 0.1, "righting_cos": 0.2}, 2.0)
     assert (core.righting_sin, core.righting_cos) == (0.1, 0.2)
-    core = pick_effect("crossflow_drag").core({"crossflow": 0.1, "length": 1.7}, 2.0)
-    assert (core.crossflow, core.length) == (0.1, 1.7)
+    flow = pick_effect("crossflow_drag")
+    core = flow.core({"crossflow": 0.1, "flow_damping": 0.5, "flow_rate": 0.3, "flow_fin": 0.2}, 2.0)
+    assert (core.strip_moment, core.strip_flow, core.cross_share) == (0.1, 0.5, 0.0)
+    assert (core.cross_damping, core.cross_rate, core.cross_fin) == (1.0, 1.2, 1.6)
+    core = flow.core({"crossflow": 0.1, "flow_share": 0.7}, 2.0)
+    assert (core.strip_moment, core.strip_flow, core.cross_share, core.cross_damping) == (0.1, 0.35, 1.0, 0.0)
 
 
 def seen(name: str, log: Record, motion: Motion, **values: float) -> Motion:

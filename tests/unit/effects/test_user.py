@@ -44,7 +44,7 @@ def made(moment: str = "-k * r * abs(r)", **more):
 def record(**signals) -> Record:
     none, ok = np.zeros(TIME.size), np.ones(TIME.size, bool)
     helpers = MappingProxyType({k: np.asarray(v, float) for k, v in signals.items()})
-    return Record("made", Axis.YAW, TIME, none + 0.2, True, False, none, none, ok, ok, helpers, 1.5)
+    return Record("made", Axis.YAW, TIME, none + 0.2, True, False, none, none, ok, ok, none, ~ok, helpers, 1.5)
 
 
 def moment_of(text: str, *, rate=0.5, k=2.0, **signals) -> np.ndarray:
@@ -72,11 +72,11 @@ def test_the_template_is_an_effect_that_needs_roll():
         ("k * exp(0 * t) * tanh(0) + 1e-1", 0.1),
         ("k * +r - -r", 1.5),
         ("k", 2.0),
-        ("k * phi + z * u - v * thrust", 2.0 * 0.1 + 3.0 * 2.0 - 0.5 * 7.0),
+        ("k * phi + z * u - thrust", 2.0 * 0.1 + 3.0 * 2.0 - 7.0),
     ],
 )
 def test_expressions_are_worth_what_they_say(text, expected):
-    full = {n: np.full(TIME.size, x) for n, x in {"roll": 0.1, "depth": 3.0, "surge": 2.0, "cross": 0.5, "thrust": 7.0}.items()}
+    full = {n: np.full(TIME.size, x) for n, x in {"roll": 0.1, "depth": 3.0, "surge": 2.0, "thrust": 7.0}.items()}
     np.testing.assert_allclose(moment_of(text, **full), expected)
 
 
@@ -85,9 +85,22 @@ def test_time_counts_from_the_first_sample():
 
 
 def test_the_names_used_say_axis_and_needs():
-    assert made("k * q * w").axes == (Axis.PITCH,)
+    assert made("k * q * theta").axes == (Axis.PITCH,)
     assert made("k * rate").axes == (Axis.YAW, Axis.PITCH)
-    assert made("k * u * phi * z * cross * thrust").needs == ("surge", "roll", "depth", "cross", "thrust")
+    assert made("k * u * phi * z * thrust").needs == ("surge", "roll", "depth", "thrust")
+
+
+@pytest.mark.parametrize(("name", "state"), [("v", "sway_coupling"), ("w", "heave_coupling"), ("cross", "sway_coupling")])
+def test_a_moment_of_the_hulls_own_cross_speed_is_refused_with_the_effect_that_has_it_as_a_state(name, state):
+    with pytest.raises(EffectError, match=f"`{name}` cannot drive a moment") as caught:
+        made(f"k * u * {name}")
+    assert caught.value.found == f"k * u * {name}"
+    assert f"`{state}`" in caught.value.hint
+
+
+def test_a_coefficient_cannot_be_called_as_the_cross_speed_is():
+    with pytest.raises(EffectError, match="has the name of a signal"):
+        made("v * r", coefficients={"v": K["k"]})
 
 
 def test_an_effect_of_ones_own_is_picklable_and_works_after_it():

@@ -10,7 +10,7 @@ import pytest
 from fieldsid.logs.doctor.examine import examine
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.models.record import left_out, record_of
+from fieldsid.models.record import first_part, left_out, record_of
 
 
 def run_of(surge):
@@ -48,6 +48,29 @@ def test_a_sensors_spikes_count_as_not_measured():
         ("spikes", "run", "yaw_rate_rad_s", 1),
     ]
     assert left_out([replace(run, notes=examine(run, {}))], Axis.PITCH) == ()
+
+
+def test_the_cross_speed_is_kept_as_it_was_measured():
+    rng, n = np.random.default_rng(4), 600
+    time = 0.05 * np.arange(n)
+    sway = 0.2 * np.sin(0.5 * time) + 0.02 * rng.standard_normal(n)
+    sway[[100, 350]] = [np.nan, 3.0]
+    own = run_of(np.full(n, 1.4))
+    record = record_of(replace(own, signals={**own.signals, "sway_m_s": sway}), Axis.YAW)
+    assert np.flatnonzero(~record.cross_ok).tolist() == [100, 350]
+    np.testing.assert_array_equal(record.cross, np.where(record.cross_ok, sway, 0.0))
+    assert "cross" not in record.signals
+    part = first_part(record, 200)
+    np.testing.assert_array_equal(part.cross, record.cross[:200])
+    assert part.cross_ok.sum() == 199
+
+
+@pytest.mark.parametrize("logged", [{}, {"sway_m_s": np.zeros(400)}, {"heave_m_s": np.linspace(0.0, 0.3, 400)}])
+def test_a_log_without_a_cross_speed_of_the_axis_has_none_measured(logged):
+    own = run_of(np.full(400, 1.4))
+    record = record_of(replace(own, signals={**own.signals, **logged}), Axis.YAW)
+    assert not record.cross_ok.any()
+    assert record.cross.tolist() == [0.0] * 400
 
 
 def test_a_command_that_is_lost_lies_between_those_around_it():

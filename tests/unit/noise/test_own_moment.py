@@ -21,7 +21,7 @@ OWN = 4e-4
 def a_record(seconds: float = 50.0, step: float = 0.1, *, name: str = "run") -> Record:
     time = np.arange(0.0, seconds, step)
     zero, ok = np.zeros(time.size), np.ones(time.size, dtype=bool)
-    return Record(name, Axis.PITCH, time, zero, True, False, zero, zero, ok, ok, {}, 1.0)
+    return Record(name, Axis.PITCH, time, zero, True, False, zero, zero, ok, ok, zero, ~ok, {}, 1.0)
 
 
 def moved(records: list[Record], moments: np.ndarray, rng: np.random.Generator, noise: Noise = WHITE) -> list[np.ndarray]:

@@ -38,7 +38,7 @@ def record(*, gaps: bool) -> Record:
     if gaps:
         ok[0, 10:14], ok[1, 20:22] = False, False
     zero = np.zeros(40)
-    return Record("short", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], {}, 1.0)
+    return Record("short", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], zero, ~ok[0], {}, 1.0)
 
 
 def settled_record(*, gaps: bool = False) -> Record:
@@ -47,7 +47,7 @@ def settled_record(*, gaps: bool = False) -> Record:
     zero, ok = np.zeros(400), np.ones((2, 400), dtype=bool)
     if gaps:
         ok[0, 150:153], ok[1, 330:331] = False, False
-    return Record("long", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], {}, 1.0)
+    return Record("long", Axis.YAW, time, zero, True, False, zero, zero, ok[0], ok[1], zero, ~ok[0], {}, 1.0)
 
 
 def dense(log: Record, noise: Noise) -> np.ndarray:

@@ -64,7 +64,6 @@ def plant(speed=1.5, count=1, **own):
         "offset": 0.0,
         "quadratic": 0.0,
         "beyond_square": 0.0,
-        "crossflow": 0.0,
         "cross_damping": 1.0,
         "cross_rate": 0.0,
         "cross_fin": 0.0,
@@ -217,7 +216,7 @@ STRIPS = {"cross_share": 0.6, "strip_moment": 2.5, "strip_force": 3.0, "strip_fl
 @pytest.mark.parametrize("strips", [{}, STRIPS], ids=["sway", "strips"])
 @pytest.mark.parametrize("power", [2.0, 1.6, 3.0])
 def test_step_agrees_with_an_ode_solver(power, strips):
-    drags = {"quadratic": 0.8, "beyond_square": power - 2.0, "crossflow": 0.3}
+    drags = {"quadratic": 0.8, "beyond_square": power - 2.0}
     own = plant(lag=0.25, **drags, **strips, cross_rate=-0.4, cross_damping=0.7, cross_quadratic=3.0, offset=0.01)
     xi = (np.arange(400) + 0.5) / 400 - 0.5
     row = replace(design_schedule_row(), gains=Gains(-0.6, 0.0, -0.2), feed_forward=-0.01, fin_limit=10.0)
@@ -228,7 +227,7 @@ def test_step_agrees_with_an_ode_solver(power, strips):
         command = -0.6 * (0.3 - y) + 0.2 * p - 0.01
         flow = strips.get("strip_flow", 0.0) * x + xi * p
         sway = -(0.7 + 3.0 * abs(x)) * x + 0.4 * p - strips.get("strip_force", 0.0) * np.mean(flow * np.abs(flow))
-        drag = 0.3 * p * abs(p) + 0.8 * np.sign(p) * 0.2**2 * (abs(p) / 0.2) ** power
+        drag = 0.8 * np.sign(p) * 0.2**2 * (abs(p) / 0.2) ** power
         drag += strips.get("strip_moment", 0.0) * 32.0 * np.mean(flow * np.abs(flow) * xi)
         return [p, -1.2 * p - 1.6 * (fin + 0.01) - drag + strips.get("cross_share", 1.0) * x, sway, (command - fin) / 0.25]
 

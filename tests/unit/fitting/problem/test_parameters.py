@@ -57,11 +57,14 @@ def test_snapped_runs_count_as_flown_at_their_groups_speed():
 
 def test_the_one_cross_state_is_that_of_the_effect_whose_textbook_has_it():
     flow, sway = pick_effect("crossflow_drag"), pick_effect("sway_coupling")
-    computed = with_variant(flow, flow.variants[0])
-    of_sensor = next(with_variant(sway, v) for v in sway.variants if v.without)
-    assert layout_of(runs(1.4), Axis.YAW, [computed]).effects == (computed,)
-    assert "rate_before" in {p.name for p in layout_of(runs(1.4), Axis.YAW, [computed]).parameters}
-    assert layout_of(runs(1.4), Axis.YAW, [computed, sway]).effects == (flow, sway)
-    assert layout_of(runs(1.4), Axis.YAW, [sway, computed]).effects == (sway, flow)
-    # flown where no sway is measured, it has a state after all
-    assert layout_of(runs(1.4), Axis.YAW, [computed, of_sensor]).effects == (flow, of_sensor)
+    shared = with_variant(flow, flow.variants[0])
+    alone, both = layout_of(runs(1.4), Axis.YAW, [flow]), layout_of(runs(1.4), Axis.YAW, [sway, flow])
+    assert alone.effects == (flow,)
+    assert both.effects == (sway, shared)
+    for layout in (alone, both):
+        assert sum(p.name == "rate_before" for p in layout.parameters) == 1
+    assert layout_of(runs(1.4), Axis.YAW, [flow, sway]).effects == (shared, sway)
+    # whichever leaves, the other has a state
+    assert layout_of(runs(1.4), Axis.YAW, [shared]).effects == (flow,)
+    formed = with_variant(sway, sway.variants[0])
+    assert layout_of(runs(1.4), Axis.YAW, [formed, flow]).effects == (formed, shared)

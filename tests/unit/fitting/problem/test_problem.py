@@ -85,10 +85,7 @@ def test_the_start_of_a_hidden_state_moves_with_its_coefficients_and_the_speed_l
         compare_with_slopes(problem, x, run, 2e-5)
 
 
-HIDDEN = [v for v in effect_named("sway_coupling").variants if not v.without]
-
-
-@pytest.mark.parametrize("variant", HIDDEN, ids=lambda v: v.says)
+@pytest.mark.parametrize("variant", effect_named("sway_coupling").variants, ids=lambda v: v.says)
 def test_the_start_of_a_hidden_state_moves_with_the_coefficients_of_its_forms(variant):
     records = [record(YAW[1], speed=1.0), record(YAW[1], 2, speed=1.6)]
     sway = effect_named("sway_coupling")
@@ -105,15 +102,12 @@ def test_the_start_of_a_hidden_state_moves_with_the_coefficients_of_its_forms(va
         compare_with_slopes(problem, x, run, 2e-5)
 
 
-@pytest.mark.parametrize("which", range(2))
-def test_the_slopes_of_a_measured_cross_speed_are_exact(which):
-    n = len(record(YAW[1]))
-    drift = {"cross": 0.2 * np.sin(np.arange(n) / 25.0), "surge": 1.3 + 0.1 * np.cos(np.arange(n) / 40.0)}
-    sway = effect_named("sway_coupling")
-    problem = problem_of([record(YAW[1], speed=1.3, signals=drift)], [with_variant(sway, sway.variants[which])])
-    x = moved_start(problem)
-    assert "rate_before" not in problem.layout.every
-    compare_with_slopes(problem, x, 0, 2e-5)
+@pytest.mark.parametrize("beside", [(), ("sway_coupling",)], ids=["its own state", "that of the sway beside it"])
+def test_the_slopes_of_a_cross_flow_are_exact(beside):
+    problem = problem_of([record(YAW[1], speed=1.0), record(YAW[1], 2, speed=1.6)], [*beside, "crossflow_drag"])
+    assert ("flow_share" in problem.layout.names) == bool(beside)
+    for run in range(2):
+        compare_with_slopes(problem, moved_start(problem), run, 2e-5)
 
 
 def test_a_bent_fins_trim_follows_what_changes_the_authority_within_a_run():

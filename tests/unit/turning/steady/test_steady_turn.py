@@ -38,6 +38,10 @@ EFFECTS = {
         ("crossflow_drag",),
         {"crossflow": 4.0, "flow_damping": 0.8, "flow_rate": 0.5, "flow_fin": 0.2},
     ),
+    "sway and cross flow": (
+        ("sway_coupling", "crossflow_drag"),
+        {"cross_damping": 0.9, "cross_rate": -0.4, "crossflow": 4.0, "flow_share": -1.2},
+    ),
     "fins": (("servo_lag", "rate_limit", "asymmetric_fin"), {"lag": 0.2, "max_rate": 0.5, "asymmetry": 0.1}),
     "stall": (("stall",), None),
     "all": (
@@ -117,7 +121,7 @@ def test_the_transient_ends_on_the_settled_circle(name):
     assert late.tactical_diameter[0] == pytest.approx(after.tactical_diameter[0], rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["sway squared", "strips", "cross flow"])
+@pytest.mark.parametrize("name", ["sway squared", "strips", "cross flow", "sway and cross flow"])
 def test_the_transient_without_lost_speed_is_the_models_own_simulation(name):
     model = model_of(name, C0=0.0)
     plant, _ = turn_of(model, 1.0)
