@@ -13,6 +13,7 @@ from fieldsid.extension.lineage import (
     parent_of,
     save_extension,
 )
+from fieldsid.extension.steps import extend_in_steps
 
 __all__ = [
     "CHANGED",
@@ -23,6 +24,7 @@ __all__ = [
     "Generation",
     "Step",
     "extend",
+    "extend_in_steps",
     "gain_body",
     "history_of",
     "kept_by",

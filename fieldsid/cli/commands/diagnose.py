@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.diagnosis import Diagnosis, Errors, Pair
+    from fieldsid.logs.run import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
 
@@ -33,6 +34,12 @@ KnownModel = Annotated[
 ]
 Thorough = Annotated[
     bool, typer.Option("--thorough", help="Go on for as long as there is something to try, half a minute where much is left.")
+]
+Apply = Annotated[
+    bool,
+    typer.Option(
+        "--apply", help="Add the named effects one at a time, the strongest first, each a model in `models/` with its errors."
+    ),
 ]
 
 
@@ -46,6 +53,7 @@ def command(
     output: OutputFile = None,
     figure: FigureFile = None,
     thorough: Thorough = False,
+    apply: Apply = False,
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
@@ -53,7 +61,7 @@ def command(
 
     Every effect of the catalogue, and every one of your own in `effects/`, is added to a model fitted to all runs together, and
     judged by its free run on the `--validate` runs; without them a part of the runs is held back. With `-o FILE` the diagnosis
-    is kept for `sysid plan --from FILE`.
+    is kept for `sysid plan --from FILE`; with `--apply` the model is extended by what is named, step by step.
 
     Example: sysid diagnose runs/pulses_*.parquet --axis yaw --validate runs/zigzag.parquet
     """
@@ -79,6 +87,7 @@ def command(
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
     body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
     body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, context, force=force)}
+    body |= {"applied": _applied(context, found, (known, model), training, unseen, force=force) if apply else []}
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
     headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
@@ -131,6 +140,57 @@ def _drawn(found: Diagnosis, path: Path | None, context: typer.Context, *, force
     return str(save(figure(found), path, force=force, tasks=tasks_of(context)))
 
 
+def _applied(
+    context: typer.Context, found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
+    unseen: Sequence[Run], *, force: bool,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
+    from fieldsid.artifacts import check_output
+    from fieldsid.cli.headlines.missing import MODELS
+    from fieldsid.cli.inputs import files_of
+    from fieldsid.extension import extend_in_steps, gain_body, save_extension
+    from fieldsid.models.model import save_model
+
+    known, path = model
+    if not found.effects:
+        return []
+    if known is None or path is None:
+        stem = "joint" if len(training) > 1 else training[0].name
+        known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
+        if not path.exists() or force:
+            save_model(known, path, inputs=files_of(training), force=force)
+    targets, stem = list[Path](), path
+    for name in found.effects:
+        stem = stem.with_name(f"{stem.stem}+{name}.yaml")
+        check_output(stem, force=force)
+        targets.append(stem)
+    with compiling_first(context), trying("adding what was found") as report:
+        steps = extend_in_steps(known, found.effects, training, unseen, report=report)
+    parents = [path, *targets]
+    for step, target, parent in zip(steps, targets, parents, strict=False):
+        save_extension(step, target, parent=parent, training=training, validation=unseen, force=force)
+    return [
+        {"effect": name, "model": str(target), "pays": step.pays, **gain_body(step.gain)}
+        for name, step, target in zip(found.effects, steps, targets, strict=True)
+    ]
+
+
+def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
+    """Print the error on fitted and unseen runs before the first step and after each."""
+    from fieldsid.cli.headlines.words import times
+    from fieldsid.comparison.sufficient import over_noise
+
+    def row(name: str, errors: Mapping[str, Any], floor: Mapping[str, Any], model: str) -> tuple[str, ...]:
+        return (name, *(times(over_noise(errors[side], floor)) for side in ("train", "validation")), model)
+
+    if not applied:
+        return
+    rows = [row("as it is", applied[0]["before"], applied[0]["noise_floor"], "")]
+    rows += [row(f"+ {step['effect']}", step["after"], step["noise_floor"], step["model"]) for step in applied]
+    to.print()
+    to.print(table("the error step by step, over the noise floor", ("", "fitted", "unseen", "model"), rows))
+
+
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
     from rich.text import Text
 
@@ -146,6 +206,7 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
     _render_where(to, found)
     _render_skipped(to, found.skipped)
     _render_maneuver(to, found)
+    _render_applied(to, body["applied"])
     for key in ("file", "figure"):
         if body[key]:
             to.print(f"{key}: {body[key]}", soft_wrap=True)

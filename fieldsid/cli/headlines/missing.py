@@ -69,6 +69,8 @@ def _after(body: Body, of: Searched) -> str:
     judged = repeated("--validate", of.unseen)
     if body["verdict"] == "undecided":  # it names effects too: the likeliest of the rivals
         return _deciding(body, axis)
+    if body["applied"]:
+        return used(axis, body["applied"][-1]["model"])
     if body["effects"]:
         adds = repeated("--add", body["effects"])
         return _on_model(of, axis, lambda model: pasted("extend", model, of.runs, *adds, *judged, *of.reading))

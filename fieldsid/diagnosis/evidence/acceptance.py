@@ -12,6 +12,7 @@ import numpy as np
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.records import Errors
 from fieldsid.diagnosis.thresholds import (
+    BELIEVED_SHARE_OF_MISFIT,
     EQUAL_ERROR_RATIO,
     EXPLAINED_ERROR_RATIO,
     LEAST_EXPLAINED_SHARE,
@@ -49,7 +50,8 @@ def lowers_error(
     lowers = min(unseen, fitted) < MAX_ERROR_RATIO and unseen * fitted < 1.0
     explains = floor is not None and _explains_most((before, was), (now, left), floor, least)
     mild = floor is not None and now.over(floor) <= SUFFICIENT_ERROR_RATIO
-    return (mild or _keeps(before, now)) and (lowers or explains)
+    believed = floor is None or _explains_beyond_misfit((before, was), (now, left), floor)
+    return believed and (mild or _keeps(before, now)) and (lowers or explains)
 
 
 def compared_errors(without: ScoredModel, with_: ScoredModel, floor: Noise | None = None) -> tuple[Errors, Errors]:
@@ -95,6 +97,17 @@ def _explains_most(before: Sequence[Errors], now: Sequence[Errors], floor: Noise
     leaves = max(run.over(floor) for errors in before for run in errors.runs) > least
     shown = before[0].over(floor) <= EXPLAINED_ERROR_RATIO or was[0] - left[0] > LEAST_EXPLAINED_SHARE * was[0]
     return bool(leaves and shown and was.sum() - left.sum() > MAIN_EXPLAINED_SHARE * was.sum())
+
+
+def _explains_beyond_misfit(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> bool:
+    """Whether an addition explains enough beside what the model leaves with it, where that is visible.
+
+    What a wrong hull leaves is made up for by whatever moves in time: an effect is believed by what it explains beyond the misfit
+    of the model it is in.
+    """
+    was, left = (float(np.mean([max(errors.over(floor) ** 2 - 1.0, 0.0) for errors in side])) for side in (before, now))
+    visible = any(errors.over(floor) > SUFFICIENT_ERROR_RATIO for errors in now)
+    return not visible or was - left > BELIEVED_SHARE_OF_MISFIT * left
 
 
 def excess_share(before: Sequence[Errors], now: Sequence[Errors], floor: Noise) -> float:

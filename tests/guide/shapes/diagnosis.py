@@ -69,6 +69,46 @@ class NextManeuver(Shape):
     """Other maneuvers, with what they are expected to give."""
 
 
+class Left(Shape):
+    """What remains beside the named effects, or of the model as it is where none is named."""
+
+    ratio: Number
+    """The error over the noise floor, of fitted or of unseen runs, whichever is larger."""
+    unexplained: bool
+    """Whether it is visible and no disturbance."""
+    where: str | None
+    """The run and the seconds where it is largest; null where nothing is left."""
+    moves_with: str | None
+    """The signal it follows; null where no test says so."""
+
+
+class Applied(Shape):
+    """One of the named effects added with `--apply`."""
+
+    effect: str
+    """The effect."""
+    model: str
+    """The file of the model with it."""
+    pays: bool
+    """Whether the error on unseen runs falls by it."""
+    added: list[str]
+    """The effect again, as `extend` has it."""
+    before: Pair
+    """Errors without it."""
+    after: Pair
+    """Errors with it."""
+    noise_floor: NoiseFloor
+    """Noise of the sensors."""
+    over_floor: dict[str, Number]
+    """The error on the runs that judge, over the noise floor, `before` and `after`."""
+    unseen: bool
+    """Whether runs that were not fitted judge."""
+    learned_on: list[str]
+    """Runs that were fitted."""
+    judged_on: list[str]
+    """Runs it was judged by."""
+
+
 class Diagnose(Result):
     """Which physical effect the model lacks."""
 
@@ -79,8 +119,12 @@ class Diagnose(Result):
     """The verdict."""
     says: str
     """The verdict in a sentence, with its numbers."""
+    short: str
+    """The same with the effects by their names alone."""
     effects: list[str]
     """The effects named, in the order to add them."""
+    unusual: list[str]
+    """Those of them that not every hull has."""
     base: Pair
     """Errors of the model as it is."""
     final: Pair
@@ -89,6 +133,8 @@ class Diagnose(Result):
     """Noise of the sensors."""
     noiseless: bool
     """Whether the logs show almost no noise, so that errors are told in their units."""
+    left: Left
+    """What remains beside the named effects."""
     candidates: list[Candidate]
     """What was tried, the one found first, then by evidence."""
     where: list[Where]
@@ -107,6 +153,8 @@ class Diagnose(Result):
     """Runs it was judged by."""
     model: str | None
     """The model given with `--model`."""
+    applied: list[Applied]
+    """With `--apply`: the named effects, added one at a time."""
     known: list[str]
     """Its effects, which are part of the base."""
     file: str | None
