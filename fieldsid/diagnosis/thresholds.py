@@ -93,6 +93,6 @@ noise: no p-value decides there, since without noise whatever is left is signifi
 MISSING_ERROR_RATIO, whatever the tests say: of 702 cases of the second bank three named less, two a lag of 20 ms beside a moment
 in no catalogue and one half of a pair that alone lowered nothing."""
 BELIEVED_SHARE_OF_MISFIT = 0.2
-"""Squared error above the noise that an effect must explain, over that which the model leaves with it: of 29 effects named in cases
-of all three banks that were there, one explained less than 0.4 times that; of nine that were not there four explained less than
-0.3."""
+"""Squared error above the noise that an effect must explain, over that which the model leaves with it: of 29 effects named in
+cases of all three banks that were there, one explained less than 0.4 times that; of nine that were not there four explained less
+than 0.3."""

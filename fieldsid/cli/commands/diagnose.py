@@ -37,9 +37,7 @@ Thorough = Annotated[
 ]
 Apply = Annotated[
     bool,
-    typer.Option(
-        "--apply", help="Add the named effects one at a time, the strongest first, each a model in `models/` with its errors."
-    ),
+    typer.Option("--apply", help="Add what is named, an effect at a time, each a model in `models/` with its errors."),
 ]
 
 
@@ -159,11 +157,11 @@ def _applied(
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), force=force)
-    targets, stem = list[Path](), path
+    targets, last = list[Path](), path
     for name in found.effects:
-        stem = stem.with_name(f"{stem.stem}+{name}.yaml")
-        check_output(stem, force=force)
-        targets.append(stem)
+        last = last.with_name(f"{last.stem}+{name}.yaml")
+        check_output(last, force=force)
+        targets.append(last)
     with compiling_first(context), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
     parents = [path, *targets]
