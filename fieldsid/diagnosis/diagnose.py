@@ -184,10 +184,10 @@ def _diagnosis(
 
 
 def _leading(work: Search, found: ScoredModel) -> list[ScoredModel]:
-    """Return all models but the base: the one found, then the accepted sets by log evidence, then the others."""
+    """Return all models but the base: the one found, then the accepted sets by log evidence, then the others, small ones first."""
     base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
-    others.sort(key=lambda h: -sums.get(frozenset(h.names), -np.inf))
+    others.sort(key=lambda h: (-sums[key], 0) if (key := frozenset(h.names)) in sums else (np.inf, len(key)))
     return [*([found] if found is not base else []), *others]
 
 
