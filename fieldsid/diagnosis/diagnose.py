@@ -166,7 +166,7 @@ def _diagnosis(
         base=base.errors,
         final=named.errors,
         noise_floor=floor,
-        candidates=_candidates(end, floor),
+        candidates=_candidates(end, floor, 1.0 if work.is_noiseless else left.ratio),
         model=model,
         base_model=base_model,
         where=where,
@@ -184,17 +184,17 @@ def _diagnosis(
 
 
 def _leading(work: Search, found: ScoredModel) -> list[ScoredModel]:
-    """Return all models but the base: the one found, then the accepted sets by log evidence, then the others, small ones first."""
+    """Return all models but the base: the one found, the accepted sets by log evidence, and the others, small ones first."""
     base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
     others.sort(key=lambda h: (-sums[key], 0) if (key := frozenset(h.names)) in sums else (np.inf, len(key)))
     return [*([found] if found is not base else []), *others]
 
 
-def _candidates(end: _SearchResult, floor: Noise) -> tuple[Candidate, ...]:
-    """Return the leading models as candidates of the diagnosis."""
+def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidate, ...]:
+    """Return the leading models as candidates of a diagnosis that leaves an error over the noise floor."""
     work, sums = end.work, end.work.evidences()
-    p = probabilities(sums)
+    p = probabilities(sums, left)
 
     def gain(h: ScoredModel) -> float:
         return sums.get(frozenset(h.names), h.log_evidence) - sums[work.root]

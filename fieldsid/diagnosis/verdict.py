@@ -37,7 +37,9 @@ from fieldsid.diagnosis.thresholds import (
     SHARES_TO_EXPLAIN_FAR,
     SHARES_TO_EXPLAIN_MISSING,
     SUFFICIENT_ERROR_RATIO,
-    UNTRIED_PROBABILITY,
+    UNTRIED_LEAST,
+    UNTRIED_MOST,
+    UNTRIED_POWER,
 )
 from fieldsid.models.model import Noise
 
@@ -158,11 +160,19 @@ def worsens(search: Search, h: ScoredModel, floor: Noise) -> bool:
     return bool(h.selection_errors.over(floor) > EQUAL_ERROR_RATIO * search.base().selection_errors.over(floor))
 
 
-def probabilities(evidences: Mapping[frozenset[str], float]) -> dict[frozenset[str], float]:
+def probabilities(evidences: Mapping[frozenset[str], float], left: float = 1.0) -> dict[frozenset[str], float]:
     """Return the posterior probability of each set of effects: proportional to exp(log evidence / EVIDENCE_TEMPERATURE).
 
-    They sum to what is left beside the probability that what is hidden is in none of the sets tried.
+    They sum to what is left beside the probability that what is hidden is in none of the sets tried, which is estimated from the
+    error over the noise that the named set leaves, `left`: no evidence of one set over another says anything of that.
     """
     scores = np.array(list(evidences.values())) / EVIDENCE_TEMPERATURE
     weights = np.exp(scores - scores.max())
-    return dict(zip(evidences, ((1.0 - UNTRIED_PROBABILITY) * weights / weights.sum()).tolist(), strict=True))
+    tried = 1.0 - untried_probability(left)
+    return dict(zip(evidences, (tried * weights / weights.sum()).tolist(), strict=True))
+
+
+def untried_probability(left: float) -> float:
+    """Return the probability that what is hidden is in no set tried, by the error over the noise that the named set leaves."""
+    share = 1.0 - 1.0 / max(left, 1.0) ** 2
+    return float(max(UNTRIED_MOST * share**UNTRIED_POWER, UNTRIED_LEAST))

@@ -131,6 +131,13 @@ def test_a_set_as_likely_is_a_rival_though_its_free_run_is_worse():
 
 def test_a_probability_is_left_for_what_is_in_no_set_that_was_tried():
     found = verdict.probabilities({frozenset(): 0.0, frozenset({"delay"}): 800.0, frozenset({"servo_lag"}): 796.0})
-    assert sum(found.values()) == pytest.approx(1.0 - verdict.UNTRIED_PROBABILITY)
+    assert sum(found.values()) == pytest.approx(1.0 - verdict.UNTRIED_LEAST)
     alike = found[frozenset({"servo_lag"})] / found[frozenset({"delay"})]
     assert alike == pytest.approx(np.exp(-4.0 / verdict.EVIDENCE_TEMPERATURE))
+
+
+@pytest.mark.parametrize(("left", "least", "most"), [(1.0, 0.004, 0.006), (1.1, 0.004, 0.02), (1.4, 0.05, 0.15), (4.0, 0.4, 0.6)])
+def test_the_more_a_named_set_leaves_the_likelier_is_something_that_was_not_tried(left, least, most):
+    assert least < verdict.untried_probability(left) < most
+    found = verdict.probabilities({frozenset(): 0.0, frozenset({"delay"}): 800.0}, left)
+    assert found[frozenset({"delay"})] == pytest.approx(1.0 - verdict.untried_probability(left))
