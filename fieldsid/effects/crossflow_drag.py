@@ -5,7 +5,7 @@
 so that F(0, p) = p |p|: without drift it is quadratic damping. y is the cross flow over the length of the hull, in rad/s;
 crossflow >= 0 in 1/rad. The drift to the other side, with flow_rate and flow_fin the other way, is the same motion. It is
 `sway_coupling` with its drag along the hull, but for the Munk moment and for what the drag takes from the drift. Beside that
-effect, or `heave_coupling`, there is one cross state, the moment x of the other: y = flow_share x.
+effect, or `heave_coupling`, there is one cross state, the moment x of the other: y = flow_share x, of either sign the same.
 Source: Fossen 2011, section 6.4.3 (cross-flow drag principle), uniform section drag.
 """
 
@@ -33,7 +33,7 @@ FLOW = (
     Coefficient("flow_fin", "1/s^2", -20.0, 20.0, 0.0, step=1e-3, says="cross flow over length that the fin makes"),
 )  # fmt: skip
 SHARE = Coefficient(
-    "flow_share", "s", -100.0, 100.0, 1.0, scan=(-1.0, 1.0), step=1e-3, rate_exponent=-1,
+    "flow_share", "s", 0.0, 100.0, 1.0, scan=(0.3, 3.0), step=1e-3, rate_exponent=-1,
     says="cross flow over length, per moment of the cross state",
 )  # fmt: skip
 

@@ -29,7 +29,7 @@ STRENGTHS: Mapping[str, tuple[str, Mapping[str, float]]] = {
     "backlash": ("stairs", {"gap": 0.08}),
     "clock_offset": ("square_pulses", {"offset": -0.25}),
     "compass_deviation": ("turning_circle", {"deviation_sin": 0.05, "deviation_cos": 0.0}),
-    "crossflow_drag": ("zigzag", {"crossflow": 3.0, "flow_damping": 0.8, "flow_rate": 0.5}),
+    "crossflow_drag": ("zigzag", {"crossflow": 3.0, "flow_damping": 0.8, "flow_rate": 0.5, "flow_fin": 0.0}),
     "current": ("turning_circle", {"current_sin": 0.02, "current_cos": 0.0}),
     "deadband": ("stairs", {"width": 0.05}),
     "delay": ("square_pulses", {"delay": 0.3}),

@@ -85,6 +85,15 @@ def test_a_run_that_starts_in_a_turn_shows_the_hidden_state_it_starts_with(case)
     assert found.predictions[0].state[2] == pytest.approx(hidden[turning], rel=0.05)
 
 
+def test_the_drag_of_the_cross_flow_comes_back_beside_the_moment_of_the_same_sway():
+    own = {"cross_damping": 0.7, "cross_rate": 0.9, "cross_moment": -0.5, "crossflow": 6.0, "length": 1.8}
+    log = record(HiddenEffect("both", own, {}, "multisine", Axis.YAW))
+    values = fit([log], Axis.YAW, method="output_error", effects=["crossflow_drag", "sway_coupling"]).model.values
+    expected = {"cross_damping": 0.7, "cross_rate": 0.45, "crossflow": 6.0, "flow_share": 1.0 / (0.5 * 1.8)}
+    assert {n: values[n] for n in expected} == pytest.approx(expected, rel=0.05)
+    assert "flow_damping" not in values
+
+
 HELD_BY_STRIPS = {
     "damping": 1.0, "authority": -1.45, "fin_bend": -0.005, "cross_damping": 0.12, "cross_rate": 1.0, "cross_fin": 0.2,
     "cross_strips": 3.1, "crossflow": 4.4, "length": 1.6,

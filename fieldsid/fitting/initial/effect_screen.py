@@ -173,10 +173,10 @@ def screen_effect(linearisation: Linearisation, effect: Effect) -> ScreenResult:
 def screen_points(linearisation: Linearisation, effect: Effect) -> list[ScreenResult]:
     """Return the screen results at every point of an effect's shared scan grid, the best first."""
     problem, begun = with_effect(linearisation.problem, linearisation.x, effect, {})
-    effect = problem.layout.effects[-1]  # beside another with a cross state it is in its variant without one
-    new, screened_points = _new_slots(problem, effect), []
+    formed = problem.layout.effects[-1]  # beside another with a cross state it is in its variant without one
+    new, screened_points = _new_slots(problem, formed), []
     low, high = problem.layout.low[new], problem.layout.high[new]
-    for values in scan_points(linearisation, effect):
+    for values in scan_points(linearisation, formed):
         x = begun.copy()
         x[new] = np.clip([values.get(problem.layout.every[i], x[i]) for i in new], low, high)
         for c in effect.nuisance:

@@ -1,1 +1,1 @@
-"""Measured helper signals (surge, depth, cross-flow speed) without their noise."""
+"""What a hull does beside the motion of an axis: its surge without noise, its drift law, and drag along its length."""

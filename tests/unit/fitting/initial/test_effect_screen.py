@@ -10,7 +10,14 @@ import pytest
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.dynamics.free_run import command_record, simulate
 from fieldsid.effects import pick_effect
-from fieldsid.fitting.initial.effect_screen import _orthonormal, backtrack, linearise_at, scan_points, screen_effect
+from fieldsid.fitting.initial.effect_screen import (
+    _orthonormal,
+    backtrack,
+    linearise_at,
+    scan_points,
+    screen_effect,
+    screen_points,
+)
 from fieldsid.fitting.initial.equation_error import equation_error_start
 from fieldsid.fitting.initial.joint_grid_search import _schur_complement
 from fieldsid.fitting.problem.parameters import layout_of
@@ -19,6 +26,7 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.numerics.first_order_lag import first_order_lag
 
 EVENTS, SIZE = (0.3, 1.0, 0.6), -0.005
 LASTING = (1.0, 1.0, 0.45, 0.0)
@@ -88,6 +96,28 @@ def test_products_without_some_columns_are_those_of_what_is_left_once_they_are_p
     rest = _orthonormal(columns[:, 3:])
     left = columns[:, :3] - rest @ (rest.T @ columns[:, :3])
     np.testing.assert_allclose(_schur_complement(columns.T @ columns, 3), left.T @ left, rtol=1e-8, atol=1e-8)
+
+
+def test_a_measured_sway_gives_start_values_beside_the_usual_ones():
+    plain = logged(1, 1.0, loss=0.0, size=0.0)
+    rate = np.interp(plain.time, plain.time[plain.rate_ok], plain.rate[plain.rate_ok])
+    drift = first_order_lag(plain.steps, -0.8 * rate, 15.0)  # slower than the bounds have it
+    seen = replace(plain, cross=drift, cross_ok=np.ones(len(plain), dtype=bool))
+    found = {}
+    for name, record in {"plain": plain, "seen": seen}.items():
+        layout = layout_of([record], Axis.YAW, ())
+        problem = Problem((record,), layout)
+        at = linearise_at(problem, equation_error_start([record], layout), white_noise_floor([record]))
+        found[name] = scan_points(at, pick_effect("sway_coupling"))
+        screened = screen_points(at, pick_effect("sway_coupling"))
+        assert len(screened) == len(found[name])
+        for one in screened:
+            inside = (one.problem.layout.low <= one.point) & (one.point <= one.problem.layout.high)
+            assert inside.all()
+    first, second = found["seen"][:2]
+    assert found["seen"][2:] == found["plain"]
+    assert first["cross_damping"] == second["cross_damping"] == pytest.approx(1.0 / 15.0, rel=0.1)
+    assert first["cross_rate"] == -second["cross_rate"] < 0.0
 
 
 @pytest.mark.parametrize("name", ["delay", "servo_lag", "clock_offset"])
