@@ -13,7 +13,6 @@ from fieldsid.diagnosis.evidence.predictive_density import (
     ValidationRun,
     _schur_complement,
     _under,
-    most_log_density,
     parameter_jacobian,
     precision,
 )
@@ -27,7 +26,6 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.models.record import first_part, record_of
-from fieldsid.noise.maximum_likelihood import log_likelihood
 
 NOISE = Noise(0.01, 0.01)
 
@@ -76,16 +74,6 @@ def test_it_is_the_likelihood_averaged_over_what_the_training_runs_leave_open(ju
     assert value[0] - at_estimate[0] == pytest.approx(averaged, abs=0.3)
     assert abs(averaged) > 0.5
     assert np.sum((led[0] / 0.01) ** 2) < plain
-
-
-def test_no_run_is_likelier_than_one_of_which_white_noise_is_left():
-    log, noise = record(YAW[1], 7), Noise(0.01, 0.004)
-    white = np.random.default_rng(2).standard_normal((2, len(log)))
-    white *= np.array([[0.01], [0.004]]) / np.sqrt(np.mean(white**2, axis=1, keepdims=True))
-    most = most_log_density([log], noise)
-    assert log_likelihood([log], [(1.0, 0.0)], [white], noise) == pytest.approx(most, rel=1e-12)
-    for of in (replace(noise, rate=0.005), replace(noise, rate=0.003), replace(noise, disturbance=0.02)):
-        assert log_likelihood([log], [(1.0, 0.0)], [white], of) < most
 
 
 def test_a_start_that_was_fitted_under_another_noise_costs_nothing(judged):

@@ -9,13 +9,14 @@ import pytest
 
 from fieldsid.diagnosis.diagnose import confusable
 from fieldsid.diagnosis.evidence.scored_model import errors_of
-from fieldsid.diagnosis.records import Errors, Pair
+from fieldsid.diagnosis.records import Errors, Left, Pair
 from fieldsid.diagnosis.report.report_text import evidence, headline
 from fieldsid.diagnosis.verdict import Verdict, excess_explained, probabilities, worsens
 from fieldsid.fitting.predict.own_moment import FreeRun
 from fieldsid.models.model import Noise
 
 FLOOR = Noise(0.004, 0.002)
+NOTHING_LEFT = Left(1.0, unexplained=False)
 
 
 def _errors(*over: float) -> Errors:
@@ -133,13 +134,44 @@ def test_the_headline_says_the_error_that_falls(fitted, unseen, settled, said):
     for h, all_runs in zip((base, found), settled, strict=True):
         h.train, h.unseen_errors, h.effects = h.errors.train, (h.selection_errors, _errors(all_runs)), ()
     search = _search(base)
-    assert headline(search, Verdict("effect", ("stall",)), found, SimpleNamespace(), FLOOR, FLOOR).endswith(f": {said}")
+    sentence = headline(search, Verdict("effect", ("stall",)), found, SimpleNamespace(), NOTHING_LEFT, FLOOR, FLOOR)
+    assert sentence.full.endswith(f"): {said}")
+    assert sentence.short == f"stall: {said}"
+
+
+def named(effects, left):
+    base, found = (_made(*n, train=(f,), unseen=(f,), score=0.0) for n, f in (((), 11.5), (effects, 1.8)))
+    for h in (base, found):
+        h.train, h.unseen_errors, h.effects = h.errors.train, (h.selection_errors,), ()
+    return headline(_search(base), Verdict("effect", effects), found, SimpleNamespace(), left, FLOOR, FLOOR)
+
+
+def test_what_every_hull_has_is_told_apart_from_what_is_unusual():
+    said = named(("gyro_bias", "sway_coupling", "servo_lag"), NOTHING_LEFT).short
+    assert said == (
+        "gyro_bias with the hull's own sway_coupling, servo_lag: "
+        "the error on unseen runs falls from 11.50 to 1.80 x the noise floor"
+    )
+    assert named(("servo_lag",), NOTHING_LEFT).short.startswith("servo_lag: the error")
+
+
+def test_what_is_left_is_said_with_its_place():
+    left = Left(1.83, unexplained=True, run="train_1", start_s=12.0, end_s=14.0, moves_with="roll rate")
+    for said in (named(("gyro_bias",), left).full, named(("gyro_bias",), left).short):
+        assert said.endswith(
+            "; 1.8 x is left that nothing in the catalogue explains: "
+            "it is largest in train_1 at 12-14 s, and moves with roll rate"
+        )
+
+
+def _disturbed(base, h, noise):
+    return headline(_search(base), Verdict("disturbed", ()), h, SimpleNamespace(), NOTHING_LEFT, FLOOR, noise).full
 
 
 def test_a_disturbance_beside_small_effects_does_not_say_that_none_is_there():
     base, small = _made(train=(2.0,), unseen=(1.93,), score=0.0), _made("servo_lag", train=(2.0,), unseen=(1.75,), score=9.0)
     noise = Noise(0.004, 0.002, disturbance=0.0065, disturbance_time=2.3)
-    alone, beside = (headline(_search(base), Verdict("disturbed", ()), h, SimpleNamespace(), FLOOR, noise) for h in (base, small))
+    alone, beside = (_disturbed(base, h, noise) for h in (base, small))
     assert alone.startswith(
         "no effect of the catalogue is missing: what is left, 1.93 x the noise floor, is a disturbance moment"
     )
@@ -156,7 +188,7 @@ def unexplained(base, found, *others, p=1e-9, noise=FLOOR):
     search.root, search.evidences, search.ranked = frozenset(), lambda: shown, lambda: [found, *others]
     where = {"worst_run": "r0", "worst_start_s": 4.2, "worst_end_s": 6.1, "worst_ratio": 2.4, "moves_with": "rate"}
     left = SimpleNamespace(p=p, dependence=p, **where)
-    return headline(search, Verdict("unexplained", ()), found, left, FLOOR, noise)
+    return headline(search, Verdict("unexplained", ()), found, left, NOTHING_LEFT, FLOOR, noise).full
 
 
 def test_the_unexplained_says_what_takes_a_part_of_it_and_which_larger_set_would_end_it():
