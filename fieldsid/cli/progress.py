@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING
 
 import typer
@@ -17,6 +18,9 @@ from fieldsid.cli.session import session_of
 
 if TYPE_CHECKING:
     from fieldsid.fitting.jit_warmup import Warmup
+
+LINE_EVERY_S = 5.0
+"""Seconds between two lines of progress where standard error is no terminal."""
 
 
 def refuse_existing(*paths: Path | None, force: bool) -> None:
@@ -43,14 +47,27 @@ def refuse_figure(path: Path | None, *, force: bool) -> None:
 
 @contextmanager
 def trying(says: str) -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows what is being tried, on stderr and only on a terminal."""
+    """Yield a function that shows what is being tried, on stderr: on a terminal as it goes, elsewhere a line every few seconds."""
     console = messages()
     if not shows_progress(console):
-        yield lambda _text: None
+        yield _now_and_then(says, lambda line: console.print(line, markup=False))
         return
     # drawn by hand: a thread that redraws would keep the search from using a second core
     with Live(console=console, auto_refresh=False, transient=True) as line:
         yield lambda text: line.update(f"{says}: {text}", refresh=True)
+
+
+def _now_and_then(says: str, show: Callable[[str], None], clock: Callable[[], float] = monotonic) -> Callable[[str], None]:
+    """Return a function that shows what is being tried no more often than every LINE_EVERY_S seconds."""
+    last = clock()
+
+    def told(text: str) -> None:
+        nonlocal last
+        if clock() - last >= LINE_EVERY_S:
+            last = clock()
+            show(f"{says}: {text}")
+
+    return told
 
 
 @contextmanager

@@ -75,6 +75,7 @@ EFFECT = Effect(
     mistaken_for=("quadratic_damping", "sway_coupling", "heave_coupling", "stall", "speed_varying"),
     source="Fossen 2011, section 6.4.3",
     extra_states=("cross flow",),
+    log_prior_penalty=6.0,  # drag of the rate and a sway of its own say most of it in simpler words
     core=core,
     initial_guesses=measured_starts,
     variants=(

@@ -1,0 +1,14 @@
+"""Progress where standard error is no terminal: a line every few seconds, so that a log of it says the work goes on."""
+
+from __future__ import annotations
+
+from fieldsid.cli.progress import LINE_EVERY_S, _now_and_then
+
+
+def test_a_line_is_shown_no_more_often_than_every_few_seconds():
+    now, shown = [0.0], []
+    told = _now_and_then("diagnosing", shown.append, lambda: now[0])
+    for second in range(int(3 * LINE_EVERY_S) + 1):
+        now[0] = float(second)
+        told(f"set {second}")
+    assert shown == ["diagnosing: set 5", "diagnosing: set 10", "diagnosing: set 15"]
