@@ -47,7 +47,7 @@ def refuse_figure(path: Path | None, *, force: bool) -> None:
 
 @contextmanager
 def trying(says: str) -> Iterator[Callable[[str], None]]:
-    """Yield a function that shows what is being tried, on stderr: on a terminal as it goes, elsewhere a line every few seconds."""
+    """Yield a function that shows what is being tried, on stderr: on a terminal as it goes, elsewhere in a line now and then."""
     console = messages()
     if not shows_progress(console):
         yield _now_and_then(says, lambda line: console.print(line, markup=False))

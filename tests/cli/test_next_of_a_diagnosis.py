@@ -17,8 +17,13 @@ def body(verdict: str, *, file: str = "") -> dict[str, object]:
         "verdict": verdict,
         "axis": "yaw",
         "says": "servo_lag or delay",
+        "short": "servo_lag or delay",
+        "applied": [],
         "effects": ["servo_lag"],
-        "candidates": [{"probability": 0.6}, {"probability": 0.4}],
+        "candidates": [
+            {"effect": "servo_lag", "probability": 0.6, "log_evidence": 44.0},
+            {"effect": "delay", "probability": 0.4, "log_evidence": 30.0},
+        ],
         "runs": ["a", "b"],
         "validation_runs": ["c"],
         "next_maneuver": {"command": "sysid plan --separate servo_lag,delay"},
@@ -35,6 +40,15 @@ def body(verdict: str, *, file: str = "") -> dict[str, object]:
 )
 def test_rivals_are_told_apart_first(file, says):
     assert of_diagnosis(body("undecided", file=file), SEARCHED).next == says
+
+
+def test_the_first_line_says_how_far_the_next_best_is_behind():
+    assert of_diagnosis(body("effect"), SEARCHED).says == "effect: servo_lag or delay; next best: delay, 14 nats behind"
+
+
+def test_what_was_added_already_is_used():
+    added = body("effect") | {"applied": [{"model": "models/m+servo_lag.yaml"}]}
+    assert of_diagnosis(added, SEARCHED).next == "sysid turn-radius models/m+servo_lag.yaml"
 
 
 def test_an_effect_that_is_named_is_added():
