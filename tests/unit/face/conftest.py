@@ -94,7 +94,8 @@ def held():
     )
     diagnosis = Diagnosis(
         Axis.YAW, "effect", ("servo_lag",), "servo_lag (the fin follows late): from 3.20 to 1.04 x the noise floor",
-        "servo_lag: from 3.20 to 1.04 x the noise floor", pair(0.015, 0.016), pair(0.005, 0.0052), NOISE, (best,), lagged, fit.model, comparison.where,
+        "servo_lag: from 3.20 to 1.04 x the noise floor",
+        pair(0.015, 0.016), pair(0.005, 0.0052), NOISE, (best,), lagged, fit.model, comparison.where,
         {"maneuver": "zigzag", "why": "it tells the two apart"}, {"roll_coupling": "needs roll, which the log lacks"}, (told,),
     )  # fmt: skip
     gain = Gain(("servo_lag",), pair(0.015, 0.016), pair(0.005, 0.0052), NOISE, True, ("pulses",), ("zigzag",))
