@@ -1,10 +1,10 @@
-"""What each stage of a diagnosis earns: the second bank answered with and without it.
+"""What each stage of a diagnosis earns: the second bank, answered with and without it.
 
     python ../shared/bank/generate.py --out DIR --seed 1 --scale 0.5 --hard --forms
     python tests/benchmarks/ablation.py DIR [DIR ...] [--stages whole_hull laws] [--cases 54]
 
-Each stage is a function of the search; without it that function does nothing. The table counts the right effect first, both of two,
-an effect named where there is none and where no catalogue has the cause, and processor time.
+Each stage is a function of the search; without it that function does nothing. The table counts the right effect first, both of
+two, an effect named where there is none and where no catalogue has the cause, and processor time.
 A stage that earns less than one case in a hundred on all banks is to be deleted.
 """
 

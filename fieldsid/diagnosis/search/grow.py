@@ -80,12 +80,12 @@ class Growth:
         most = None if self.forced else MAX_EFFECTS_AT_BASE if is_root else MAX_EFFECTS_LATER
         found = screen_addition(Addition(self.parent, self.effects, most, flown, anew=is_root), self.grounds.parallel)
         groups = by_effects(found)
-        later = self._evaluate(groups) if self.forced else self._evaluate_foremost(groups)
+        later = self.evaluate(groups) if self.forced else self._evaluate_foremost(groups)
         if only_validation_shows(self.parent, floor):
             untried = [e for e in self.effects if self.key | {e.name} not in tried]
-            self._evaluate(by_effects(moves_of_all_runs(self.parent, untried, self.grounds.parallel)), every=True)
+            self.evaluate(by_effects(moves_of_all_runs(self.parent, untried, self.grounds.parallel)), every=True)
         leading = {n for h in tried.children(self.key)[:LEADING_CHILDREN] for n in h.names if n not in self.key}
-        self._evaluate(by_effects([move for move in later if move.screened.effect.name in leading]), every=True)
+        self.evaluate(by_effects([move for move in later if move.screened.effect.name in leading]), every=True)
         if self._prefer_output_error(refit=True):
             self._prefer_output_error(refit=False)
         if self.may_refine():
@@ -97,14 +97,14 @@ class Growth:
         Where the best child then leaves no visible error, of the others only what its effect may be mistaken for.
         """
         first = foremost(groups, FOREMOST_EFFECTS)
-        later = self._evaluate(first)
+        later = self.evaluate(first)
         best = self.tried.children(self.key)[:1]
         explained = [h for h in best if worst_error(h, self.grounds.floor) <= SUFFICIENT_ERROR_RATIO]
         alike = {n for h in explained for e in h.effects if e.name not in self.key for n in e.mistaken_for}
         others = [group for group in groups if group not in first]
-        return later + self._evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
+        return later + self.evaluate([g for g in others if not explained or g[0].screened.effect.name in alike])
 
-    def _evaluate(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
+    def evaluate(self, groups: Sequence[Sequence[SearchMove]], *, every: bool = False) -> list[SearchMove]:
         """Evaluate the moves to each set of effects; return those left out: an earlier start has reached their predicted cost.
 
         `every` leaves none out. All moves are compared with the same rival, so that the result does not depend on their order.

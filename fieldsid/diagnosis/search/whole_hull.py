@@ -2,8 +2,8 @@
 
 Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn.
 Steps from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another
-whatever each is worth alone, each from the best few of its scan points at the fit before it; what the data do not show is dropped
-again.
+whatever each is worth alone, each from the best few of its scan points at the fit before it and in the variant that the data show;
+what they do not show is dropped again.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from fieldsid.diagnosis.evidence.scored_model import ScoredModel
 from fieldsid.diagnosis.search.add_effect import likelihood_linearisation
 from fieldsid.diagnosis.search.archive import Archive
 from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.diagnosis.search.variant_search import VariantRequest, try_variants
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, screen_points
 from fieldsid.models.effect import Effect
 
@@ -33,7 +34,9 @@ def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, gro
         fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
         if fits:
             key = frozenset((*h.names, effect.name))
-            h = tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
+            tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
+            try_variants([VariantRequest(tried[key], {effect.name})], tried, grounds)
+            h = tried[key]
     return h
 
 
