@@ -2,8 +2,8 @@
 
 Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn.
 Steps from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another
-whatever each is worth alone, each from the best few of its scan points at the fit before it and in the variant that the data show;
-what they do not show is dropped again.
+whatever each is worth alone, each from the best few of its scan points at the fit before it, and in the variant that the data
+show. What they do not show is dropped again.
 """
 
 from __future__ import annotations
