@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldsid.printable import one_line
+from fieldsid.text.one_line import one_line
 
 FOUND = "  found: "
 
@@ -18,7 +18,7 @@ class FieldsidError(Exception):
 
     @property
     def shown(self) -> tuple[str, str, str]:
-        """The three parts for a reader, whatever names they hold: lines of what was found stand below its first, none elsewhere."""
+        """The three parts for a reader, whatever names they hold: only what was found may have lines, below its first."""
         found = f"\n{' ' * len(FOUND)}".join(map(one_line, self.found.split("\n")))
         return one_line(self.what), found, one_line(self.hint)
 

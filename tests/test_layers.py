@@ -16,9 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
-    "_version", "printable", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
-    "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
-    "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
+    "_version", "text", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles",
+    "strict", "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting",
+    "estimators", "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
     "trial_folder", "change", "reporting", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip

@@ -24,7 +24,7 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
-from fieldsid.printable import one_line
+from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
 WIDTH = 80

@@ -10,7 +10,7 @@ import typer
 
 from fieldsid.cli.console import complain
 from fieldsid.errors import FieldsidError
-from fieldsid.printable import one_line
+from fieldsid.text.one_line import one_line
 
 if TYPE_CHECKING:
     from fieldsid.logs.run import Run

@@ -277,9 +277,7 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     backup = str(write_patch(patch)) if write else None
     body = {"schema": "fieldsid/export/1", "target": "into", "difference": patch.difference, "file": str(into), "backup": backup}
     headline = of_patch(body, schedule, key)
-    return emit(
-        body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write
-    )
+    return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
 def _limits(

@@ -1,4 +1,4 @@
-"""Text of others as one printable line: what a name, a note or a cell holds can neither steer a terminal nor add a line to a file."""
+"""Text of others as one printable line: no name, note or cell steers a terminal or adds a line to a file."""
 
 from __future__ import annotations
 
