@@ -1,1 +1,1 @@
-"""How work is run: forked workers, background tasks, and the count of evaluations."""
+"""Text of others, made fit to be shown."""
