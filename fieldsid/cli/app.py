@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.exit_codes import DONE, INTERRUPTED
-from fieldsid.runtime.interrupts import heed_interrupts
+from fieldsid.runtime.interrupts import heed_interrupts, meet_interrupt
 from fieldsid.runtime.streams import have_streams
 
 if TYPE_CHECKING:
@@ -47,18 +47,25 @@ def _answered(arguments: list[str]) -> int:
         code = _dispatch(arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return INTERRUPTED
+        return _interrupted()
     except BrokenPipeError:
         # The reader went away (`| head`): point stdout elsewhere so that the interpreter's last flush is quiet.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         code = DONE
     except Exception as error:  # noqa: BLE001 - the one boundary: every error becomes a message and an exit code
+        if meet_interrupt():  # and what it hit was left half done
+            return _interrupted()
         from fieldsid.cli.failure import explain
 
         code, raised = explain(error, arguments), error
     _tell_refused(raised)
     return code
+
+
+def _interrupted() -> int:
+    meet_interrupt()
+    sys.stderr.write("interrupted\n")
+    return INTERRUPTED
 
 
 def entry() -> Never:

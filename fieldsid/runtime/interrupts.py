@@ -1,7 +1,7 @@
-"""Ctrl-C that is never lost: what libraries swallow while they are imported, or Python while it clears up, is raised again.
+"""Ctrl-C that is never lost: where a library swallows it while it is imported, or Python cannot raise it, it is asked for again.
 
-Python raises KeyboardInterrupt wherever the program is. A library that tries an import may take it for a module that is not
-there, and in what is called when an object goes, nothing can be raised at all: the job would go on to its end.
+Python raises KeyboardInterrupt wherever the program is. In the middle of an import a library may take it for a module that is
+not there, or clear it away in C, and in what is called when an object goes nothing can be raised: the job would go on to its end.
 """
 
 from __future__ import annotations
@@ -9,49 +9,60 @@ from __future__ import annotations
 import _thread
 import signal
 import sys
+from dataclasses import dataclass
 from time import sleep
 from types import FrameType
-from typing import Any, Never, cast
+from typing import Never
 
-AGAIN_S = 0.01
-"""How long after an interrupt that could not be raised it is asked for again."""
+AGAIN_S = 0.05
+"""How long after an interrupt that may be lost it is asked for again."""
 
 
+@dataclass(slots=True)
 class _Asked:
-    """Whether an interrupt came while something was imported: then nothing more is, and each import raises it anew."""
+    """Whether an interrupt was asked for that may be lost, and the program has not met it yet."""
 
-    in_import = False
+    is_open: bool = False
 
-    def find_spec(self, *_module: Any) -> None:
-        """Find nothing, as a finder of modules that knows none; raise KeyboardInterrupt where one was asked for."""
-        if self.in_import:
-            raise KeyboardInterrupt
+
+_ASKED = _Asked()
 
 
 def heed_interrupts() -> None:
     """Have every Ctrl-C end what this process does; where its caller has them ignored, as `nohup` does, they stay ignored."""
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        return
-    asked = _Asked()
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        sys.unraisablehook = _unraisable
+        signal.signal(signal.SIGINT, _interrupted)
 
-    def interrupted(_number: int, frame: FrameType | None) -> Never:
-        asked.in_import = asked.in_import or _is_import(frame)
-        raise KeyboardInterrupt
 
-    def unraisable(what: sys.UnraisableHookArgs) -> None:
-        if isinstance(what.exc_value, KeyboardInterrupt):
-            _thread.start_new_thread(_ask_again, ())
-        else:
-            sys.__unraisablehook__(what)
+def meet_interrupt() -> bool:
+    """Return whether an interrupt was asked for that nobody met, which then is met."""
+    was_open, _ASKED.is_open = _ASKED.is_open, False
+    return was_open
 
-    cast("list[Any]", sys.meta_path).insert(0, asked)
-    sys.unraisablehook = unraisable
-    signal.signal(signal.SIGINT, interrupted)
+
+def _interrupted(_number: int, frame: FrameType | None) -> Never:
+    if _is_import(frame):
+        _ask_later()
+    raise KeyboardInterrupt
+
+
+def _unraisable(what: sys.UnraisableHookArgs) -> None:
+    if isinstance(what.exc_value, KeyboardInterrupt):
+        _ask_later()
+    else:
+        sys.__unraisablehook__(what)
+
+
+def _ask_later() -> None:
+    _ASKED.is_open = True
+    _thread.start_new_thread(_ask_again, ())
 
 
 def _ask_again() -> None:
     sleep(AGAIN_S)
-    _thread.interrupt_main()
+    if _ASKED.is_open:
+        _thread.interrupt_main()
 
 
 def _is_import(frame: FrameType | None) -> bool:
