@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from io import StringIO
 
 import pandas as pd
@@ -98,8 +97,7 @@ def test_no_text_in_a_table_of_an_archive_is_a_formula(tmp_path, first):
 
 
 def test_the_name_of_a_run_reaches_no_table_as_markup(run_cli, tmp_path):
-    run = replace(load_run(trial.flown(tmp_path)), name="[/x]\x1b[0m")
-    log = save_run(run, tmp_path / "own.parquet")
+    log = trial.flown(tmp_path).rename(tmp_path / "[b]x\x1b[0m.parquet")
     answer = run_cli("identify", log, "--axis", "yaw")
     assert answer.code == 0, answer.err
-    assert "\n[/x]\\x1b[0m  a22 " in answer.out
+    assert "\n[b]x\\x1b[0m  a22 " in answer.out
