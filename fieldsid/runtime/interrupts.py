@@ -9,7 +9,6 @@ from __future__ import annotations
 import _thread
 import signal
 import sys
-from dataclasses import dataclass
 from time import sleep
 from types import FrameType
 from typing import Never
@@ -18,11 +17,10 @@ AGAIN_S = 0.05
 """How long after an interrupt that may be lost it is asked for again."""
 
 
-@dataclass(slots=True)
 class _Asked:
     """Whether an interrupt was asked for that may be lost, and the program has not met it yet."""
 
-    is_open: bool = False
+    is_open = False
 
 
 _ASKED = _Asked()
