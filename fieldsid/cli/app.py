@@ -6,8 +6,6 @@ import atexit
 import gc
 import os
 import sys
-from contextlib import chdir
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.exit_codes import DONE, INTERRUPTED
@@ -164,6 +162,9 @@ def _enter_folder() -> None:
         found = os.environ.get("PWD", "no folder")
         raise UsageError("the working folder is no longer there", found=found, hint="`cd` to one that is") from error
     if os.path.lexists("matplotlibrc"):  # no way to tell matplotlib not to look for it
+        from contextlib import chdir
+        from importlib import import_module
+
         with chdir(os.path.dirname(__file__)):  # noqa: PTH120 - no import
             import_module("fieldsid.figures.canvas")
 

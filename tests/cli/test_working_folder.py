@@ -133,7 +133,8 @@ def test_a_mistyped_file_beside_a_refused_effect_ends_at_once(folder, words):
     done = started(*words)
     assert done.returncode == 2
     assert done.stderr.count("error: ") == 1
-    assert "tether.yaml`: `moment` must be text; it takes no part" in done.stderr
+    assert "warning: `effects/tether.yaml`: " in done.stderr
+    assert done.stderr.count("; it takes no part\n") == 1
 
 
 def test_a_file_that_cannot_be_read_is_no_cause_of_itself(tmp_path):
