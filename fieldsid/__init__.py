@@ -10,14 +10,15 @@ The functions take the arguments of the commands of their names (`sysid identify
 record in words, `to_frame()` a pandas table, `plot()` a matplotlib figure. A name is loaded when it is first asked for.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from fieldsid._version import __version__
 
+TYPE_CHECKING = False
+"""What `typing` has by this name: nothing more is imported here before `python -m fieldsid` leaves the working folder out."""
 if TYPE_CHECKING:
+    from typing import Any
+
     from fieldsid.change.record import Change
     from fieldsid.comparison.compare import Comparison
     from fieldsid.diagnosis import Candidate, Diagnosis
@@ -67,7 +68,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     room = next((room for room, names in _ROOMS.items() if name in names), None)
     if room is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from fieldsid.text.one_line import one_line
+
+FOUND = "  found: "
+
 
 class FieldsidError(Exception):
     """Base of every error this package raises on purpose; the command line turns it into exit code 2."""
@@ -12,13 +16,15 @@ class FieldsidError(Exception):
         self.found = found
         self.hint = hint
 
+    @property
+    def shown(self) -> tuple[str, str, str]:
+        """The three parts for a reader, whatever names they hold: only what was found may have lines, below its first."""
+        found = f"\n{' ' * len(FOUND)}".join(map(one_line, self.found.split("\n")))
+        return one_line(self.what), found, one_line(self.hint)
+
     def __str__(self) -> str:
-        parts = [self.what]
-        if self.found:
-            parts.append(f"  found: {self.found}")
-        if self.hint:
-            parts.append(f"\nhint: {self.hint}")
-        return "\n".join(parts)
+        what, found, hint = self.shown
+        return "".join((what, f"\n{FOUND}{found}" if found else "", f"\n\nhint: {hint}" if hint else ""))
 
 
 class UsageError(FieldsidError):

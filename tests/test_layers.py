@@ -16,10 +16,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
-    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
-    "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
-    "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
-    "trial_folder", "change", "reporting", "figures", "views", "face",
+    "_version", "text", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles",
+    "strict", "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting",
+    "estimators", "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule",
+    "exports", "trial_folder", "change", "reporting", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""
@@ -236,7 +236,15 @@ def test_nothing_but_the_house_stands_at_the_top():
 
 
 def test_help_page_and_front_door_import_nothing_heavy():
-    own = {f"fieldsid.{name}" for name in ("_version", "cli.help.catalogue", "cli.help.command_order", "cli.exit_codes")}
+    light = (
+        "_version",
+        "cli.help.catalogue",
+        "cli.help.command_order",
+        "cli.exit_codes",
+        "runtime.interrupts",
+        "runtime.streams",
+    )
+    own = {f"fieldsid.{name}" for name in light}
     for name in ("app", "exit_codes", "help/catalogue", "help/command_order", "help/help_page"):
         modules = imports_at_start(PACKAGE / "cli" / f"{name}.py")
         assert modules <= {"__future__", "atexit", "gc", "os", "sys", "typing", *own}

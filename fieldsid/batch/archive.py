@@ -59,9 +59,15 @@ def write_table(folder: Path, axis: Axis, rows: Iterable[Row]) -> tuple[Path, Pa
     parquet, table = folder / f"batch_{axis.value}.parquet", folder / f"batch_{axis.value}.csv"
     with replacing(parquet, force=True) as temporary:
         frame.to_parquet(temporary, index=False)
+    cells = {n: frame[n].map(_no_formula, na_action="ignore") for n in words}
     with replacing(table, force=True) as temporary:
-        frame.to_csv(temporary, index=False)
+        frame.assign(**cells).to_csv(temporary, index=False)
     return parquet, table
+
+
+def _no_formula(text: str) -> str:
+    """Return a text as a cell that a spreadsheet takes for text, whatever a log's name begins with."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
 _WORDS = frozenset(

@@ -155,7 +155,7 @@ class _Crew:
 
 
 def _started() -> _Process:
-    command = [sys.executable, "-m", "fieldsid.batch.worker"]
+    command = [sys.executable, "-P", "-m", "fieldsid.batch.worker"]  # -P: no module is looked for in the working folder
     environment = os.environ | ENVIRONMENT
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, start_new_session=True

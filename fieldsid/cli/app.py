@@ -9,6 +9,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.exit_codes import DONE, INTERRUPTED
+from fieldsid.runtime.interrupts import heed_interrupts, meet_interrupt
+from fieldsid.runtime.streams import have_streams
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 # Before NumPy is loaded: the systems solved here are tiny, and threads that wait for a busy core cost ten times the work.
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
+# Figures are drawn with matplotlib's own settings and ours.
+os.environ.setdefault("MATPLOTLIBRC", os.devnull)
 
 JOURNAL = "journal.jsonl"
 """The file that marks a trial folder, as `fieldsid/trial_folder/journal.py` has it: known here without its imports."""
@@ -41,13 +45,14 @@ def _answered(arguments: list[str]) -> int:
         code = _dispatch(arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return INTERRUPTED
+        return _interrupted()
     except BrokenPipeError:
         # The reader went away (`| head`): point stdout elsewhere so that the interpreter's last flush is quiet.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         code = DONE
     except Exception as error:  # noqa: BLE001 - the one boundary: every error becomes a message and an exit code
+        if meet_interrupt():  # and what it hit was left half done
+            return _interrupted()
         from fieldsid.cli.failure import explain
 
         code, raised = explain(error, arguments), error
@@ -55,16 +60,29 @@ def _answered(arguments: list[str]) -> int:
     return code
 
 
+def _interrupted() -> int:
+    meet_interrupt()
+    sys.stderr.write("interrupted\n")
+    return INTERRUPTED
+
+
 def entry() -> Never:
     """Run the command line of this process and end it."""
     gc.set_threshold(GC_THRESHOLD)
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # a console without a file's letters shows their codes
-            stream.reconfigure(errors="backslashreplace")
+    heed_interrupts()
+    can_answer = have_streams()
     codes: list[int] = []
     atexit.register(_end, codes)  # what is registered first is called last
-    codes.append(main())
+    codes.append(main() if can_answer else _refused_output())
     sys.exit(codes[0])
+
+
+def _refused_output() -> int:
+    from fieldsid.cli.failure import explain
+    from fieldsid.errors import UsageError
+
+    hint = "leave it open, or send the result to a file: `> result.txt`"
+    return explain(UsageError("standard output is closed", found="no place for the result", hint=hint), ())
 
 
 def _end(codes: list[int]) -> None:
@@ -124,6 +142,7 @@ def _dispatch(arguments: list[str]) -> int:
     from fieldsid.cli.voice import take
 
     arguments = take(arguments)
+    _enter_folder()
     if os.path.isfile(JOURNAL):  # noqa: PTH113 - no import
         from fieldsid.cli.trial.journaled import run_in_trial
 
@@ -131,6 +150,23 @@ def _dispatch(arguments: list[str]) -> int:
     else:
         result = run(arguments)
     return result if isinstance(result, int) else DONE
+
+
+def _enter_folder() -> None:
+    """Check that the working folder is there, and load what would take settings from a file in it; raises UsageError."""
+    try:
+        os.getcwd()  # noqa: PTH109 - no import
+    except OSError as error:
+        from fieldsid.errors import UsageError
+
+        found = os.environ.get("PWD", "no folder")
+        raise UsageError("the working folder is no longer there", found=found, hint="`cd` to one that is") from error
+    if os.path.lexists("matplotlibrc"):  # no way to tell matplotlib not to look for it
+        from contextlib import chdir
+        from importlib import import_module
+
+        with chdir(os.path.dirname(__file__)):  # noqa: PTH120 - no import
+            import_module("fieldsid.figures.canvas")
 
 
 def _forget_voice() -> None:

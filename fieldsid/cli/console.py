@@ -1,4 +1,8 @@
-"""What commands print: data to stdout, messages to stderr, one JSON object on demand, tables that fit 80 columns."""
+"""What commands print: data to stdout, messages to stderr, one JSON object on demand, tables that fit 80 columns.
+
+The one way to a terminal: what is printed, and the cell of a table, is a line of plain text and no markup, and control codes are
+shown, whatever names of others it holds.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,8 @@ from typing import Any, TypeVar
 
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.measure import Measurement
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -19,11 +24,31 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
+from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
 WIDTH = 80
 NARROW, FAR = 60, 1000
 """Columns of a terminal below which a table that does not fit is shown row by row, and those in which any table fits."""
+
+
+class Terminal(Console):
+    """A console that takes text for what it is: no markup, no emoji by name, no highlights, no control codes but its own."""
+
+    def render_str(self, text: str, **given: Any) -> Text:
+        """Return a text that is printed, or a table's cell, as one line of printable characters."""
+        return super().render_str(one_line(text), **given)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield the pieces of whatever is shown, with the control codes in its words made printable."""
+        for piece in super().render(renderable, options):
+            whole = piece.control or piece.text.isprintable() or piece.text == "\n"
+            yield piece if whole else Segment("\n".join(map(one_line, piece.text.split("\n"))), piece.style)
+
+
+def words(text: str, style: str = "") -> Text:
+    """Return one line of plain text in a style."""
+    return Text(one_line(text), style=style)
 
 
 def out() -> Console:
@@ -72,8 +97,17 @@ def emit(
 def print_headline(to: Console, headline: Headline) -> None:
     """Print the first lines of a result, each whole on a line of its own: they are read, and pasted."""
     for i, line in enumerate(headline.lines):
-        to.print(Text(line, style="bold" if i == 0 else ""), soft_wrap=True)
+        to.print(words(line, "bold" if i == 0 else ""), soft_wrap=True)
     to.file.flush()
+
+
+def print_file(to: Console, text: str) -> None:
+    """Print the text of a file: byte for byte where it is redirected to one, line by line to a terminal."""
+    if not to.is_terminal:
+        to.file.write(text)
+        return
+    for line in text.removesuffix("\n").split("\n"):
+        to.print(line, soft_wrap=True)
 
 
 class Rows(Table):
@@ -86,7 +120,7 @@ class Rows(Table):
             yield from super().__rich_console__(console, options)
             return
         if self.title:
-            yield Text(str(self.title), style="bold")
+            yield words(str(self.title), "bold")
         for row in zip(*(column.cells for column in self.columns), strict=True):
             block = Table.grid(padding=(0, 2, 0, 0))
             block.add_column(style="dim")
@@ -122,9 +156,10 @@ def say(text: str) -> None:
         complain(text)
 
 
-def complain(text: str) -> None:
+def complain(*lines: str) -> None:
     """Print on stderr what makes the exit code other than 0, however quiet the command is to be."""
-    messages().print(Text(text), soft_wrap=True)
+    for line in lines:
+        messages().print(words(line), soft_wrap=True)
 
 
 def warn(notes: Iterable[Note], *, of: str = "") -> None:
@@ -134,7 +169,7 @@ def warn(notes: Iterable[Note], *, of: str = "") -> None:
     where, to = f"{of}: " if of else "", messages()
     for note in notes:
         said = f"{where}{note.message} [{note.code}]"
-        to.print(Text(f"warning: {folded(said, to.width) if to.is_terminal else said}", style="yellow"), soft_wrap=True)
+        to.print(words(f"warning: {folded(said, to.width) if to.is_terminal else said}", "yellow"), soft_wrap=True)
 
 
 def alike(found: Iterable[tuple[Hashable, str, Note]]) -> list[Note]:
@@ -165,18 +200,14 @@ def folded(text: str, width: int) -> str:
 @contextmanager
 def progress(says: str, total: int) -> Iterator[Callable[[], None]]:
     """Yield a function that moves a bar on by one; the bar is drawn on stderr, and only on a terminal."""
-    console = messages()
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not shows_progress(console)) as bar:
+    with _bar(TextColumn("{task.completed}/{task.total}")) as bar:
         task = bar.add_task(says, total=total)
         yield lambda: bar.advance(task)
 
 
 def tracked(items: Sequence[T], says: str) -> Iterator[tuple[T, Callable[[float], None]]]:
     """Yield the items while a bar on a terminal shows how far it is, each with a function that tells how much of it is done."""
-    console = messages()
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not shows_progress(console)) as bar:
+    with _bar(TaskProgressColumn()) as bar:
         task = bar.add_task(says, total=len(items))
         for i, item in enumerate(items):
             yield item, partial(_show_share, bar, task, i)
@@ -188,6 +219,12 @@ def shows_progress(console: Console) -> bool:
     return console.is_terminal and not voice().is_quiet
 
 
+def _bar(how_far: ProgressColumn) -> Progress:
+    console = messages()
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), how_far, TimeElapsedColumn())
+    return Progress(*columns, console=console, transient=True, disable=not shows_progress(console))
+
+
 def _show_share(bar: Progress, task: TaskID, done: int, share: float) -> None:
     bar.update(task, completed=done + share)
 
@@ -195,4 +232,4 @@ def _show_share(bar: Progress, task: TaskID, done: int, share: float) -> None:
 def _console(*, stderr: bool) -> Console:
     stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() else WIDTH
-    return Console(file=stream, width=width, highlight=False, soft_wrap=False, emoji=False)
+    return Terminal(file=stream, width=width, markup=False, highlight=False, soft_wrap=False, emoji=False)

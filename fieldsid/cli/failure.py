@@ -41,26 +41,30 @@ def explain(error: Exception, arguments: Sequence[str]) -> int:
         sys.stderr.write(f"error: {error}\n")
         _print_json(arguments, BAD_INPUT, error.what, error.found, error.hint)
         return BAD_INPUT
-    trace = _save_trace(error, arguments)
-    _print_json(arguments, OUR_BUG, f"this is a bug of fieldsid: {type(error).__name__}: {error}", f"the trace is in `{trace}`")
-    sys.stderr.write(
-        f"error: this is a bug of fieldsid: {type(error).__name__}: {error}\n"
-        f"  found: the trace is in `{trace}`\n\nhint: send us that file with the log that caused it\n"
-    )
+    trace, said = _save_trace(error, arguments), f"this is a bug of fieldsid: {type(error).__name__}: {error}"
+    _print_json(arguments, OUR_BUG, said, f"the trace is in `{trace}`")
+    bug = FieldsidError(said, found=f"the trace is in `{trace}`", hint="send us that file with the log that caused it")
+    sys.stderr.write(f"error: {bug}\n")
     return OUR_BUG
 
 
 def tell_refused(errors: Sequence[FieldsidError], raised: Exception | None) -> None:
     """Print on stderr why parts that are not built in took none, but for the one that an error was raised for."""
-    printed: list[BaseException] = []
-    cause: BaseException | None = raised
-    while cause is not None:
-        printed.append(cause)
-        cause = cause.__cause__
+    printed = _with_causes(raised)
     for error in errors:
         if not any(error is one for one in printed):
-            found, hint = (f"\n  {word}: {said}" if said else "" for word, said in (("found", error.found), ("hint", error.hint)))
-            sys.stderr.write(f"warning: {error.what}; it takes no part{found}{hint}\n")
+            what, found, hint = error.shown
+            below = (f"\n  {word}: {said}" if said else "" for word, said in (("found", found), ("hint", hint)))
+            sys.stderr.write(f"warning: {what}; it takes no part{''.join(below)}\n")
+
+
+def _with_causes(error: BaseException | None) -> list[BaseException]:
+    """Return an error and what it was raised from, each once: of errors raised from one another there is no end."""
+    found: list[BaseException] = []
+    while error is not None and not any(error is one for one in found):
+        found.append(error)
+        error = error.__cause__
+    return found
 
 
 def _print_json(arguments: Sequence[str], code: int, what: str, found: str, hint: str = "") -> None:

@@ -10,6 +10,7 @@ import typer
 
 from fieldsid.cli.console import complain
 from fieldsid.errors import FieldsidError
+from fieldsid.text.one_line import one_line
 
 if TYPE_CHECKING:
     from fieldsid.logs.run import Run
@@ -32,7 +33,7 @@ class Skips:
             self._runs.add(name)
         shown = str(file or "-")
         self.records.append({"run": name, "file": shown, "what": error.what, "found": error.found, "hint": error.hint})
-        complain(f"skipped `{shown}`: {error}\n")
+        complain(*f"skipped `{one_line(shown)}`: {error}\n".split("\n"))
 
     def left_of(self, runs: Sequence[Run]) -> list[Run]:
         """Return those of the runs read that were not skipped afterwards."""

@@ -134,7 +134,7 @@ def _value(expression: Expression, node: ast.expr, table: Mapping[str, FloatArra
 def _at(text: str, offset: int, what: str, hint: str) -> EffectError:
     """Return an error that shows the expression with a caret under the place."""
     column = len(text.encode("utf-8")[: max(offset, 0)].decode("utf-8", errors="ignore"))
-    return EffectError(what, found=f"{text}\n{' ' * (len('  found: ') + column)}^", hint=hint)
+    return EffectError(what, found=f"{text}\n{' ' * column}^", hint=hint)
 
 
 def _grammar_hint(text: str) -> str:

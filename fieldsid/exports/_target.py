@@ -9,14 +9,18 @@ from typing import Any
 
 import jinja2
 import numpy as np
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from fieldsid.errors import ArtifactError
 from fieldsid.models.axis import Axis
 from fieldsid.schedule.record import Schedule
 from fieldsid.templates import template_path
+from fieldsid.text.one_line import one_line
 
 DECIMALS = 6
 NAMES = {Axis.YAW: "heading", Axis.PITCH: "pitch"}
+MISTAKES = (jinja2.TemplateError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+"""What a template that is wrong ends in, jinja's own errors and those of what is reckoned in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +49,17 @@ def columns_of(schedule: Schedule) -> dict[str, list[float]]:
 
 
 def notes_of(schedule: Schedule) -> list[str]:
-    """Return the lines a reader of the exported file needs: law, signs, units, support, origin and margins."""
+    """Return the lines a reader of the exported file needs: law, signs, units, support, origin and margins.
+
+    They are comments in a file for a vehicle: each is one line, whatever names a schedule holds.
+    """
     p = schedule.provenance
     models = ", ".join(f"{Path(str(m['path'])).name} (sha256 {str(m['sha256'])[:12]})" for m in p.get("models", []))
     low, high = (float(v) for v in p.get("supported_m_s", (schedule.speeds[0], schedule.speeds[-1])))
     phase = min(r.phase_margin_deg for r in schedule.rows)
     gain = min(r.gain_margin_db for r in schedule.rows)
     delay = min(r.delay_margin_s for r in schedule.rows)
-    return [
+    lines = (
         f"{NAMES[schedule.axis]} gain schedule, controller {schedule.kind}, by {p.get('tool', 'fieldsid')}",
         str(p.get("law", "")),
         f"signs: {p.get('sign_convention', '')}",
@@ -62,15 +69,16 @@ def notes_of(schedule: Schedule) -> list[str]:
         f"least margins: {phase:.0f} deg, {'no limit' if gain == float('inf') else f'{gain:.1f} dB'}, {delay:.2f} s of delay",
         f"models: {models or 'none named'}",
         f"runs: {', '.join(map(str, p.get('runs', []))) or 'none named'}",
-    ]
+    )
+    return [one_line(line) for line in lines]
 
 
 def from_template(shipped: str, schedule: Schedule, node: str, own: Path | None) -> str:
     """Render a template with the schedule's rows (numbers as text), columns and notes; raises ArtifactError."""
     path = own or template_path(f"exports/{shipped}")
-    # configuration text, not HTML: nothing is escaped
+    # Configuration text, not HTML: nothing is escaped. A template may be somebody else's: it reaches its numbers and no Python.
     options: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
-    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=False, **options)  # noqa: S701
+    environment = ImmutableSandboxedEnvironment(undefined=jinja2.StrictUndefined, autoescape=False, **options)
     try:
         template = environment.from_string(path.read_text(encoding="utf-8"))
         return template.render(**_context(schedule, node))
@@ -78,7 +86,7 @@ def from_template(shipped: str, schedule: Schedule, node: str, own: Path | None)
         raise ArtifactError(
             f"template `{path}` cannot be read", found=str(error.strerror), hint="leave `--template` out"
         ) from error
-    except jinja2.TemplateError as error:
+    except MISTAKES as error:
         raise ArtifactError(
             f"template `{path}` is not valid", found=str(error), hint=f"start from `{template_path(f'exports/{shipped}')}`"
         ) from error
@@ -89,7 +97,7 @@ def _context(schedule: Schedule, node: str) -> dict[str, Any]:
     texts = {name: [decimal(v) for v in values] for name, values in columns.items()}
     count = len(schedule.rows)
     return {
-        "node": node,
+        "node": one_line(node),
         "axis": schedule.axis.value,
         "name": NAMES[schedule.axis],
         "controller": schedule.kind,

@@ -5,6 +5,8 @@ Every number has a decimal point and none an exponent: rcl takes `1` for an inte
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 from fieldsid.exports._target import NAMES, Target, columns_of, decimal, notes_of
@@ -21,7 +23,8 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
 
 
 def _key(node: str) -> str:
-    return f'"{node}"' if "*" in node and not node.startswith("/") else node
+    """Return a node's name as a YAML key, quoted where it is more than a plain word."""
+    return node if re.fullmatch(r"[\w/][\w/*-]*", node, re.ASCII) else json.dumps(node)
 
 
 EXPORT = Target(

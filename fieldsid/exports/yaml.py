@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from fieldsid.artifacts import to_yaml
+from fieldsid.artifacts import plain, to_yaml
 from fieldsid.exports._target import NAMES, Target, notes_of
 from fieldsid.schedule.record import Schedule, body_of
+from fieldsid.text.one_line import one_line
 
 
 def render(schedule: Schedule, node: str, template: Path | None) -> str:
@@ -20,9 +22,18 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
         "angle": NAMES[schedule.axis],
         "controller": body["controller"],
         "rows": rows,
-        "provenance": body["provenance"],
+        "provenance": _in_lines(plain(body["provenance"])),
     }
     return head + to_yaml({node: inner})
+
+
+def _in_lines(value: Any) -> Any:
+    """Return nested plain values with every word in them as one line."""
+    if isinstance(value, dict):
+        return {one_line(k): _in_lines(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_in_lines(v) for v in value]
+    return one_line(value) if isinstance(value, str) else value
 
 
 EXPORT = Target(

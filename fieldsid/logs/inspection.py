@@ -19,6 +19,7 @@ from fieldsid.logs.mapping.propose import Proposal, propose
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.way_in import WayIn, way_in
+from fieldsid.text.one_line import one_line
 
 SCHEMA = "fieldsid/inspection/1"
 _COLUMN_EXAMPLE = """# columns are counted from 0:
@@ -48,7 +49,7 @@ class Inspection(Brief):
 
     def yaml(self) -> str:
         """Return the proposed mapping as the text of a mapping.yaml."""
-        head = f"# Proposed for {self.inventory.path.name} by its names, types and numbers.\n"
+        head = f"# Proposed for {one_line(self.inventory.path.name)} by its names, types and numbers.\n"
         head += "# Check units, signs and frame before you trust it.\n"
         body = dict(self.proposal.body)
         signals = body.pop("signals")
@@ -140,7 +141,7 @@ def _scalar(value: Any) -> str:
     return (
         text
         if isinstance(value, (int, float)) or (_PLAIN.match(text) and text.lower() not in _RESERVED)
-        else json.dumps(text, ensure_ascii=False)
+        else one_line(json.dumps(text, ensure_ascii=False))  # YAML reads these escapes too
     )
 
 

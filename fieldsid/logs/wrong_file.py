@@ -20,7 +20,10 @@ def unless_log(path: Path, wanted: str) -> Iterator[None]:
     try:
         yield
     except ArtifactError as error:
-        raise (None if _has_keys(path) else if_log(path, wanted)) or error from error
+        log = None if _has_keys(path) else if_log(path, wanted)
+        if log is None:
+            raise
+        raise log from error
 
 
 def _has_keys(path: Path) -> bool:

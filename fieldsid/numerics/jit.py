@@ -1,13 +1,19 @@
 """The typed interface to numba: `@jit` compiles a function once and caches it on disk, `@inner` marks what it calls.
 
+A cache is code that is run. It is the user's own, and no file of the working folder says where it is: by itself numba reads
+`.numba_config.yaml` there, which a folder from somebody else may hold.
+
 On a vehicle's computer without numba functions stay plain Python: the online estimate needs 31 us a sample then. Fits of whole
 logs would take minutes.
 """
 
 from __future__ import annotations
 
+import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
+from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from importlib.util import find_spec
@@ -23,17 +29,47 @@ def jit(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function compiled by numba, without Python objects, division by zero giving inf as in NumPy."""
     if not HAS_NUMBA:
         return function
-    numba: Any = import_module("numba")
-    return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
+    numba = _numba()
+    given = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = given or cache_folder()  # looked at here alone: what a caller compiles is kept where it was
+    try:
+        return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)(function))
+    finally:
+        numba.config.CACHE_DIR = given
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:
     """Return the function as it is, which functions of `jit` may call, compiled with them; called from Python it is plain."""
     if not HAS_NUMBA:
         return function
-    numba: Any = import_module("numba.extending")
-    decorator = numba.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    decorator = _numba().extending.register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
     return cast("Callable[P, R]", decorator(function))
+
+
+def cache_folder() -> str:
+    """Return the folder of what is compiled, among what the user's programs keep; empty, which numba takes for its own choice.
+
+    The variable NUMBA_CACHE_DIR, where it is set, says another one.
+    """
+    places = (os.environ.get("XDG_CACHE_HOME", ""), os.environ.get("LOCALAPPDATA", ""), os.path.expanduser("~/.cache"))  # noqa: PTH111
+    place = next((p for p in places if os.path.isabs(p)), "")  # noqa: PTH117 - a relative one is one of the working folder
+    return place and os.path.join(place, "fieldsid", "numba")  # noqa: PTH118
+
+
+@cache
+def _numba() -> Any:
+    """Return numba, which then takes no settings from the working folder: it reads them with a library that it does not find."""
+    modules = cast("dict[str, Any]", sys.modules)
+    held = {"yaml": modules["yaml"]} if "yaml" in modules else {}
+    modules["yaml"] = None
+    warnings.filterwarnings("ignore", "A Numba config file is found")  # said at each function that is compiled
+    try:
+        numba = import_module("numba")
+        import_module("numba.extending")
+    finally:
+        del modules["yaml"]
+        modules.update(held)
+    return numba
 
 
 def plain_of(function: Callable[P, R]) -> Callable[P, R]:
@@ -51,7 +87,7 @@ def warmup_marker(functions: Sequence[Callable[..., object]]) -> Path:
 
     Its name changes with what numba compiles anew for: the source files, numba's and Python's version, the processor.
     """
-    parts = [import_module("numba").__version__, sys.version, import_module("llvmlite.binding").get_host_cpu_name()]
+    parts = [_numba().__version__, sys.version, import_module("llvmlite.binding").get_host_cpu_name()]
     for source in sorted({cast("Any", f).py_func.__code__.co_filename for f in functions}):
         known = Path(source).stat()
         parts.append(f"{source} {known.st_mtime_ns} {known.st_size}")

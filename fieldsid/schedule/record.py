@@ -17,7 +17,7 @@ from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import finite_number
-from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.controller import KINDS, Gains
 
 KIND = "fieldsid/schedule"
 COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad", "depth_gain", "supported")
@@ -151,7 +151,7 @@ def load_schedule(path: Path) -> Schedule:
         _refuse_falling(rows)
         return Schedule(
             axis=Axis(body["axis"]),
-            kind=str(body["controller"]),
+            kind=_controller(body["controller"]),
             damping=float(body["damping_ratio"]),
             phase_margin_deg=float(body["phase_margin_wanted_deg"]),
             depth=bool(body["depth"]),
@@ -167,6 +167,12 @@ def load_schedule(path: Path) -> Schedule:
             found=f"{type(error).__name__}: {error}",
             hint="design it again, with `--force`",
         ) from error
+
+
+def _controller(kind: object) -> str:
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise ValueError(f"`controller` is none of {', '.join(KINDS)}")
+    return kind
 
 
 def _refuse_falling(rows: Sequence[Row]) -> None:

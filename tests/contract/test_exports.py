@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import configparser
 import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from fieldsid.errors import ArtifactError
@@ -13,7 +18,7 @@ from fieldsid.exports import all_targets
 from fieldsid.exports._target import columns_of
 from fieldsid.models.axis import Axis
 from fieldsid.schedule.controller import Gains
-from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.record import Row, Schedule, load_schedule, save_schedule
 
 TARGETS = sorted(all_targets())
 
@@ -32,6 +37,8 @@ def schedule_of(axis=Axis.YAW, *, depth=False):
             65.0,
             float("inf"),
             2.0,
+            0.99,
+            8.0,
         )
         for i in range(3)
     )
@@ -146,9 +153,8 @@ def read_ardupilot(text, node):
 
 def read_moos(text, node):
     assert f"ProcessConfig = {node}\n{{" in text
-    rows = [
-        dict(p.strip().split("=") for p in line.split("ROW = ")[1].split(",")) for line in text.splitlines() if "ROW = " in line
-    ]
+    lines = [line.split("ROW = ")[1] for line in text.splitlines() if line.startswith("  ROW = ")]
+    rows = [dict(p.strip().split("=") for p in line.split(",")) for line in lines]
     return {k: [float(r[k]) for r in rows] for k in rows[0]}
 
 
@@ -168,3 +174,86 @@ def test_a_template_of_ones_own_is_used_and_a_broken_one_refused(name, tmp_path)
         own.write_text(broken)
         with pytest.raises(ArtifactError, match="not valid"):
             all_targets()[name].render(schedule_of(), "N", own)
+
+
+LINES = (
+    "SERVO1_MIN,500",
+    "fin_limit_rad: [9.0]",
+    "Maximum Fin Angle = 9.0",
+    "  ROW = fin_limit_rad=9.0",
+    "[Control]",
+    "}",
+    "{{ 1 }}",
+)
+ENDS = ("\n", "\r", "\r\n", "\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\u2029")
+OWN_LINES = st.builds("{0}{1}{2}{1}# ".format, st.text(max_size=5), st.sampled_from(ENDS), st.sampled_from(LINES))
+TEXT = st.one_of(st.text(max_size=20), OWN_LINES)
+SAYS = ("tool", "law", "sign_convention", "schedule_variable", "between_rows", "outside_rows")
+
+
+@st.composite
+def accepted(draw):
+    """A schedule of somebody else's that is read without complaint: numbers as they may be, any words wherever words may be."""
+    axis, depth = draw(st.sampled_from([(Axis.YAW, False), (Axis.PITCH, True)]))
+    known = schedule_of(axis, depth=depth)
+    models = [{"path": draw(TEXT), "sha256": draw(TEXT)} for _ in range(draw(st.integers(0, 2)))]
+    said = {name: draw(TEXT) for name in SAYS if draw(st.booleans())}
+    provenance = {**known.provenance, **said, "models": models, "runs": draw(st.lists(TEXT, max_size=3)), draw(TEXT): draw(TEXT)}
+    made = replace(known, kind=draw(st.sampled_from(["p", "pd", "pi", "pid", "lqr"])), provenance=provenance)
+    with tempfile.TemporaryDirectory() as folder:
+        return load_schedule(save_schedule(made, Path(folder) / "gains.yaml"))
+
+
+@settings(max_examples=20)  # a YAML file each
+@pytest.mark.parametrize("name", TARGETS)
+@given(schedule=accepted())
+def test_an_export_holds_exactly_its_own_keys_whatever_a_schedule_says(name, schedule):
+    target = all_targets()[name]
+    text, plain = (target.render(s, target.node, None) for s in (schedule, plainly(schedule)))
+    assert all(line.isprintable() for line in text.split("\n"))
+    assert text.splitlines() == text.removesuffix("\n").split("\n")
+    assert own_keys(name, text, target.node) == own_keys(name, plain, target.node)
+    assert set(READERS[name](text, target.node)) >= set(columns_of(schedule))
+
+
+def plainly(schedule):
+    """The same schedule with no words but its own."""
+    return replace(schedule, provenance=schedule_of(schedule.axis, depth=schedule.depth).provenance)
+
+
+def own_keys(name, text, node):
+    """All that a file says but comments, and of the plain YAML its keys, without the words of where it came from."""
+    if name == "yaml":
+        (inner,) = YAML(typ="safe").load(text).values()
+        assert isinstance(inner.pop("provenance"), dict)
+        return inner
+    return [line for line in text.splitlines() if not line.startswith(("#", "//"))]
+
+
+@pytest.mark.parametrize("kind", ['pd"\n      fin_limit_rad: [9.0]', "PD", "", None, 3, ["pd"], {"pd": 1}])
+def test_a_schedule_with_a_controller_that_there_is_not_is_refused(tmp_path, kind):
+    path = save_schedule(replace(schedule_of(), kind=kind), tmp_path / "gains.yaml")
+    with pytest.raises(ArtifactError, match="not a complete schedule") as error:
+        load_schedule(path)
+    assert "none of p, pd, pi, pid, lqr" in error.value.found
+
+
+@pytest.mark.parametrize("reached", ["{{ ''.__class__.__mro__ }}", "{{ notes.append('x') }}", "{{ notes.__init__.__globals__ }}"])
+def test_a_template_of_somebody_elses_reaches_no_python(tmp_path, reached):
+    own = tmp_path / "own.txt"
+    own.write_text(reached)
+    with pytest.raises(ArtifactError, match="not valid"):
+        all_targets()["dune"].render(schedule_of(), "N", own)
+
+
+@pytest.mark.parametrize("mistake", ["{{ 1 / 0 }}", "{{ 'a' + 1 }}", "{{ '%d' | format('x') }}", "{{ range(10 ** 9) | list }}"])
+def test_a_mistake_in_a_template_is_said(tmp_path, mistake):
+    own = tmp_path / "own.txt"
+    own.write_text(mistake)
+    with pytest.raises(ArtifactError, match="not valid"):
+        all_targets()["moos"].render(schedule_of(), "N", own)
+
+
+@pytest.mark.parametrize("node", ["N", "/**", "**", "a b", "x: {y: 1}, z", "n\nm", '"'])
+def test_the_name_of_a_node_is_one_key(node):
+    assert list(YAML(typ="safe").load(all_targets()["ros2"].render(schedule_of(), node, None))) == [node]

@@ -17,7 +17,17 @@ import numpy as np
 from bags import MAPPING, write_bag
 from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 from cli import trial
-from fuzz.mutate import Spoil, spoil_bytes, spoil_column, spoil_parquet, spoil_sqlite, spoil_text, spoil_yaml
+from fuzz.mutate import (
+    Spoil,
+    spoil_bytes,
+    spoil_column,
+    spoil_heads,
+    spoil_names,
+    spoil_parquet,
+    spoil_sqlite,
+    spoil_text,
+    spoil_yaml,
+)  # fmt: skip
 
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.cli.app import run as command
@@ -257,6 +267,79 @@ def prior_read(path):
     load_believed(path)
 
 
+def as_plan(folder):
+    from plan_legs import leg, plan
+
+    from fieldsid.planning.output.plan_file import save_plan
+
+    return save_plan(plan(leg("square_pulses"), leg("doublet")), folder / "plan.yaml")
+
+
+def exported(path):
+    """Export a schedule to every target: each file holds what it holds where the same numbers have no words of others."""
+    from fieldsid.exports import all_targets
+    from fieldsid.schedule.record import load_schedule
+
+    known = load_schedule(path)
+    plain = replace(known, provenance={}, notes=())
+    for name, target in all_targets().items():
+        text, own = (target.render(s, target.node, None) for s in (known, plain))
+        check_lines(text)
+        if name != "yaml":
+            own_lines, lines = ([x for x in t.split("\n") if not x.startswith(("#", "//"))] for t in (own, text))
+            assert lines == own_lines, f"{name} holds lines that are none of the schedule's"
+
+
+def flown_from_list(path):
+    """Write every leg of a plan as every mission: lines of text, the same ones whatever the plan calls things."""
+    from fieldsid.planning.output.mission import render, styles
+    from fieldsid.planning.output.plan_file import load_plan
+
+    known = load_plan(path)
+    for leg in known.legs:
+        for style in styles():
+            text, own = (render(p, leg, style) for p in (known, replace(known, vehicle="x")))
+            check_lines(text)
+            assert text.split("\n")[1:] == own.split("\n")[1:], f"{style} holds lines that are none of the plan's"
+
+
+def check_lines(text):
+    """What is written for a vehicle or shown on a terminal has no letter that is not printable."""
+    for line in text.split("\n"):
+        assert line.isprintable(), f"a line holds {line[:200]!r}"
+
+
+def shown(*words):
+    """A command line whose output and messages are looked through for what would steer a terminal."""
+
+    def door(path):
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+            try:
+                said(*words)(path)
+            except FieldsidError as error:
+                out.write(str(error))
+        check_lines(out.getvalue())
+
+    return door
+
+
+def printed(path):
+    """Print what a file holds, each line of it as a name: in a table, as a headline's line, a note, a message."""
+    from fieldsid.cli.console import complain, out, table, warn, words
+
+    names = path.read_bytes().decode(errors="surrogateescape").split("\n")
+    stream = io.StringIO()
+    with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(stream):
+        for name in names:
+            out().print(table(name, (name, "number"), [(name, "1.0"), (words(name, "bold"), name)]))
+            out().print(name, soft_wrap=True)
+            complain(name)
+            warn([Note("code", name, {})])
+            stream.write(str(FieldsidError(name, found=name, hint=name)))
+    check_lines(stream.getvalue())
+
+
 TABLE = (spoil_text, spoil_text, spoil_column, spoil_bytes)
 NODES = (spoil_yaml, spoil_yaml, spoil_yaml, spoil_text, spoil_bytes)
 LOG = (imported(None), inspected)
@@ -286,6 +369,10 @@ KINDS = (
     Kind("law", good("law.yaml"), NODES, (law_read,)),
     Kind("schedule", good("gains.yaml"), NODES, (schedule_read,)),
     Kind("prior", good("prior.yaml"), NODES, (prior_read,)),
+    Kind("export", good("gains.yaml"), (spoil_names,), (exported, shown("schedule", "export", "FILE", "--to", "moos"))),
+    Kind("mission", as_plan, (spoil_names,), (flown_from_list,)),
+    Kind("heads", as_foreign_csv, (spoil_heads,), (shown("inspect", "FILE"),)),
+    Kind("terminal", as_foreign_csv, (spoil_heads, spoil_text, spoil_bytes), (printed,)),
     Kind("radius_table", as_radius_table, TABLE, (said("turn-radius", "FILE", "--rudder-max", "0.2", "--json"),
                                                  said("fit", "FILE", "--json"))),
     Kind("effect", as_effect, NODES, (effect_read,)),

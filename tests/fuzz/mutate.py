@@ -29,6 +29,51 @@ ODD_VALUES = (
 )  # fmt: skip
 
 
+ENDS = ("\n", "\r", "\r\n", "\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\u2029")
+ODD_NAMES = (
+    "SERVO1_MIN,500", "      fin_limit_rad: [9.0]", "Maximum Fin Angle = 9.0", "  ROW = kp=9.0", "[Control]", "}", "*/", "--]]",
+    "os.exit()", "\x1b[31m", "\x1b]0;t\x07", "\x9b2J", "\u202egpj", "\x00", "\x7f", "[/s]", "[bold]", "[link=http:x]y", ":smile:",
+    "\\[", "{{ 1 / 0 }}", "{%", "=1+1", "+1", "-1", "@x", "\t", "#", "//", "'", '"', "$(x)", "%s", "%(a)s", "A" * 300,
+    "\u65e5\u672c", "\U0001f600", "e\u0301", "",
+)  # fmt: skip
+"""Names that mean something to a terminal, a vehicle's file, a template or a table; and ends of lines that bring them there."""
+
+
+def odd_name(random: np.random.Generator) -> str:
+    """Return a name of somebody else's: any letters, odd words and ends of lines in any order."""
+    parts = [lambda: _pick(ODD_NAMES, random), lambda: _pick(ENDS, random), lambda: chr(int(random.integers(0, 0xD800)))]
+    return "".join(parts[int(random.integers(0, 3))]() for _ in range(int(random.integers(1, 7))))
+
+
+def _pick(words, random):
+    return words[int(random.integers(0, len(words)))]
+
+
+def spoil_names(data: bytes, random: np.random.Generator) -> bytes:
+    """Give up to four of the words of a YAML file, and keys beside them, the names of somebody else."""
+    yaml = YAML(typ="safe")
+    body = yaml.load(data.decode())
+    for _ in range(int(random.integers(1, 5))):
+        words = [(parent, key) for parent, key in _places(body) if isinstance(parent[key], str) and key != "schema"]
+        parent, key = words[int(random.integers(0, len(words)))]
+        parent[key] = odd_name(random)
+        if isinstance(parent, dict) and random.random() < 0.2:
+            parent[odd_name(random)] = odd_name(random)
+    stream = io.BytesIO()
+    yaml.dump(body, stream)
+    return stream.getvalue()
+
+
+def spoil_heads(data: bytes, random: np.random.Generator) -> bytes:
+    """Give up to three columns of a text table the names of somebody else, quoted as such a table has them."""
+    head, _, rest = data.partition(b"\n")
+    cells = head.decode().split(",")
+    for _ in range(int(random.integers(1, 4))):
+        at = int(random.integers(0, len(cells)))
+        cells[at] = '"' + (cells[at] if random.random() < 0.5 else "").strip('"') + odd_name(random).replace('"', '""') + '"'
+    return ",".join(cells).encode() + b"\n" + rest
+
+
 def spoil_bytes(data: bytes, random: np.random.Generator) -> bytes:
     """Flip, set, cut, copy, insert or drop bytes at one to eight places."""
     out = bytearray(data)

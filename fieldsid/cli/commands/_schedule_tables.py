@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from fieldsid.cli.console import table
+from fieldsid.cli.console import print_file, table
 from fieldsid.cli.voice import shown_in
 
 if TYPE_CHECKING:
@@ -136,4 +136,4 @@ def render_export(to: Console, body: Mapping[str, Any]) -> None:
     if body["file"]:
         to.print(f"exported: {body['file']}", soft_wrap=True)
     else:
-        to.out(body["text"], end="", highlight=False)
+        print_file(to, body["text"])

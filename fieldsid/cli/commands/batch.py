@@ -190,8 +190,6 @@ def _of_trend(trend: Trend) -> dict[str, Any]:
 
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
-    from rich.text import Text
-
     bad = body["skipped_runs"]
     for t in body["trend"]:
         _render_trend(to, t)
@@ -200,7 +198,7 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
         why.setdefault(row["what"].replace(row["file"], "").replace(row["run"], ""), []).append(row["what"])
     for said in list(why.values())[:MOST_REASONS]:
         more = f"; the same of {len(said) - 1} more" if len(said) > 1 else ""
-        to.print(Text(f"not used: {said[0]}{more}"), soft_wrap=True)
+        to.print(f"not used: {said[0]}{more}", soft_wrap=True)
     if len(why) > MOST_REASONS:
         to.print(f"and for {len(why) - MOST_REASONS} other reasons: see the column `what`")
     to.print(f"table: {body['table']} and {body['csv']}", soft_wrap=True)

@@ -190,8 +190,6 @@ def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
-    from rich.text import Text
-
     from fieldsid.rounding import number
 
     to.print(_candidates(found))
@@ -199,7 +197,7 @@ def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
     factor, angle = shown_in("rad")
     noise = f"{number(factor * floor.angle, 2)} {angle} and {number(factor * floor.rate, 2)} {angle}/s"
     of = f"in {angle} and {angle}/s, in logs with next to no noise" if found.noiseless else f"over the noise floor, {noise}"
-    to.print(Text(f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row"))
+    to.print(f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row")
     _render_words(to, found)
     _render_where(to, found)
     _render_skipped(to, found.skipped)
@@ -243,21 +241,19 @@ def _errors(found: Diagnosis, errors: Pair) -> tuple[str, str]:
 
 def _render_words(to: Console, found: Diagnosis) -> None:
     """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
-    from rich.text import Text
-
     from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
 
     if found.verdict in ("sufficient", "disturbed"):
         return
     if found.effects:
         to.print()
-        to.print(Text(shown_words(found.says)))
+        to.print(shown_words(found.says))
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < RIVAL_PROBABILITY_RATIO:
             continue
         alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
         to.print()
-        to.print(Text(shown_words(f"{c.effect}: {c.evidence}{alike}")))
+        to.print(shown_words(f"{c.effect}: {c.evidence}{alike}"))
 
 
 def _render_where(to: Console, found: Diagnosis) -> None:
@@ -270,8 +266,6 @@ def _render_where(to: Console, found: Diagnosis) -> None:
 
 
 def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
-    from rich.text import Text
-
     if not skipped:
         return
     why: dict[str, list[str]] = {}
@@ -279,14 +273,12 @@ def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
         why.setdefault(reason, []).append(name)
     to.print()
     for reason, names in why.items():
-        to.print(Text(f"not tried: {', '.join(names)}: {reason}"))
+        to.print(f"not tried: {', '.join(names)}: {reason}")
 
 
 def _render_maneuver(to: Console, found: Diagnosis) -> None:
-    from rich.text import Text
-
     fly = found.next_maneuver
     if fly:
         to.print()
         note = f"; {fly['note']}" if "note" in fly else ""
-        to.print(Text(shown_words(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}")))
+        to.print(shown_words(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}"))

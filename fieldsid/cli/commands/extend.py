@@ -211,8 +211,6 @@ def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
 
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
-    from rich.text import Text
-
     from fieldsid.rounding import number
 
     times, angle = shown_in("rad")
@@ -238,8 +236,8 @@ def _render(to: Console, body: Mapping[str, Any]) -> None:
     ]
     to.print(table("", ("coefficient", "value", "unit"), found, left=2))
     to.print()
-    to.print(Text(_verdict(body)))
-    to.print(Text(left_says(body)))
+    to.print(_verdict(body))
+    to.print(left_says(body))
     to.print(f"model: {body['model']}", soft_wrap=True)
 
 

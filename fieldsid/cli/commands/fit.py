@@ -115,7 +115,8 @@ def _render_left_out(to: Console, law: ParameterLaw) -> None:
         for p in law.points
     ]
     to.print(table(f"leave one out, |{law.name}|", ("point", "m/s", "value", "without it", "slope", "off", ""), rows))
-    to.print(f"off: how far from the law of the others, in standard errors; {_odd(law.points)}\n")
+    to.print(f"off: how far from the law of the others, in standard errors; {_odd(law.points)}")
+    to.print()
 
 
 def _odd(points: Sequence[PointCheck]) -> str:

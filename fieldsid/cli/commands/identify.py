@@ -276,7 +276,8 @@ def _render(to: Console, entries: Sequence[Mapping[str, Any]], *, figures: bool)
     ]
     columns = ("run", "m/s", "angle rms", "noise", "fit %", "rate rms", "noise", "fit %")
     to.print(table("", columns, merits))
-    to.print(f"\nmethod: {', '.join(sorted({e['method'] for e in entries}))}; angle in {angle}, rate in {angle}/s")
+    to.print()
+    to.print(f"method: {', '.join(sorted({e['method'] for e in entries}))}; angle in {angle}, rate in {angle}/s")
     _render_reasons(to, entries)
     for e in entries:
         if e["model"]:

@@ -41,7 +41,7 @@ def command(
 
     def render(console: Console) -> None:
         for file in files:
-            console.print(str(file), markup=False, soft_wrap=True)
+            console.print(str(file), soft_wrap=True)
 
     body = {"schema": "fieldsid/init/1", "folder": name, "template": template, "files": [str(f) for f in files]}
     emit(body, as_json=as_json, render=render, headline=of_trial(body))

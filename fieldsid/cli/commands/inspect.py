@@ -43,17 +43,18 @@ def command(
 
 
 def _render(found: Inspection, console: Console) -> None:
-    from rich.text import Text
-
-    from fieldsid.cli.console import table
+    from fieldsid.cli.console import table, words
 
     record: dict[str, Any] = found.record(None)
     rows = [(c["name"], c["type"], str(c["count"]), c["rate"], c["holds"]) for c in record["shown"]]
     console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
-    console.print(Text("\nmapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), style="bold"))
-    console.print(Text(found.yaml().rstrip()))
-    console.print(Text("\nfindings", style="bold"))
+    console.print()
+    console.print(words("mapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), "bold"))
+    for line in found.yaml().rstrip().split("\n"):
+        console.print(line)
+    console.print()
+    console.print(words("findings", "bold"))
     for note in found.notes:
-        console.print(Text(f"- {note.message} [{note.code}]"))
+        console.print(f"- {note.message} [{note.code}]")
     if not found.notes:
-        console.print(Text("- none"))
+        console.print("- none")

@@ -83,4 +83,4 @@ def _state(given: Sequence[Path]) -> FolderState:
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     for v in body["verdicts"][1:]:
-        to.print(f"{v['what']}: {v['says']}", markup=False, soft_wrap=True)
+        to.print(f"{v['what']}: {v['says']}", soft_wrap=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fieldsid.cli.commands._schedule_tables import render_design, render_export, render_verify
-from fieldsid.cli.console import emit, say
+from fieldsid.cli.console import emit, print_file, say
 from fieldsid.cli.headlines.gains import of_design, of_export, of_patch, of_verification
 from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_existing, refuse_figure
@@ -276,8 +276,8 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     patch = patch_yaml(into, key, columns_of(known))
     backup = str(write_patch(patch)) if write else None
     body = {"schema": "fieldsid/export/1", "target": "into", "difference": patch.difference, "file": str(into), "backup": backup}
-    shown, headline = (lambda out: out.out(patch.difference, end="", highlight=False)), of_patch(body, schedule, key)
-    return emit(body, as_json=as_json, render=shown, headline=headline, is_file=not write)
+    headline = of_patch(body, schedule, key)
+    return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
 def _limits(

@@ -112,7 +112,7 @@ def _render(to: Console, state: FolderState, body: Mapping[str, Any]) -> None:
     for e in kept:
         done = "" if e.exit in (0, 1) else "failed: "
         when = datetime.fromisoformat(e.time).astimezone().strftime("%Y-%m-%d %H:%M")
-        to.print(f"{when}  sysid {e.name}: {done}{e.verdict}", markup=False, soft_wrap=True)
+        to.print(f"{when}  sysid {e.name}: {done}{e.verdict}", soft_wrap=True)
 
 
 def _row(item: Item) -> Sequence[str]:

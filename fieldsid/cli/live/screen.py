@@ -11,9 +11,8 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.measure import Measurement
 from rich.progress_bar import ProgressBar
 from rich.table import Table
-from rich.text import Text
 
-from fieldsid.cli.console import FAR
+from fieldsid.cli.console import FAR, words
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import shown_estimate, shown_in
 
@@ -30,10 +29,8 @@ BAR = 20
 
 def screen(body: Mapping[str, Any]) -> RenderableType:
     """Return the whole view of one look: verdict, parameters with bands, excitation, what was met."""
-    head = Text(body["said"], style=STYLE[body["verdict"]])
-    return Group(
-        head, Text(f"rests on {rests_on(body)}", style="dim"), Text(), Parameters(body), Text(), _meters(body), _met(body)
-    )
+    head = words(body["said"], STYLE[body["verdict"]])
+    return Group(head, words(f"rests on {rests_on(body)}", "dim"), "", Parameters(body), "", _meters(body), _met(body))
 
 
 def line(body: Mapping[str, Any]) -> str:
@@ -81,7 +78,7 @@ def _parameters(body: Mapping[str, Any], *, with_band: bool) -> Table:
             made.add_row(name, "-", unit, *(("-",) if with_band else ()), "-", wanted, "")
             continue
         shown, _, band = shown_estimate(p["value"], p["std_error"], p["interval95"], p["unit"])
-        state = Text("settled", style="green") if p["settled"] else Text("moving", style="yellow")
+        state = words("settled", "green") if p["settled"] else words("moving", "yellow")
         bands = (band,) if with_band else ()
         made.add_row(name, shown, unit, *bands, _error(factor * p["std_error"], value), wanted, state)
     return made
@@ -119,6 +116,6 @@ def _degrees(value: float | None) -> str:
     return "-" if value is None else f"{value * 180.0 / pi:.1f}"
 
 
-def _met(body: Mapping[str, Any]) -> Text:
+def _met(body: Mapping[str, Any]) -> RenderableType:
     found = [f"{count} {name}" for name, count in body["counts"].items() if count]
-    return Text("met: " + ", ".join(found) if found else "", style="dim")
+    return words("met: " + ", ".join(found) if found else "", "dim")

@@ -21,6 +21,7 @@ from fieldsid.planning.output import helm
 from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
 from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
+from fieldsid.text.one_line import one_line
 
 FOLDER = "plan/mission"
 SUFFIX = ".j2"
@@ -102,12 +103,11 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
     names, aborts = NAMES[plan.axis], aborts_of(leg, plan.envelope)
     return {
         "tool": f"fieldsid {__version__}",
-        "plan": plan,
         "leg": leg,
         "axis": plan.axis.value,
         "fin": names.fin.removesuffix("_rad"),
         "angle": names.angle,
-        "vehicle": "".join(c for c in plan.vehicle if c.isprintable())[:80],
+        "vehicle": one_line(plan.vehicle)[:80],
         "rule": None if leg.open_loop else _blind(leg),
         "spec": leg.candidate.spec,
         "steps": steps_of(plan, leg),

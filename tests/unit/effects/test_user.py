@@ -141,7 +141,7 @@ def test_whatever_is_not_arithmetic_is_refused_with_its_place(text, column, word
     assert word in str(caught.value)
     shown, caret = caught.value.found.split("\n")
     assert shown == text
-    assert caret.index("^") - len("  found: ") == column
+    assert caret.index("^") == column
 
 
 @pytest.mark.parametrize("text", ["", "   ", "k + " * 200 + "k", "(" * 240 + "k" + ")" * 240, "-" * 490 + "k", "k\0"])
@@ -172,7 +172,7 @@ def test_a_division_by_zero_names_time_and_place():
     surge[4] = 0.0
     with pytest.raises(EffectError, match=r"divides by zero at t = 12.000 s: `u` is 0") as caught:
         moment_of("k * r / u", surge=surge)
-    assert caught.value.found.endswith(" " * len("  found: k * r / ") + "^")
+    assert caught.value.found.endswith("\n" + " " * len("k * r / ") + "^")
 
 
 def test_a_root_of_a_negative_number_names_the_time_and_the_values():

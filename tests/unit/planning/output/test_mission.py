@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from moos_helm import Helm, corners, holds, inside, script
 from plan_legs import ENVELOPE, leg, plan
 
@@ -164,3 +166,11 @@ def test_the_risk_of_a_list_is_that_of_flying_it_blind():
 def _gains(judge):
     pilot = judge.autopilot
     return pilot.angle_gain, pilot.rate_gain, pilot.fin
+
+
+@given(st.text(max_size=30))
+@pytest.mark.parametrize("style", styles())
+def test_whatever_a_vehicle_is_called_a_mission_holds_the_same_lines(style, name):
+    plain, named = (render(limited(leg(), vehicle=v), leg(), style) for v in ("torpedo", name))
+    assert named.split("\n")[1:] == plain.split("\n")[1:]
+    assert all(line.isprintable() for line in named.split("\n"))
