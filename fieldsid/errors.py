@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+from reprlib import Repr
+
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
+
+
+def shortened(value: object) -> str:
+    """Return a value as Python writes it, cut where it is long or deep: what an error quotes of a file that anybody wrote."""
+    return _SHORT.repr(value)
+
 
 class FieldsidError(Exception):
     """Base of every error this package raises on purpose; the command line turns it into exit code 2."""

@@ -10,13 +10,13 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from fieldsid.artifacts import near_files
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.reading import near_files
 from fieldsid.registry import members
 
 PACKAGE = "fieldsid.logs.readers"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, save_record
+from fieldsid.artifacts import save_record
 from fieldsid.display import Brief, Displayed
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.wrong_file import unless_log
@@ -18,6 +18,7 @@ from fieldsid.models.definition import Definition, definitions_body, read_defini
 from fieldsid.models.effect import definitions_of, effect_held
 from fieldsid.models.speed_law import SpeedLaw, with_speed
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.reading import load_record
 
 KIND = "fieldsid/model"
 LARGEST = 1e9

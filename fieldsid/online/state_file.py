@@ -6,11 +6,12 @@ import json
 from pathlib import Path
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import plain, read_text, write_text
+from fieldsid.artifacts import plain, write_text
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.online.identifier import OnlineIdentifier
 from fieldsid.online.progress import Watch
+from fieldsid.reading import read_text
 
 SCHEMA = "fieldsid/online/1"
 

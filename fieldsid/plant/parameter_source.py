@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import read_yaml, where_now
 from fieldsid.display import Brief
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import DataError, UsageError
@@ -19,6 +18,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, load_model
 from fieldsid.models.record import knows_speed
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.named_inputs import where_now
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.axis_laws import KIND as FIT_KIND
 from fieldsid.plant.laws.axis_laws import Laws, carried_models, fit_laws, load_laws, with_own_law
@@ -26,6 +26,7 @@ from fieldsid.plant.laws.parameter_law import ParameterLaw
 from fieldsid.plant.points import EQUAL_SPEED_SHARE, Point, check_authority, distinct_speeds, of_known_sign, points_of
 from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
+from fieldsid.reading import read_yaml
 from fieldsid.rounding import nine_digits
 
 MAX_PROPOSALS = 40
@@ -333,11 +334,11 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
     return str(body.get("schema", "")).startswith(f"{FIT_KIND}/")
 
 
-def logs_of(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Return the logs that model files, or a fit file's models, name as what they were made from, each once."""
+def logs_of(paths: Sequence[Path]) -> dict[str, Path | None]:
+    """Return the logs that model files, or a fit file's models, name as what they were made from: where each is now, if anywhere."""
     bodies = [(p, read_yaml(p)) for p in paths]
     records = [(p, r) for p, b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
-    return tuple(dict.fromkeys(where_now(i, p) for p, r in records for i in r.get("inputs", [])))
+    return {str(i["path"]): where_now(i, p) for p, r in records for i in r.get("inputs") or ()}
 
 
 def _with_laws(

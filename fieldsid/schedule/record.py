@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, save_record
+from fieldsid.artifacts import save_record
 from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import finite_number
+from fieldsid.reading import load_record
 from fieldsid.schedule.controller import Gains
 
 KIND = "fieldsid/schedule"

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import sha256_of
 from fieldsid.display import Brief
+from fieldsid.named_inputs import sha256_of
 
 JOURNAL = "journal.jsonl"
 SCHEMA = "fieldsid/journal/1"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, plain, save_record
+from fieldsid.artifacts import plain, save_record
 from fieldsid.errors import ArtifactError, FieldsidError
 from fieldsid.maneuvers import Autopilot, pick_maneuver
 from fieldsid.models.axis import Axis
@@ -19,6 +19,7 @@ from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope, limits_said
+from fieldsid.reading import load_record
 
 KIND = "fieldsid/plan"
 MAX_LEG_S = 3600.0

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, save_record
+from fieldsid.artifacts import save_record
 from fieldsid.display import Plotted
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.logs.run import Note
@@ -21,6 +21,7 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law, without_candidates
 from fieldsid.plant.laws.regression import Regression, regression_of
 from fieldsid.plant.points import Point, check_authority, distinct_speeds
+from fieldsid.reading import load_record
 from fieldsid.rounding import nine_digits
 
 KIND = "fieldsid/fit"

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from fieldsid.artifacts import inputs_of
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.named_inputs import inputs_of
 from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
 from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
 from fieldsid.plant.points import distinct_speeds
