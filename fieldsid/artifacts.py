@@ -114,7 +114,7 @@ def _given_a_name(handle: int, path: Path) -> Iterator[Path]:
 def write_text(path: Path, text: str, *, force: bool = False) -> Path:
     """Write a text file whole or not at all; raises ArtifactError."""
     with replacing(path, force=force) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")  # of a name that is no UTF-8
     return path
 
 

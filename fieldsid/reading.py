@@ -10,7 +10,7 @@ import difflib
 import json
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +24,8 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
 from fieldsid.errors import ArtifactError, shortened
+from fieldsid.shapes.check import ShapeError, check
+from fieldsid.shapes.kinds import ANY, KINDS
 
 LARGEST_TEXT = 4 << 20
 """Bytes of a file of text: a hundred times the largest that this program writes, the state of a live estimate."""
@@ -95,7 +97,7 @@ def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
 def load_record(path: Path, kind: str) -> dict[str, Any]:
     """Read a record back and check that it is one of `kind` (`fieldsid/model` for `fieldsid/model/1`).
 
-    Raises ArtifactError when the file cannot be read, is not YAML, or is another kind of record.
+    Raises ArtifactError when the file cannot be read, is not YAML, is another kind of record, or has not the shape of its kind.
     """
     body = read_yaml(path)
     schema = body.get("schema")
@@ -110,7 +112,17 @@ def load_record(path: Path, kind: str) -> dict[str, Any]:
         if number.isdecimal() and int(number[:9]) > 1:
             raise ArtifactError(f"`{path}` has a newer schema than this version reads", found=schema, hint="update fieldsid")
         raise ArtifactError(f"`{path}` has a schema that there is not", found=schema, hint=f"such a file has `schema: {kind}/1`")
+    check_kind(body, kind, path)
     return body
+
+
+def check_kind(body: Mapping[str, Any], kind: str, path: Path) -> None:
+    """Raise ArtifactError where a record has not the shape of its kind: what is wrong, and where."""
+    shape, name, again = KINDS.get(kind, ANY)
+    try:
+        check(body, shape)
+    except ShapeError as error:
+        raise ArtifactError(f"`{path}` is not a complete {name}", found=str(error), hint=again) from error
 
 
 def read_json(text: str | bytes) -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.display import Brief
-from fieldsid.errors import ArtifactError, shortened
+from fieldsid.errors import ArtifactError
 from fieldsid.extension.extend import Extension, Gain
 from fieldsid.logs.run import Run
 from fieldsid.models.model import KIND, Noise, load_model, save_model
@@ -107,10 +107,7 @@ def parent_of(path: Path) -> Parent | None:
     named = load_record(path, KIND).get("parent")
     if named is None:
         return None
-    try:
-        said, digest = Path(str(named["path"])), str(named["sha256"])
-    except (KeyError, TypeError) as error:
-        raise ArtifactError(f"`{path}` names its parent badly", found=shortened(named), hint="extend the parent again") from error
+    said, digest = Path(named["path"]), named["sha256"]
     trial = path.resolve().parent.parent
     places = [p for p in (said, path.parent / said.name) if beside([p], trial) is not None and not p.is_dir()]
     for place in places:
@@ -130,7 +127,7 @@ def history_of(path: Path) -> tuple[Generation, ...]:
     place, state = path, INTACT
     while True:
         model = load_model(place)
-        step, logs[place] = _step(place, model.info.get("extension"))
+        step, logs[place] = _step(model.info.get("extension"))
         line.append(Generation(place, model.effects, state, step))
         parent = parent_of(place)
         if parent is None:
@@ -152,19 +149,11 @@ def _with_logs(generation: Generation, logs: Sequence[tuple[Path, str]]) -> Gene
     return generation if generation.step is None else replace(generation, step=replace(generation.step, changed_data=changed))
 
 
-def _step(path: Path, body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
+def _step(body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
     """Return how a model was extended, and the logs it was made from with their hashes."""
     if body is None:
         return None, []
-    try:
-        logs = [(Path(str(d["path"])), str(d["sha256"])) for d in body["data"]]
-        return Step(_gain(body), str(body["kept_by"])), logs
-    except (KeyError, TypeError, ValueError) as error:
-        raise ArtifactError(
-            f"`{path}` does not say completely how it was extended",
-            found=f"{type(error).__name__}: {error}",
-            hint="extend its parent again, with `--force`",
-        ) from error
+    return Step(_gain(body), body["kept_by"]), [(Path(d["path"]), d["sha256"]) for d in body["data"]]
 
 
 def _gain(body: Mapping[str, Any]) -> Gain:

@@ -112,7 +112,7 @@ def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]
     if not any(m.effects for m in source.models):
         return []
     named = logs_of(source.paths)
-    there = [p for p in named.values() if p is not None]
+    there = [p for _, p in named if p is not None]
     if len(there) < len(named):
         say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
     return there
@@ -127,7 +127,7 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     if not source.models or not source.paths or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
-    there = [p for p in named.values() if p is not None]
+    there = [p for _, p in named if p is not None]
     runs = [run for run in (attempt(load_run, path) for path in there) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
         say(f"{len(named) - len(runs)} of {len(named)} runs of the models cannot be read again: they show how the vehicle turns")

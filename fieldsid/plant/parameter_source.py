@@ -334,11 +334,11 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
     return str(body.get("schema", "")).startswith(f"{FIT_KIND}/")
 
 
-def logs_of(paths: Sequence[Path]) -> dict[str, Path | None]:
-    """Return the logs that model files, or a fit file's models, name as what they were made from: where each is now, if anywhere."""
+def logs_of(paths: Sequence[Path]) -> tuple[tuple[str, Path | None], ...]:
+    """Return the logs that model files, or a fit file's models, name as what they were made from, and where each is now."""
     bodies = [(p, read_yaml(p)) for p in paths]
     records = [(p, r) for p, b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
-    return {str(i["path"]): where_now(i, p) for p, r in records for i in r.get("inputs") or ()}
+    return tuple(dict.fromkeys((str(i["path"]), where_now(i, p)) for p, r in records for i in r.get("inputs") or ()))
 
 
 def _with_laws(

@@ -69,7 +69,7 @@ def material_of(state: FolderState) -> Material:
         raise UsageError(
             f"there is nothing to report in `{state.folder}`", found=found, hint="begin with `sysid import LOG -o runs/`"
         )
-    skipped: list[str] = []
+    skipped = list(state.unreadable)
     vehicle = find_vehicle(state.folder)
     runs = _runs(state, vehicle, skipped)
     axes = tuple(a for axis in ("yaw", "pitch") if (a := _axis(state, axis, runs, skipped)) is not None)
@@ -117,23 +117,38 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     best = chosen_models(state, axis)
     if not best:
         return None
-    line = history_of(state.folder / best[0]) if len(best) == 1 else ()
+    line = _line(state.folder / best[0], skipped) if len(best) == 1 else ()
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
     paths = [*(state.folder / b for b in best), *ancestors][:MOST_MODELS]
     if len(best) > MOST_MODELS:
         skipped.append(f"{len(best) - MOST_MODELS} of {len(best)} {axis} models are not drawn")
     singles = [state.folder / p for p in single_models(state, axis)]
+    shown = tuple(s for p in paths if (s := _shown(state, p, runs, skipped)) is not None)
+    if not shown:
+        return None
     return AxisMaterial(
         axis,
-        tuple(_shown(state, p, runs, skipped) for p in paths),
+        shown,
         line,
         _source(singles if len(singles) > 1 else [state.folder / b for b in best], skipped),
         *(_last(state, kind, axis) for kind in ("diagnosis", "turn-radius", "schedule")),
     )
 
 
-def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown:
-    model = load_model(path)
+def _line(path: Path, skipped: list[str]) -> tuple[Generation, ...]:
+    try:
+        return history_of(path)
+    except FieldsidError as error:
+        skipped.append(f"no history of {path.name}: {error.what}")
+        return ()
+
+
+def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown | None:
+    try:
+        model = load_model(path)
+    except FieldsidError as error:
+        skipped.append(f"{path.name}: {error.what}; {error.found}")
+        return None
     mine, found = [run for run in runs if may_show(run, model.axis)], []
     for run in mine:
         try:

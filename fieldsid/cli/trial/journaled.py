@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -103,15 +104,16 @@ def _inputs(parsed: Parsed) -> list[Path]:
 
 
 def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return size and time of writing of every file below a folder, hidden ones and the journal left out."""
+    """Return size and time of writing of every plain file below a folder, hidden ones, links and the journal left out."""
     found = {}
     for place, folders, files in os.walk(folder):
         folders[:] = [f for f in folders if not f.startswith(".")]
         for name in files:
             if not name.startswith(".") and name != JOURNAL:
                 path = Path(place) / name
-                state = path.stat()
-                found[path.as_posix()] = (state.st_size, state.st_mtime_ns)
+                state = path.lstat()
+                if stat.S_ISREG(state.st_mode):
+                    found[path.as_posix()] = (state.st_size, state.st_mtime_ns)
     return found
 
 

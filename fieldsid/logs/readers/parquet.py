@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,9 @@ from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.run import SIGNALS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.reading import read_json
+from fieldsid.shapes.check import check
+from fieldsid.shapes.kinds import RUN_HEAD
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"
@@ -98,14 +100,13 @@ def _notes_of_ours(path: Path, table: Any) -> tuple[Note, ...] | None:
     if not text:
         return None
     try:
-        body = json.loads(text)
-        if not str(body["schema"]).startswith("fieldsid/run/"):
+        body = read_json(text)
+        if not isinstance(body, dict) or not str(body.get("schema", "")).startswith("fieldsid/run/"):
             return None
-        return tuple(Note(str(n["code"]), str(n["message"]), dict(n["data"])) for n in body["notes"])
-    except (ValueError, TypeError, LookupError) as error:
-        raise LogError(
-            f"`{path}` is a run of ours whose notes are spoilt", found=f"{type(error).__name__}: {error}"[:160], hint=AGAIN
-        ) from error
+        check(body, RUN_HEAD)
+    except ValueError as error:
+        raise LogError(f"`{path}` is a run of ours whose notes are spoilt", found=str(error)[:160], hint=AGAIN) from error
+    return tuple(Note(n["code"], n["message"], n["data"]) for n in body["notes"])
 
 
 def _series_of_ours(path: Path, table: Any) -> dict[str, Series]:

@@ -13,10 +13,11 @@ from fieldsid.effects import pick_effect
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.model import LARGEST, Model, Noise, load_model
+from fieldsid.models.model import Model, Noise, load_model
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
 from fieldsid.reading import load_record, read_yaml
 from fieldsid.registry import near
+from fieldsid.shapes.check import LARGEST
 
 KIND = "fieldsid/prior"
 
