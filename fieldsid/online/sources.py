@@ -9,10 +9,11 @@ import queue
 import socket
 import threading
 import time as clock
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from math import inf, isfinite
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from fieldsid.logs.load import map_for
 from fieldsid.logs.reader import ReadOptions, reader_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.online.samples import MessageReader, Sample, samples_of
+from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples_of
 
 TICK_S = 0.2
 POLL_S = 0.5
@@ -74,14 +75,18 @@ def followed(
         yield from samples_of(run, axis, after)
 
 
-def lines_of(stream: Iterable[str | bytes], reader: MessageReader) -> Iterator[Sample | None]:
-    """Yield the samples of a stream of JSON lines until it ends."""
-    waiting: queue.Queue[str | bytes | None] = queue.Queue(WAITING_LINES)
+def lines_of(stream: BinaryIO, reader: MessageReader) -> Iterator[Sample | None]:
+    """Yield the samples of a stream of JSON lines until it ends, or cannot be read any more."""
+    waiting: queue.Queue[bytes | None] = queue.Queue(WAITING_LINES)
 
     def listen() -> None:
-        for line in stream:
-            waiting.put(line)
-        waiting.put(None)
+        try:
+            for line in _lines(stream):
+                waiting.put(line)
+        except OSError:  # what was at the other end is gone
+            return
+        finally:
+            waiting.put(None)
 
     threading.Thread(target=listen, daemon=True).start()
     while True:
@@ -94,6 +99,14 @@ def lines_of(stream: Iterable[str | bytes], reader: MessageReader) -> Iterator[S
             return
         if (sample := reader.read(line)) is not None:
             yield sample
+
+
+def _lines(stream: BinaryIO) -> Iterator[bytes]:
+    """Yield lines; of one that is too long its beginning, which is too long still, and what follows is passed over."""
+    while line := stream.readline(LONGEST_LINE + 1):
+        yield line
+        while len(line) > LONGEST_LINE and not line.endswith(b"\n"):
+            line = stream.readline(LONGEST_LINE + 1)
 
 
 def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Iterator[Sample | None]:

@@ -123,6 +123,15 @@ def at_least_one(shape: Shape) -> Shape:
     return look
 
 
+def times(count: int, shape: Shape) -> Shape:
+    """Return the shape of a list of so many of one shape."""
+
+    def look(value: object, place: str) -> None:
+        check(value, (shape,) * count, place)
+
+    return look
+
+
 def one_of(words: Collection[str]) -> Shape:
     """Return the shape of one of some words."""
 
@@ -142,8 +151,8 @@ def text(value: object, place: str) -> None:
 
 
 def whole(value: object, place: str) -> None:
-    """Raise ShapeError where a value is no whole number."""
-    _refuse(isinstance(value, bool) or not isinstance(value, int), value, place, "a whole number")
+    """Raise ShapeError where a value is no whole number, or a negative one."""
+    _refuse(isinstance(value, bool) or not isinstance(value, int) or value < 0, value, place, "a whole number, 0 or more")
 
 
 def flag(value: object, place: str) -> None:

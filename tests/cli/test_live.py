@@ -85,7 +85,7 @@ def test_lines_on_standard_input_are_taken(run_cli, tmp_path, monkeypatch):
         json.dumps({"time_s": t, "rudder_rad": d, "yaw_rad": y, "yaw_rate_rad_s": r})
         for t, d, y, r in zip(log.time, log["rudder_rad"], log["yaw_rad"], log["yaw_rate_rad_s"], strict=True)
     ]
-    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(["rubbish", *lines])))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(["rubbish", *lines]).encode())))
     last = looks(run_cli("live", "-", "--axis", "yaw", "--json"))[-1]
     assert last["counts"]["unreadable"] == 1
     assert last["samples"] > 0.9 * len(lines)

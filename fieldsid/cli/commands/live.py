@@ -207,7 +207,7 @@ class _Feed:
             self.reader = MessageReader(self.axis)
             if self.udp is not None:
                 return datagrams(self.udp, self.reader, idle_s=self.idle_s)
-            return lines_of(sys.stdin, self.reader)
+            return lines_of(sys.stdin.buffer, self.reader)
         if self.log is None or not self.follow:
             run = read_run(Path(str(self.log)), mapping=self.mapping)
             return replayed(run, self.axis, self.factor, after)
