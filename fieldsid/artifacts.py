@@ -18,7 +18,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError
-from fieldsid.named_inputs import sha256_of
+from fieldsid.records.named_inputs import sha256_of
 
 OWN_HANDLES = Path("/proc/self/fd")
 """Where Linux shows a process the files that it has open, by their number: the way to one that has no name."""

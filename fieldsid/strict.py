@@ -10,7 +10,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from fieldsid.errors import FieldsidError
-from fieldsid.reading import read_yaml
+from fieldsid.records.reading import read_yaml
 from fieldsid.registry import near
 
 

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
-    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "shapes", "reading", "named_inputs",
+    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "records",
     "artifacts", "rounding", "angles", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",

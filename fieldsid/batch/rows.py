@@ -24,7 +24,7 @@ from fieldsid.logs.importing import Importer
 from fieldsid.logs.run import EXPLAINING, Run
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.named_inputs import sha256_of
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.vehicle import Vehicle
 
 FIRST = ("log", "run", "status", "start_utc", "time_from", "speed_m_s", "verdict", "effects")

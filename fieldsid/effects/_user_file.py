@@ -27,7 +27,7 @@ from fieldsid.models.definition import of_text
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.reading import read_text, yaml_mapping
+from fieldsid.records.reading import read_text, yaml_mapping
 from fieldsid.registry import near
 
 SIGNAL_OF: Mapping[str, str] = MappingProxyType(

@@ -12,7 +12,7 @@ from fieldsid.errors import EffectError
 from fieldsid.logs.run import Note
 from fieldsid.models.definition import Definition
 from fieldsid.models.effect import REGISTRY, Effect
-from fieldsid.reading import yaml_mapping
+from fieldsid.records.reading import yaml_mapping
 from fieldsid.registry import refuse
 
 

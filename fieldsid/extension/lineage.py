@@ -13,8 +13,10 @@ from fieldsid.errors import ArtifactError
 from fieldsid.extension.extend import Extension, Gain
 from fieldsid.logs.run import Run
 from fieldsid.models.model import KIND, Noise, load_model, save_model
-from fieldsid.named_inputs import beside, sha256_of, sha256_of_named
-from fieldsid.reading import load_record
+from fieldsid.records.check import ShapeError, check
+from fieldsid.records.model import EXTENSION
+from fieldsid.records.named_inputs import beside, sha256_of, sha256_of_named
+from fieldsid.records.reading import load_record
 
 INTACT, CHANGED, MISSING = "intact", "changed", "missing"
 
@@ -127,7 +129,7 @@ def history_of(path: Path) -> tuple[Generation, ...]:
     place, state = path, INTACT
     while True:
         model = load_model(place)
-        step, logs[place] = _step(model.info.get("extension"))
+        step, logs[place] = _step(place, model.info.get("extension"))
         line.append(Generation(place, model.effects, state, step))
         parent = parent_of(place)
         if parent is None:
@@ -149,10 +151,18 @@ def _with_logs(generation: Generation, logs: Sequence[tuple[Path, str]]) -> Gene
     return generation if generation.step is None else replace(generation, step=replace(generation.step, changed_data=changed))
 
 
-def _step(body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
+def _step(path: Path, body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
     """Return how a model was extended, and the logs it was made from with their hashes."""
     if body is None:
         return None, []
+    try:
+        check(body, EXTENSION, "info.extension")
+    except ShapeError as error:
+        raise ArtifactError(
+            f"`{path}` does not say completely how it was extended",
+            found=str(error),
+            hint="extend its parent again, with `--force`",
+        ) from error
     return Step(_gain(body), body["kept_by"]), [(Path(d["path"]), d["sha256"]) for d in body["data"]]
 
 

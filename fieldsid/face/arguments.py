@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from fieldsid.effects._user_folder import add_user_effects
 from fieldsid.errors import ArtifactError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
-from fieldsid.named_inputs import where_now
+from fieldsid.records.named_inputs import where_now
 from fieldsid.registry import near
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 

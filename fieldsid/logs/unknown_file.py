@@ -10,7 +10,7 @@ from shlex import quote
 from types import MappingProxyType
 
 from fieldsid.errors import LogError
-from fieldsid.named_inputs import inputs_of
+from fieldsid.records.named_inputs import inputs_of
 
 COPY_AGAIN = "where the vehicle's own file is larger, copy it again"
 """What helps where a log holds less than it should, and is true of any."""

@@ -11,7 +11,7 @@ from shlex import quote
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.reader import ReadOptions, reader_of
-from fieldsid.reading import read_yaml
+from fieldsid.records.reading import read_yaml
 
 
 @contextmanager

@@ -18,8 +18,8 @@ from fieldsid.models.definition import Definition, definitions_body, read_defini
 from fieldsid.models.effect import definitions_of, effect_held
 from fieldsid.models.speed_law import SpeedLaw, with_speed
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.reading import load_record
-from fieldsid.shapes.check import ShapeError
+from fieldsid.records.check import ShapeError
+from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/model"
 

@@ -15,7 +15,7 @@ from fieldsid.logs.mapping.canonical_names import TIME, canonical
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.reading import read_json
+from fieldsid.records.reading import read_json
 
 SURGE = "surge_m_s"
 LONGEST_LINE = 1 << 14

@@ -11,9 +11,9 @@ from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.online.identifier import OnlineIdentifier
 from fieldsid.online.progress import Watch
-from fieldsid.reading import read_json, read_text
-from fieldsid.shapes.check import check
-from fieldsid.shapes.online import STATE
+from fieldsid.records.check import check
+from fieldsid.records.online import STATE
+from fieldsid.records.reading import read_json, read_text
 
 SCHEMA = "fieldsid/online/1"
 

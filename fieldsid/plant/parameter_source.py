@@ -18,7 +18,6 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, load_model
 from fieldsid.models.record import knows_speed
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
-from fieldsid.named_inputs import where_now
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.axis_laws import KIND as FIT_KIND
 from fieldsid.plant.laws.axis_laws import Laws, carried_models, fit_laws, load_laws, with_own_law
@@ -26,7 +25,8 @@ from fieldsid.plant.laws.parameter_law import ParameterLaw
 from fieldsid.plant.points import EQUAL_SPEED_SHARE, Point, check_authority, distinct_speeds, of_known_sign, points_of
 from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
-from fieldsid.reading import read_yaml
+from fieldsid.records.named_inputs import where_now
+from fieldsid.records.reading import read_yaml
 from fieldsid.rounding import nine_digits
 
 MAX_PROPOSALS = 40

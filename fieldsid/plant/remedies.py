@@ -9,8 +9,8 @@ from shlex import quote
 from fieldsid.angles import FIN
 from fieldsid.dynamics.free_run import LIMITING_EFFECT
 from fieldsid.models.axis import NAMES
-from fieldsid.named_inputs import inputs_of
 from fieldsid.plant.parameter_source import ParameterSource, logs_of
+from fieldsid.records.named_inputs import inputs_of
 
 USUAL_FIN_DEG = 15.0
 

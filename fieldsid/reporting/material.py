@@ -15,6 +15,8 @@ from fieldsid.logs import Run, load_run
 from fieldsid.logs.segments import may_show
 from fieldsid.models.model import Model, load_model
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
+from fieldsid.records.check import ShapeError, check
+from fieldsid.records.kinds import DRAWN_DIAGNOSIS
 from fieldsid.trial_folder.next_step import chosen_models, next_step, single_models
 from fieldsid.trial_folder.state import MODEL, RUN, FolderState, Item
 from fieldsid.vehicle import Vehicle, find_vehicle
@@ -131,7 +133,7 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
         shown,
         line,
         _source(singles if len(singles) > 1 else [state.folder / b for b in best], skipped),
-        *(_last(state, kind, axis) for kind in ("diagnosis", "turn-radius", "schedule")),
+        *(_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")),
     )
 
 
@@ -168,10 +170,19 @@ def _source(paths: Sequence[Path], skipped: list[str]) -> ParameterSource | None
         return None
 
 
-def _last(state: FolderState, kind: str, axis: str) -> Item | None:
-    """Return the newest file of a kind for an axis; a turning radius is that of the yaw."""
-    items = [i for i in state.of_kind(kind) if _axis_of(i) == axis]
+def _last(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:
+    """Return the newest file of a kind for an axis that says enough to be drawn; a turning radius is that of the yaw."""
+    items = [i for i in state.of_kind(kind) if _axis_of(i) == axis and _is_complete(i, skipped)]
     return max(items, key=lambda i: state.place(i).stat().st_mtime_ns, default=None)
+
+
+def _is_complete(item: Item, skipped: list[str]) -> bool:
+    try:
+        check(item.body, DRAWN_DIAGNOSIS if item.kind == "diagnosis" else {})
+    except ShapeError as error:
+        skipped.append(f"{item.path}: {error}")
+        return False
+    return True
 
 
 def _axis_of(item: Item) -> Any:

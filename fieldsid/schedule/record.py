@@ -16,9 +16,9 @@ from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
-from fieldsid.reading import load_record
+from fieldsid.records.check import ShapeError
+from fieldsid.records.reading import load_record
 from fieldsid.schedule.controller import Gains
-from fieldsid.shapes.check import ShapeError
 
 KIND = "fieldsid/schedule"
 COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad", "depth_gain", "supported")

@@ -17,9 +17,9 @@ from typing import Any, BinaryIO
 from fieldsid._version import __version__
 from fieldsid.display import Brief
 from fieldsid.errors import shortened
-from fieldsid.named_inputs import sha256_of, sha256_of_named
-from fieldsid.reading import read_json
-from fieldsid.shapes.check import Shape, ShapeError, check, number, text, whole
+from fieldsid.records.check import Shape, ShapeError, check, number, text, whole
+from fieldsid.records.named_inputs import sha256_of, sha256_of_named
+from fieldsid.records.reading import read_json
 
 JOURNAL = "journal.jsonl"
 SCHEMA = "fieldsid/journal/1"

@@ -13,8 +13,8 @@ from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
 from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
-from fieldsid.named_inputs import beside
-from fieldsid.reading import check_kind, read_json, read_yaml
+from fieldsid.records.named_inputs import beside
+from fieldsid.records.reading import check_kind, read_json, read_yaml
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
 from fieldsid.trial_folder.make import RUNS
 

@@ -12,7 +12,7 @@ from fieldsid.logs import save_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.planning.discriminate.rivals import rivals_from
-from fieldsid.reading import load_record
+from fieldsid.records.reading import load_record
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ import pytest
 from cli import trial
 
 from fieldsid.models.model import load_model
-from fieldsid.named_inputs import sha256_of
-from fieldsid.reading import load_record
+from fieldsid.records.named_inputs import sha256_of
+from fieldsid.records.reading import load_record
 
 
 @pytest.fixture(scope="module")

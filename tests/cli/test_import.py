@@ -12,7 +12,7 @@ from bags import MAPPING, write_bag
 
 from fieldsid.artifacts import to_yaml
 from fieldsid.logs import Run, load_run, save_run
-from fieldsid.named_inputs import sha256_of
+from fieldsid.records.named_inputs import sha256_of
 
 TIME = np.arange(400) / 20
 SIGNALS = {

@@ -10,7 +10,7 @@ from fieldsid.effects import forget_effects
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model, save_model
 from fieldsid.planning.discriminate.rivals import rivals_named
-from fieldsid.reading import load_record
+from fieldsid.records.reading import load_record
 
 PULL = (
     "# drag of a towed line\nname: pull\naxes: [yaw]\nmoment: '-pull_k * rate * abs(rate)'\n"

@@ -14,7 +14,7 @@ from fieldsid.logs import Run, load_run, save_run
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import PACKAGE, RawLog, ReadOptions, reader_of
-from fieldsid.named_inputs import sha256_of
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.registry import members
 
 READERS = tuple(members(PACKAGE, "READER").values())

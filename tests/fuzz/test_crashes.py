@@ -30,7 +30,7 @@ from fieldsid.models.model import load_model
 from fieldsid.models.record import record_of
 from fieldsid.planning.belief.prior_file import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
-from fieldsid.reading import read_yaml
+from fieldsid.records.reading import read_yaml
 from fieldsid.schedule.record import load_schedule
 
 

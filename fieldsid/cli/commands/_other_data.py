@@ -17,7 +17,7 @@ def fitted_to(path: Path, model: Model, runs: Iterable[Run]) -> frozenset[str]:
     By their hashes. Where the model's own log is gone, or of another format, its name is all there is to go by.
     """
     from fieldsid.logs.several.run_names import stem_of
-    from fieldsid.named_inputs import inputs_of, sha256_of, sha256_of_named
+    from fieldsid.records.named_inputs import inputs_of, sha256_of, sha256_of_named
 
     own = {(stem_of(p), p.suffix): p for p in inputs_of(path)}
     pairs = [(r.name, r.source, own.get((stem_of(r.source), r.source.suffix))) for r in runs if r.source is not None]

@@ -74,7 +74,7 @@ def several_models(
     }
     from fieldsid.cli.headlines.models import of_several
     from fieldsid.cli.inputs import files_of
-    from fieldsid.named_inputs import inputs_of
+    from fieldsid.records.named_inputs import inputs_of
 
     headline = of_several(body, names, files_of(logs), inputs_of(Path(str(body["best"]))), close=CLOSE)
     notes = left_out(logs, models[0].axis)

@@ -150,7 +150,7 @@ def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> 
     from fieldsid.effects import pick_effect
     from fieldsid.extension import gain_body, kept_by
     from fieldsid.models.effect import as_fitted
-    from fieldsid.named_inputs import sha256_of
+    from fieldsid.records.named_inputs import sha256_of
 
     new = [c for n in found.gain.added for c in as_fitted(pick_effect(n), found.model.values).shared]
     return {

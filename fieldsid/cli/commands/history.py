@@ -49,7 +49,7 @@ def command(
         "figure": _drawn(line, model, figure, context, force=force),
     }
     from fieldsid.cli.headlines.models import of_history
-    from fieldsid.named_inputs import inputs_of
+    from fieldsid.records.named_inputs import inputs_of
 
     headline = of_history(body, inputs_of(model))
     return emit(body, as_json=as_json, render=lambda to: _render(to, line, body), headline=headline, notes=_notes(line))

@@ -50,6 +50,8 @@ def _render(found: Inspection, console: Console) -> None:
     record: dict[str, Any] = found.record(None)
     rows = [(c["name"], c["type"], str(c["count"]), c["rate"], c["holds"]) for c in record["shown"]]
     console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
+    if record["more_channels"]:
+        console.print(Text(f"and {record['more_channels']} more channels"))
     console.print(Text("\nmapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), style="bold"))
     console.print(Text(found.yaml().rstrip()))
     console.print(Text("\nfindings", style="bold"))

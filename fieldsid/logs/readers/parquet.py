@@ -18,9 +18,9 @@ from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.run import SIGNALS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
-from fieldsid.reading import read_json
-from fieldsid.shapes.check import check
-from fieldsid.shapes.kinds import RUN_HEAD
+from fieldsid.records.check import check
+from fieldsid.records.kinds import RUN_HEAD
+from fieldsid.records.reading import read_json
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"

@@ -15,9 +15,9 @@ from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model, Noise, load_model
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
-from fieldsid.reading import load_record, read_yaml
+from fieldsid.records.check import LARGEST
+from fieldsid.records.reading import load_record, read_yaml
 from fieldsid.registry import near
-from fieldsid.shapes.check import LARGEST
 
 KIND = "fieldsid/prior"
 

@@ -16,7 +16,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Coefficient, definitions_of, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
-from fieldsid.reading import load_record
+from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/diagnosis"
 PLAIN = "none"

@@ -19,7 +19,7 @@ from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope, limits_said
-from fieldsid.reading import load_record
+from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/plan"
 MAX_LEG_S = 3600.0

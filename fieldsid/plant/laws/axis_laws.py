@@ -21,10 +21,10 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law, without_candidates
 from fieldsid.plant.laws.regression import Regression, regression_of
 from fieldsid.plant.points import Point, check_authority, distinct_speeds
-from fieldsid.reading import load_record
+from fieldsid.records.check import ShapeError
+from fieldsid.records.laws import LARGEST_COEFFICIENT
+from fieldsid.records.reading import load_record
 from fieldsid.rounding import nine_digits
-from fieldsid.shapes.check import ShapeError
-from fieldsid.shapes.laws import LARGEST_COEFFICIENT
 
 KIND = "fieldsid/fit"
 

@@ -13,8 +13,8 @@ from fieldsid.display import Brief
 from fieldsid.errors import DataError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile
-from fieldsid.shapes.check import ShapeError, finite_number
-from fieldsid.shapes.laws import LARGEST_COEFFICIENT, LARGEST_LOGARITHM
+from fieldsid.records.check import ShapeError, finite_number
+from fieldsid.records.laws import LARGEST_COEFFICIENT, LARGEST_LOGARITHM
 
 CONFIDENCE_LEVEL = 0.95
 ROUNDING_SHARE = 1e-9

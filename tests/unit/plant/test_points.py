@@ -16,11 +16,11 @@ from fieldsid.errors import ArtifactError, DataError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.named_inputs import inputs_of
 from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
 from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
 from fieldsid.plant.points import distinct_speeds
 from fieldsid.plant.table import read_table
+from fieldsid.records.named_inputs import inputs_of
 
 TABLE = """thrust_percent,speed_m_s,a22,b2,C0,b2_std_error
 60,1.0,1.1,-0.6,-0.01,0.02

@@ -10,7 +10,7 @@ from typing import Any
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.readers.bags.packets import Collector
 from fieldsid.logs.run import Note
-from fieldsid.reading import read_yaml
+from fieldsid.records.reading import read_yaml
 
 NAME = "metadata.yaml"
 

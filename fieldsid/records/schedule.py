@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldsid.shapes.check import (
+from fieldsid.records.check import (
     AXES,
     HEAD,
     LARGEST_FIN_RAD,

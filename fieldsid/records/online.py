@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldsid.shapes.check import AXES, Shape, above_zero, each, flag, maybe, number, one_of, text, times, whole
+from fieldsid.records.check import AXES, Shape, above_zero, each, flag, maybe, number, one_of, text, times, whole
 
 ANY = number(-1e60, 1e60)
 """A number whose squares are numbers still."""

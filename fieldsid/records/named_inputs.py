@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fieldsid.errors import ArtifactError
-from fieldsid.reading import read_yaml
+from fieldsid.records.reading import read_yaml
 
 LARGEST_HASHED = 1 << 28
 """Bytes of a file that a record names, or of all files of a folder, up to which they are hashed: a second at the most."""

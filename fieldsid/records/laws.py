@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fieldsid.shapes.check import AXES, HEAD, Shape, at_least_one, each, maybe, number, one_of, text, whole
-from fieldsid.shapes.model import EXPONENT, MODEL, SPEED
+from fieldsid.records.check import AXES, HEAD, Shape, at_least_one, each, maybe, number, one_of, text, whole
+from fieldsid.records.model import EXPONENT, MODEL, SPEED
 
 LARGEST_COEFFICIENT = 1e6
 """Of a law of powers of the speed, SI: no vehicle damps or turns so fast."""

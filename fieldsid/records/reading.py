@@ -24,8 +24,8 @@ from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 
 from fieldsid.errors import ArtifactError, shortened
-from fieldsid.shapes.check import ShapeError, check
-from fieldsid.shapes.kinds import ANY, KINDS
+from fieldsid.records.check import ShapeError, check
+from fieldsid.records.kinds import ANY, KINDS
 
 LARGEST_TEXT = 4 << 20
 """Bytes of a file of text: a hundred times the largest that this program writes, the state of a live estimate."""

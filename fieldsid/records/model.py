@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fieldsid.shapes.check import (
+from fieldsid.records.check import (
     AXES,
     BOTH_SIDES,
     FLOOR,
@@ -22,7 +22,7 @@ from fieldsid.shapes.check import (
 SPEED = above_zero(LARGEST_SPEED_M_S)
 EXPONENT = number(-20.0, 20.0)
 """A power of the speed: those of a fit are between 0 and 3, and those of all speeds there are stay numbers with it."""
-EXTENSION: Shape = {
+EXTENSION = {
     "added": [text],
     "before": BOTH_SIDES,
     "after": BOTH_SIDES,
@@ -33,6 +33,7 @@ EXTENSION: Shape = {
     "kept_by": text,
     "data": [{"path": text, "sha256": text}],
 }
+"""How a model was extended; a history needs all of it."""
 MODEL: Shape = {
     **HEAD,
     "axis": one_of(AXES),
@@ -60,7 +61,7 @@ MODEL: Shape = {
     "info": {
         "whiteness_p?": maybe(number(0.0, 1.0)),
         "law_parameters?": each({"std_error": maybe(number(0.0))}),
-        "extension?": EXTENSION,
+        "extension?": {f"{key}?": shape for key, shape in EXTENSION.items()},
     },
     "own_effects?": [{"name": text, "file": text, "sha256": text, "text?": text, "package?": text}],
 }

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fieldsid.shapes.check import (
+from fieldsid.records.check import (
     AXES,
     BOTH_SIDES,
+    ERRORS,
     FLOOR,
     HEAD,
     LARGEST_FIN_RAD,
@@ -25,9 +26,9 @@ from fieldsid.shapes.check import (
     one_of,
     text,
 )
-from fieldsid.shapes.laws import FIT
-from fieldsid.shapes.model import MODEL, SPEED
-from fieldsid.shapes.schedule import SCHEDULE
+from fieldsid.records.laws import FIT
+from fieldsid.records.model import MODEL, SPEED
+from fieldsid.records.schedule import SCHEDULE
 
 
 class Kind(NamedTuple):
@@ -41,18 +42,19 @@ class Kind(NamedTuple):
 DIAGNOSIS: Shape = {
     **HEAD,
     "axis": one_of(AXES),
-    "verdict": text,
+    "verdict?": text,
     "says?": text,
-    "effects": [text],
-    "base": BOTH_SIDES,
-    "noise_floor": FLOOR,
+    "effects?": [text],
+    "base?": BOTH_SIDES,
+    "noise_floor?": FLOOR,
     "noiseless?": flag,
     "runs?": [text],
     "validation_runs?": [text],
-    "candidates": [
+    "candidates?": [
         {
-            **BOTH_SIDES,
             "effect": text,
+            "train?": ERRORS,
+            "validation?": ERRORS,
             "probability?": number(0.0, 1.0),
             "explained?": number(0.0, 1.0),
             "log_evidence?": number(),
@@ -60,6 +62,11 @@ DIAGNOSIS: Shape = {
         }
     ],
 }
+DRAWN_DIAGNOSIS: Shape = {
+    **dict.fromkeys(("verdict", "base", "noise_floor"), anything),
+    "candidates": [{"train": anything, "validation": anything}],
+}
+"""What a report needs of a diagnosis beside that."""
 TURN_RADIUS: Shape = {
     **HEAD,
     "rudder_max_rad?": above_zero(LARGEST_FIN_RAD),
