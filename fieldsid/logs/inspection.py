@@ -133,10 +133,8 @@ def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Pat
 
 
 def _many(inventory: Inventory) -> str:
-    looked = len(inventory.channels)
-    return (
-        f"{looked + inventory.more} channels: the first {looked} by name were looked into for signals, {inventory.more} were not"
-    )
+    looked, more = len(inventory.channels), inventory.more
+    return f"{looked + more} channels: the first {looked} by name were looked into for signals, {more} were not"
 
 
 def _line(item: dict[str, Any]) -> str:

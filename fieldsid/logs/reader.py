@@ -23,7 +23,7 @@ PACKAGE = "fieldsid.logs.readers"
 DEFINED = "message"
 """The kind of a topic whose fields the format defines: its names are not guessed at."""
 MOST_CHANNELS = 5000
-"""Channels of a log that are looked into: twice those of a glider, which has the most. Of others it is said how many there are."""
+"""Channels of a log that are looked into, twice those of a glider, which has the most; of others, how many there are is said."""
 WORTH_SALVAGING = 0.5
 """Share of a log from which its readable part is offered."""
 
@@ -95,8 +95,8 @@ class ChannelInfo:
 class Inventory(Brief):
     """What is in a log file; `table` says how a text table was understood, `samples` are a table's numbers.
 
-    `more` are channels beyond the MOST_CHANNELS that were looked into. `frame` is that of a log of topics whose format has one, `by_topic` whether it is such a log. `no_clock` is the column of a
-    table that is called its time, and why it is none.
+    `more` are channels beyond the MOST_CHANNELS that were looked into. `frame` is that of a log of topics whose format has one,
+    `by_topic` whether it is such a log. `no_clock` is the column of a table that is called its time, and why it is none.
     """
 
     path: Path

@@ -72,7 +72,7 @@ def test_lines_that_cannot_be_read_are_counted_and_those_behind_them_are_read():
 
 def test_a_stream_that_breaks_is_one_that_ends():
     class Broken(io.BytesIO):
-        def readline(self, size=-1):
+        def readline(self, *_size):
             raise OSError(5, "Input/output error")
 
     assert taken(lines_of(Broken(), MessageReader(Axis.YAW))) == []
