@@ -49,6 +49,16 @@ class LimitError(ValueError):
 def read_text(path: Path) -> str:
     """Read a text file; raises ArtifactError when it cannot be read, is no plain file, is too large or is no text."""
     try:
+        return read_bytes(path).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        raise ArtifactError(
+            f"`{path}` is not YAML, nor any text", found=str(error), hint="give a file with `key: value` lines"
+        ) from error
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read the bytes of a file of text as they are; raises ArtifactError as `read_text` does."""
+    try:
         with open(path, "rb", opener=_without_waiting) as stream:
             if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
                 raise ArtifactError(
@@ -68,12 +78,7 @@ def read_text(path: Path) -> str:
     if len(raw) > LARGEST_TEXT:
         found = f"{path.stat().st_size} bytes, more than {LARGEST_TEXT}"
         raise ArtifactError(f"`{path}` is too large for a file of this kind", found=found, hint="check that this file is meant")
-    try:
-        return raw.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError as error:
-        raise ArtifactError(
-            f"`{path}` is not YAML, nor any text", found=str(error), hint="give a file with `key: value` lines"
-        ) from error
+    return raw
 
 
 def _without_waiting(path: str, flags: int) -> int:

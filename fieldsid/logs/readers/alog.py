@@ -39,8 +39,8 @@ def sniff(path: Path) -> bool:
     return head.startswith(b"%%") and b"%% LOGSTART" in head
 
 
-def _topics(path: Path, wanted: Collection[str] | None = None) -> tuple[dict[str, Topic], tuple[Note, ...], int]:
-    """Return the topics that are wanted, or as many as are looked into, what was noticed, and how many others there are."""
+def _topics(path: Path, wanted: Collection[str] = ()) -> tuple[dict[str, Topic], tuple[Note, ...], int]:
+    """Return as many topics as are looked into and those that are wanted, what was noticed, and how many others there are."""
     times: dict[str, list[float]] = {}
     values: dict[str, list[float]] = {}
     odd = 0
@@ -57,7 +57,7 @@ def _topics(path: Path, wanted: Collection[str] | None = None) -> tuple[dict[str
             if time is not None and value is not None:
                 times.setdefault(parts[1], []).append(time)
                 values.setdefault(parts[1], []).append(value)
-    taken = [n for n in times if n in wanted] if wanted is not None else sorted(times)[:MOST_CHANNELS]
+    taken = {*sorted(times)[:MOST_CHANNELS], *(n for n in wanted if n in times)}
     found = {name: topic_of(np.array(times[name]), {DATA: np.array(values[name])}) for name in taken}
     message = f"lines of the log that are cut off or no posting, left out: {odd}"
     notes = (Note("truncated", message, {"count": odd}),) if odd else ()
