@@ -33,6 +33,8 @@ READING_SHARE = 0.25
 LOCALHOST = "127.0.0.1"
 LARGEST_DATAGRAM = 65536
 WAITING_LINES = 10_000
+PASSED_OVER = 1 << 20
+"""Bytes of a line without end that are passed over at once."""
 
 
 def replayed(run: Run, axis: Axis, factor: float, after: float = -inf) -> Iterator[Sample | None]:
@@ -106,7 +108,7 @@ def _lines(stream: BinaryIO) -> Iterator[bytes]:
     while line := stream.readline(LONGEST_LINE + 1):
         yield line
         while len(line) > LONGEST_LINE and not line.endswith(b"\n"):
-            line = stream.readline(LONGEST_LINE + 1)
+            line = stream.readline(PASSED_OVER)
 
 
 def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Iterator[Sample | None]:

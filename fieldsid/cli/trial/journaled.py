@@ -19,6 +19,7 @@ from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
 from fieldsid.cli.trial.filled import filled, in_words, left_out, wants
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
+from fieldsid.records.named_inputs import is_there
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, Stamp, append, read
 from fieldsid.trial_folder.state import FolderState, state_of
 
@@ -76,7 +77,7 @@ class _Kept:
         entries, _ = read(folder)
         self._hashes = Hashes(folder, entries)
         read_from = [*_inputs(parsed), *([Path("vehicle.yaml")] if "vehicle" in parsed.values else [])]
-        self._inputs = self._stamps(dict.fromkeys(p for p in read_from if p.exists()))
+        self._inputs = self._stamps(dict.fromkeys(p for p in read_from if is_there(p)))
         self._before = _snapshot(folder)
 
     def write(self, code: int, verdict: str, result: Any = None) -> None:
