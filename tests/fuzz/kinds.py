@@ -51,7 +51,6 @@ from fieldsid.reporting.sections import context_of
 from fieldsid.schedule.record import load_schedule
 from fieldsid.templates import template_path
 from fieldsid.trial_folder.journal import Entry, Stamp, append
-from fieldsid.trial_folder.next_step import next_step
 from fieldsid.trial_folder.state import state_of
 
 TIME = 0.05 * np.arange(120)
@@ -292,17 +291,20 @@ def in_a_trial(name, *, journal=False):
         if not journal:
             (folder / "journal.jsonl").write_bytes(as_journal(path.parent).read_bytes())
         (folder / name).write_bytes(path.read_bytes())
-        reported(folder)
+        reported(folder, page=len(path.read_bytes()) % PAGES == 0)
 
     return door
 
 
-def reported(folder):
-    """Make all of a folder's report but the page's file, and say what to do next in it."""
-    state = state_of(folder)
-    next_step(state)
-    html_of(context_of(material_of(state))).encode()
-    command(["status", str(folder), "--json"])
+PAGES = 8
+"""Of so many files one's page is laid out too: compiling its template takes ten times as long as all else."""
+
+
+def reported(folder, *, page):
+    """Make all of a folder's report but the page's file; what to do next in it is a part of that."""
+    context = context_of(material_of(state_of(folder)))
+    if page:
+        html_of(context).encode()
 
 
 def as_journal(folder):
@@ -329,7 +331,8 @@ def as_diagnosis(folder):
 
 
 def as_turns(folder):
-    row = {"speed_m_s": 1.0, "side": "port", "radius_m": 5.3, "interval95": [4.8, 5.9], "steady_radius_m": 5.3, "u_turn_radius_m": 5.8,
+    row = {"speed_m_s": 1.0, "side": "port", "radius_m": 5.3, "interval95": [4.8, 5.9], "steady_radius_m": 5.3,
+           "u_turn_radius_m": 5.8,
            "u_turn_time_s": 18.0, "yaw_rate_max_rad_s": 0.19, "extrapolated": False, "trust": "identified"}  # fmt: skip
     rows = [{**row, "side": side, "speed_m_s": speed} for side in ("port", "starboard") for speed in (1.0, 1.8)]
     return written_yaml(
