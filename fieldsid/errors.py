@@ -5,6 +5,7 @@ from __future__ import annotations
 from reprlib import Repr
 
 _SHORT = Repr()
+_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxdict = 2, 3, 3
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
 
 

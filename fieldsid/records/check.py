@@ -50,11 +50,14 @@ def check(value: object, shape: Shape, place: str = "") -> None:
 
 def _check_key(value: Any, name: str, inner: Shape, place: str) -> None:
     key, is_optional = name.removesuffix("?"), name.endswith("?")
-    way = f"{place}.{key}" if place else key
     if key in value:
-        check(value[key], inner, way)
+        check(value[key], inner, _way(place, key))
     elif not is_optional:
-        raise ShapeError(f"`{way}` is missing")
+        raise ShapeError(f"`{_way(place, key)}` is missing")
+
+
+def _way(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key
 
 
 def _items(value: object, place: str) -> list[Any]:
@@ -68,7 +71,7 @@ def finite_number(value: object, name: str, low: float = -LARGEST, high: float =
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise _wrong(value, name, "a finite number")
     if not low <= value <= high:
-        bounds = f"at least {low:g}" if high == LARGEST else f"within {low:g} .. {high:g}"
+        bounds = f"at least {low:g}" if high == LARGEST and low > -LARGEST else f"within {low:g} .. {high:g}"
         raise ShapeError(f"`{name}` is {value:g}, and must be {bounds}: it is no such number of a vehicle")
     return float(value)
 
@@ -108,7 +111,7 @@ def each(shape: Shape) -> Shape:
     def look(value: object, place: str) -> None:
         _refuse(not isinstance(value, Mapping), value, place, "keys with values")
         for key, item in value.items():  # type: ignore[attr-defined]
-            check(item, shape, f"{place}.{key}")
+            check(item, shape, _way(place, str(key)))
 
     return look
 

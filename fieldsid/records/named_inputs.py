@@ -85,7 +85,10 @@ def where_now(entry: Mapping[str, Any], record: Path) -> Path | None:
     What is not there is looked for from the folders above the record, and known by its hash: a record tells its files from the
     folder where it was made.
     """
-    path = Path(str(entry.get("path", "")))
+    named = entry.get("path")
+    if not isinstance(named, str) or not named:
+        return None
+    path = Path(named)
     folders = list(islice(record.resolve().parents, ABOVE))
     trial = folders[min(1, len(folders) - 1)]
     if (there := beside([path], trial)) is not None or path.is_absolute():
