@@ -87,7 +87,7 @@ def test_a_pipe_and_a_device_are_no_plain_files(tmp_path):
     "text", [b"9" * 400, b"[" * 100_000, b'{"a":' * 50_000, b"\xff", b'"\\ud800"', b'{"a": ' + b"1" * 25 + b"}", b"{", b""]
 )
 def test_json_beyond_the_limits_is_a_value_error(text):
-    with pytest.raises(ValueError, match="."):
+    with pytest.raises(ValueError, match=r"."):
         read_json(text)
 
 
