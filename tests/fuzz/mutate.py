@@ -152,7 +152,7 @@ def spoil_lines(data: bytes, random: np.random.Generator) -> bytes:
         if random.random() < 0.2:
             lines[at] = LONG_LINES[int(random.integers(0, len(LONG_LINES)))]
         elif lines[at].startswith(b"{"):
-            with contextlib.suppress(ValueError):
+            with contextlib.suppress(ValueError, RecursionError):
                 lines[at] = spoil_json(lines[at], random)
     return b"\n".join(lines)
 
