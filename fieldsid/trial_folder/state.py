@@ -182,6 +182,11 @@ def _found(named: str, folder: Path) -> Path | None:
     return None if there is None else there.resolve()
 
 
+def _unknown(source: Source) -> str:
+    """Return how an input is told of which nothing is known."""
+    return source.named if source.path is None else f"{source.named} (too large to be hashed)"
+
+
 def _parents(item: Item, folder: Path) -> tuple[Source, ...]:
     return _sources(_parent(_body(item)), folder)
 
@@ -196,7 +201,7 @@ def _judge(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: 
         return done[path]
     item = done[path] = items[path]  # a file that names itself ends here
     now = {s: hashes.of_named(s.path) for s in item.sources if s.path is not None and s.sha256}
-    missing = tuple(s.named for s in item.sources if s.path is None or (s in now and now[s] is None))
+    missing = tuple(_unknown(s) for s in item.sources if s.path is None or (s in now and now[s] is None))
     because = ""
     for source in item.sources:
         if source.path is None or because:

@@ -89,6 +89,8 @@ def test_lines_on_standard_input_are_taken(run_cli, tmp_path, monkeypatch):
     last = looks(run_cli("live", "-", "--axis", "yaw", "--json"))[-1]
     assert last["counts"]["unreadable"] == 1
     assert last["samples"] > 0.9 * len(lines)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"\xff\n" + b"9" * 100_000 + b"\n" + "\n".join(lines).encode())))
+    assert "2 lines could not be read" in run_cli("live", "-", "--axis", "yaw").out
 
 
 def test_the_goal_is_what_a_plan_promised(run_cli, tmp_path):

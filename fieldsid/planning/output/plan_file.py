@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import plain, save_record
-from fieldsid.errors import ArtifactError, FieldsidError
+from fieldsid.errors import ArtifactError, FieldsidError, shortened
 from fieldsid.maneuvers import Autopilot, pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.planning.design.abort_conditions import aborts_of
@@ -172,7 +172,7 @@ def _fin(value: Any) -> float:
 
 def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ArtifactError(f"`{name}` must be a finite number", found=repr(value), hint=f"write a number after `{name}:`")
+        raise ArtifactError(f"`{name}` must be a finite number", found=shortened(value), hint=f"write a number after `{name}:`")
     return float(value)
 
 
