@@ -11,9 +11,9 @@ import threading
 import time as clock
 from collections.abc import Iterator
 from contextlib import closing
+from io import BufferedIOBase
 from math import inf, isfinite
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
@@ -33,8 +33,7 @@ READING_SHARE = 0.25
 LOCALHOST = "127.0.0.1"
 LARGEST_DATAGRAM = 65536
 WAITING_LINES = 10_000
-PASSED_OVER = 1 << 20
-"""Bytes of a line without end that are passed over at once."""
+PIECE_BYTES = 1 << 18
 
 
 def replayed(run: Run, axis: Axis, factor: float, after: float = -inf) -> Iterator[Sample | None]:
@@ -77,7 +76,7 @@ def followed(
         yield from samples_of(run, axis, after)
 
 
-def lines_of(stream: BinaryIO, reader: MessageReader) -> Iterator[Sample | None]:
+def lines_of(stream: BufferedIOBase, reader: MessageReader) -> Iterator[Sample | None]:
     """Yield the samples of a stream of JSON lines until it ends, or cannot be read any more."""
     waiting: queue.Queue[bytes | None] = queue.Queue(WAITING_LINES)
 
@@ -103,12 +102,18 @@ def lines_of(stream: BinaryIO, reader: MessageReader) -> Iterator[Sample | None]
             yield sample
 
 
-def _lines(stream: BinaryIO) -> Iterator[bytes]:
-    """Yield lines; of one that is too long its beginning, which is too long still, and what follows is passed over."""
-    while line := stream.readline(LONGEST_LINE + 1):
-        yield line
-        while len(line) > LONGEST_LINE and not line.endswith(b"\n"):
-            line = stream.readline(PASSED_OVER)
+def _lines(stream: BufferedIOBase) -> Iterator[bytes]:
+    """Yield lines as their ends come; of one that is too long no more is kept than shows that."""
+    kept = b""
+    while piece := stream.read1(PIECE_BYTES):
+        if len(kept) > LONGEST_LINE and b"\n" not in piece:
+            continue
+        first, *others = piece.split(b"\n")
+        kept = kept if len(kept) > LONGEST_LINE else kept + first
+        for line in others:
+            yield kept
+            kept = line
+    yield kept
 
 
 def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Iterator[Sample | None]:

@@ -93,6 +93,12 @@ def test_lines_on_standard_input_are_taken(run_cli, tmp_path, monkeypatch):
     assert "2 lines could not be read" in run_cli("live", "-", "--axis", "yaw").out
 
 
+def test_what_cannot_be_read_is_counted_where_nothing_follows_it(run_cli, monkeypatch):
+    raw = b'{"time_s": 1, "rudder_rad": 0.1}\n\xff\n' + b"9" * 100_000
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(raw)))
+    assert looks(run_cli("live", "-", "--axis", "yaw", "--json"))[-1]["counts"]["unreadable"] == 2
+
+
 def test_the_goal_is_what_a_plan_promised(run_cli, tmp_path):
     plan = run_cli("plan", "--axis", "yaw", "--speeds", "1.4", "-o", tmp_path, "--json").json
     file = next(tmp_path.glob("*.yaml"))

@@ -70,9 +70,19 @@ def test_lines_that_cannot_be_read_are_counted_and_those_behind_them_are_read():
     assert reader.unreadable == 3
 
 
+@pytest.mark.parametrize("size", [1, 7, 31, 32, 33, 1 << 16])
+def test_lines_are_the_same_whatever_pieces_they_come_in(size, monkeypatch):
+    monkeypatch.setattr("fieldsid.online.sources.PIECE_BYTES", size)
+    good = b'{"time_s": %d, "rudder_rad": 0.1}\n'
+    reader = MessageReader(Axis.YAW)
+    stream = io.BytesIO(good % 1 + b"\n" + b"x" * (3 * LONGEST_LINE) + b"\n" + good % 2 + (good % 3)[:-1])
+    assert [s.time for s in taken(lines_of(stream, reader))] == [1.0, 2.0, 3.0]
+    assert reader.unreadable == 1
+
+
 def test_a_stream_that_breaks_is_one_that_ends():
     class Broken(io.BytesIO):
-        def readline(self, *_size):
+        def read1(self, *_size):
             raise OSError(5, "Input/output error")
 
     assert taken(lines_of(Broken(), MessageReader(Axis.YAW))) == []
