@@ -7,6 +7,7 @@ import json
 import os
 import time
 import zlib
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -16,6 +17,7 @@ from binary_logs import write_mat
 from fuzz.kinds import SIGNALS, TIME, as_diagnosis, as_run, as_state, as_turns, good_files
 
 from fieldsid.artifacts import to_yaml
+from fieldsid.batch.archive import SCHEMA, known_rows
 from fieldsid.cli.app import main
 from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.exports._patch import patch_yaml
@@ -265,3 +267,18 @@ def test_a_run_whose_notes_are_spoilt_is_told_and_left_out(trial):
         state = state_of(trial)
         assert [i.path for i in state.items] == ["models/m.yaml"]
         assert state.unreadable
+
+
+@pytest.mark.parametrize(
+    "spoilt", ["{", "[" * 9999, "null", '{"schema": 3}', '{"rows": [3]}', '{"rows": [{"status": 3}]}',
+               '{"rows": [{"status": "done", "speed_m_s": "x"}]}', '{"rows": []}', '{"rows": [{"status": "failed"}]}'],
+)  # fmt: skip
+def test_a_spoilt_answer_of_a_batch_is_asked_for_again(tmp_path, spoilt):
+    (tmp_path / "logs").mkdir()
+    path = tmp_path / "logs" / "one.json"
+    task = SimpleNamespace(key="one")
+    rows = [{"status": "done", "speed_m_s": 1.0, "verdict": None}]
+    path.write_text(json.dumps({"schema": SCHEMA, "rows": rows}))
+    assert known_rows(tmp_path, task) == rows
+    path.write_text(spoilt.replace('{"rows"', f'{{"schema": "{SCHEMA}", "rows"'))
+    assert known_rows(tmp_path, task) is None
