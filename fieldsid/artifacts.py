@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import hashlib
 import io
 import math
 import os
@@ -11,33 +9,19 @@ import secrets
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from copy import deepcopy
-from functools import lru_cache
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 from ruamel.yaml.scalarstring import LiteralScalarString
 
 from fieldsid._version import __version__
 from fieldsid.errors import ArtifactError
+from fieldsid.records.named_inputs import sha256_of
 
 OWN_HANDLES = Path("/proc/self/fd")
 """Where Linux shows a process the files that it has open, by their number: the way to one that has no name."""
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file's bytes as 64 hex digits; a folder's is that of its files in name order."""
-    digest = hashlib.sha256()
-    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
-    for file in files:
-        with file.open("rb") as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
-    return digest.hexdigest()
 
 
 def check_output(path: Path, *, force: bool = False) -> None:
@@ -130,7 +114,7 @@ def _given_a_name(handle: int, path: Path) -> Iterator[Path]:
 def write_text(path: Path, text: str, *, force: bool = False) -> Path:
     """Write a text file whole or not at all; raises ArtifactError."""
     with replacing(path, force=force) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")  # of a name that is no UTF-8
     return path
 
 
@@ -151,109 +135,6 @@ def save_record(
         "parent": None if parent is None else {"path": str(parent), "sha256": sha256_of(parent)},
     }
     return write_text(path, to_yaml({**head, **body}), force=force)
-
-
-def load_record(path: Path, kind: str) -> dict[str, Any]:
-    """Read a record back and check that it is one of `kind` (`fieldsid/model` for `fieldsid/model/1`).
-
-    Raises ArtifactError when the file cannot be read, is not YAML, or is another kind of record.
-    """
-    body = read_yaml(path)
-    schema = body.get("schema")
-    if not isinstance(schema, str) or not schema.startswith(f"{kind}/"):
-        raise ArtifactError(
-            f"`{path}` is not a {kind} file",
-            found=f"schema: {schema!r}",
-            hint=f"give a file with a line `schema: {kind}/1`",
-        )
-    if schema != f"{kind}/1":
-        number = schema.rpartition("/")[2]
-        if number.isdecimal() and int(number) > 1:
-            raise ArtifactError(f"`{path}` has a newer schema than this version reads", found=schema, hint="update fieldsid")
-        raise ArtifactError(f"`{path}` has a schema that there is not", found=schema, hint=f"such a file has `schema: {kind}/1`")
-    return body
-
-
-@lru_cache(maxsize=32)
-def _parsed(text: str) -> object:
-    """Return what a YAML text says: a command asks a model's file again and again, and parsing it takes 25 ms."""
-    return YAML(typ="safe").load(text)
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping; raises ArtifactError when it cannot be read or is not a mapping."""
-    return yaml_mapping(read_text(path), path)
-
-
-def read_text(path: Path) -> str:
-    """Read a text file; raises ArtifactError when it cannot be read or is no text."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except IsADirectoryError as error:
-        held = sorted(p.name for p in path.iterdir())
-        found = f"it holds {', '.join(held[:3])}{' ...' if len(held) > 3 else ''}" if held else "it is empty"
-        raise ArtifactError(f"`{path}` is a folder, where a file is needed", found=found, hint="name a file in it") from error
-    except OSError as error:
-        raise ArtifactError(
-            f"`{path}` cannot be read: {error.strerror}",
-            found=f"in `{path.parent}`",
-            hint=near_files(path) if isinstance(error, FileNotFoundError) else "check its permissions",
-        ) from error
-    except UnicodeDecodeError as error:
-        raise ArtifactError(
-            f"`{path}` is not YAML, nor any text", found=str(error), hint="give a file with `key: value` lines"
-        ) from error
-
-
-def yaml_mapping(text: str, path: Path) -> dict[str, Any]:
-    """Return the mapping that a YAML text holds; raises ArtifactError naming the file it came from."""
-    try:
-        body = deepcopy(_parsed(text))
-    except YAMLError as error:
-        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
-        found = str(error).strip() if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
-        raise ArtifactError(f"`{path}` is not valid YAML", found=found, hint="mend the line named above") from error
-    except (ValueError, RecursionError) as error:  # a date that there is not, brackets without end
-        found = f"{type(error).__name__}: {error}"
-        raise ArtifactError(f"`{path}` holds a value that YAML cannot read", found=found, hint="put text in quotes") from error
-    if not isinstance(body, dict):
-        raise ArtifactError(f"`{path}` holds no keys with values", found=_shape_of(body), hint="write `key: value` lines")
-    return body
-
-
-def near_files(path: Path) -> str:
-    """Return what a file that is not there may have meant."""
-    names = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() and os.access(path.parent, os.R_OK) else []
-    close = difflib.get_close_matches(path.name, names, n=1)
-    return f"did you mean `{quote(str(path.parent / close[0]))}`?" if close else "check the path"
-
-
-def _shape_of(body: object) -> str:
-    return "nothing" if body is None else "a list" if isinstance(body, list) else f"the text {str(body)[:40]!r}"
-
-
-def inputs_of(path: Path) -> tuple[Path, ...]:
-    """Return the files that a record says it was made from, those that are still there; none where it cannot be read."""
-    try:
-        inputs = read_yaml(path).get("inputs")
-        named = [where_now(entry, path) for entry in inputs or ()]
-    except (ArtifactError, TypeError, KeyError):
-        return ()
-    return tuple(p for p in dict.fromkeys(named) if p.exists())
-
-
-def where_now(entry: Mapping[str, Any], record: Path) -> Path:
-    """Return the path of a file that a record names with its SHA-256, as seen from the working folder.
-
-    What is not there is looked for from every folder above the record, and known by its hash: a record tells its files from the
-    folder where it was made.
-    """
-    path = Path(str(entry["path"]))
-    if path.is_absolute() or path.exists():
-        return path
-    above = (folder / path for folder in record.resolve().parents)
-    found = next((p for p in above if p.exists() and sha256_of(p) == entry.get("sha256")), None)
-    return path if found is None else Path(os.path.relpath(found))
 
 
 def to_yaml(body: Mapping[str, Any]) -> str:

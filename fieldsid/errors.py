@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from reprlib import Repr
+
 from fieldsid.text.one_line import one_line
 
 FOUND = "  found: "
+_SHORT = Repr()
+_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxdict = 2, 3, 3
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
+
+
+def shortened(value: object) -> str:
+    """Return a value as Python writes it, cut where it is long or deep: what an error quotes of a file that anybody wrote."""
+    return _SHORT.repr(value)
 
 
 class FieldsidError(Exception):

@@ -9,8 +9,8 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from fieldsid.artifacts import read_yaml
-from fieldsid.errors import FieldsidError
+from fieldsid.errors import FieldsidError, shortened
+from fieldsid.records.reading import read_yaml
 from fieldsid.registry import near
 
 
@@ -55,7 +55,7 @@ def _explained(model: type[StrictModel], failure: ValidationError, place: str, e
         key = str(first["loc"][-1])
         return error(
             f"{place} has an unknown key `{where}`",
-            found=f"{key}: {first['input']!r}",
+            found=f"{key}: {shortened(first['input'])}",
             hint=near(key, _known_keys(model, first["loc"][:-1])),
         )
     if first["type"] == "missing":
@@ -67,7 +67,7 @@ def _explained(model: type[StrictModel], failure: ValidationError, place: str, e
     value = first["input"]
     return error(
         f"{place}: `{where or 'the file'}` is not valid: {_lower(first['msg'])}",
-        found=f"{value!r} ({type(value).__name__})",
+        found=f"{shortened(value)} ({type(value).__name__})",
         hint=f"correct `{where or 'the file'}`; `sysid init NAME` writes an example",
     )
 

@@ -13,10 +13,15 @@ from fieldsid._version import __version__
 from fieldsid.artifacts import plain, replacing, write_text
 from fieldsid.batch.rows import Row, columns
 from fieldsid.batch.task import Task
+from fieldsid.errors import ArtifactError
 from fieldsid.models.axis import Axis
+from fieldsid.records.check import Shape, at_least_one, check, text
+from fieldsid.records.reading import read_json, read_text
 
 SCHEMA = "fieldsid/batch-log/1"
 ANSWERS = "logs"
+ANSWER: Shape = {"schema": text, "rows": at_least_one({"status": text})}
+"""What a log's answer holds beside the columns of its rows."""
 
 Work = Callable[[Sequence[Task]], Iterator[tuple[Task, list[Row]]]]
 
@@ -25,13 +30,20 @@ def known_rows(folder: Path, task: Task) -> list[Row] | None:
     """Return the rows that an earlier batch found for a task, None where it has none or failed at it."""
     path = _answer(folder, task)
     try:
-        body = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        body = read_json(read_text(path))
+        check(body, ANSWER)
+    except (ArtifactError, ValueError):
         return None
-    rows = body.get("rows") if isinstance(body, dict) and body.get("schema") == SCHEMA else None
-    if not isinstance(rows, list) or not rows or any(r.get("status") == "failed" for r in rows):
+    rows: list[Row] = body["rows"]
+    if body["schema"] != SCHEMA or any(r["status"] == "failed" or not all(map(_fits, r, r.values())) for r in rows):
         return None
     return rows
+
+
+def _fits(name: str, value: object) -> bool:
+    """Whether a cell of a row is one of its column: words in some, numbers in the others."""
+    is_shown = any(name in columns(axis) for axis in Axis)
+    return not is_shown or value is None or isinstance(value, str if name in _WORDS else (int, float))
 
 
 def all_rows(folder: Path, tasks: Sequence[Task], work: Work, done: Callable[[], None]) -> tuple[list[Row], int]:

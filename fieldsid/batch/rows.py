@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import sha256_of
 from fieldsid.batch.task import Settings, Task
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import ChannelMap
@@ -25,6 +24,7 @@ from fieldsid.logs.importing import Importer
 from fieldsid.logs.run import EXPLAINING, Run
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.vehicle import Vehicle
 
 FIRST = ("log", "run", "status", "start_utc", "time_from", "speed_m_s", "verdict", "effects")

@@ -143,7 +143,12 @@ def _dispatch(arguments: list[str]) -> int:
 
     arguments = take(arguments)
     _enter_folder()
-    if os.path.isfile(JOURNAL):  # noqa: PTH113 - no import
+    is_link = os.path.islink(JOURNAL)  # noqa: PTH114 - no import
+    if is_link:
+        from fieldsid.cli.console import say
+
+        say(f"warning: `{JOURNAL}` is a symbolic link: it is neither read nor written, and this folder is no trial [journal]")
+    if os.path.isfile(JOURNAL) and not is_link:  # noqa: PTH113 - no import
         from fieldsid.cli.trial.journaled import run_in_trial
 
         result = run_in_trial(arguments, run)

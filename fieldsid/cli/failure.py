@@ -86,9 +86,9 @@ def _as_usage(error: typer.TyperException, arguments: Sequence[str]) -> UsageErr
     words, hint = words[:1].lower() + words[1:], f"see `{path} --help`"
     if words.startswith("missing argument"):
         from fieldsid.cli.trial.filled import FILLS
-        from fieldsid.trial_folder.journal import JOURNAL
+        from fieldsid.trial_folder.journal import is_trial
 
-        if Path(JOURNAL).is_file() and path.removeprefix("sysid ") in FILLS:
+        if is_trial(Path()) and path.removeprefix("sysid ") in FILLS:
             return _not_given(words, arguments, path.removeprefix("sysid "))
         hint = f"{_example(context)}{hint}"
     return UsageError(words, found=shlex.join(["sysid", *arguments]), hint=hint)
@@ -119,6 +119,6 @@ def _as_full(error: OSError) -> UsageError:
 def _save_trace(error: Exception, arguments: Sequence[str]) -> Path:
     handle, name = tempfile.mkstemp(prefix="fieldsid-trace-", suffix=".txt")
     head = f"fieldsid {__version__}\nPython {sys.version}\n{shlex.join(['sysid', *arguments])}\n\n"
-    with os.fdopen(handle, "w", encoding="utf-8") as stream:
+    with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
         stream.write(head + "".join(traceback.format_exception(error)))
     return Path(name)

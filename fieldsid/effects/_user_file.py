@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import read_text, yaml_mapping
 from fieldsid.effects._expression import FUNCTIONS, Expression, parse
 from fieldsid.errors import ArtifactError, EffectError
 from fieldsid.models.axis import NAMES, Axis
@@ -28,6 +27,7 @@ from fieldsid.models.definition import of_text
 from fieldsid.models.effect import Coefficient, Effect, Motion, Stage, Values
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.reading import read_text, yaml_mapping
 from fieldsid.registry import near
 
 SIGNAL_OF: Mapping[str, str] = MappingProxyType(

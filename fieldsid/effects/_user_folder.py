@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fieldsid.artifacts import yaml_mapping
 from fieldsid.effects import add_effects, all_effects
 from fieldsid.effects._user_file import load_user_effect, names_asked, user_effect_files
 from fieldsid.errors import EffectError
 from fieldsid.logs.run import Note
 from fieldsid.models.definition import Definition
 from fieldsid.models.effect import REGISTRY, Effect
+from fieldsid.records.reading import yaml_mapping
 from fieldsid.registry import refuse
 
 

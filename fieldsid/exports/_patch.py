@@ -18,15 +18,18 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import YAMLError
 from ruamel.yaml.representer import RoundTripRepresenter
 
 from fieldsid.artifacts import replacing
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.exports._target import decimal
+from fieldsid.records.reading import read_bytes, yaml_mapping
 from fieldsid.registry import near
 
-INDENTS = tuple(product((2, 4), ((2, 0), (4, 2), (2, 2), (6, 4), (4, 4)), (True, False)))
+INDENTS = tuple(product((2, 4), ((2, 0), (4, 2), (2, 2), (6, 4), (4, 4))))
+LARGEST_PATCHED = 1 << 17
+"""Letters of a file that is patched: it is read with its comments, and written in each of the indentations, in a few seconds."""
+BY_HAND = "export with `-o FILE`, and copy the numbers"
 
 
 class _Decimals(RoundTripRepresenter):
@@ -63,7 +66,8 @@ def patch_yaml(path: Path, key: str, columns: Mapping[str, Sequence[float]]) -> 
     Raises UsageError when the key is not in the file, ArtifactError when the file cannot be read or kept intact.
     """
     before = _text(path)
-    yaml, tree, regular = _parsed(path, before)
+    _values(path, before)
+    yaml, tree, regular = _parsed(before)
     parent, last = _find(path, tree, key)
     if regular:
         _put(parent, last, columns)
@@ -102,30 +106,62 @@ def write_patch(patch: Patch) -> Path:
 
 def _text(path: Path) -> str:
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            return stream.read()
-    except (OSError, UnicodeDecodeError) as error:
+        return read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError as error:
         raise ArtifactError(f"`{path}` cannot be read", found=str(error), hint="check the path given to `--into`") from error
 
 
-def _parsed(path: Path, text: str) -> tuple[YAML, CommentedMap, bool]:
-    """Return a parser, the tree, and whether the parser's indentation gives the text back; raises ArtifactError."""
+def _values(path: Path, text: str) -> dict[str, Any]:
+    """Return what the text says; raises ArtifactError where it is none of what is read, as with tags of its own."""
+    if len(text) > LARGEST_PATCHED:
+        found = f"{len(text)} letters, more than {LARGEST_PATCHED}"
+        raise ArtifactError(f"`{path}` could not be patched safely", found=found, hint=BY_HAND)
+    try:
+        return yaml_mapping(text.replace("\r\n", "\n"), path)
+    except ArtifactError as error:
+        raise ArtifactError(
+            f"`{path}` could not be patched safely", found=f"{error.what}: {error.found}", hint=BY_HAND
+        ) from error
+
+
+def _parsed(text: str) -> tuple[YAML, CommentedMap, bool]:
+    """Return a parser, the tree, and whether the parser's indentation gives the text back."""
     source = text.replace("\r\n", "\n")
-    for mapping, (sequence, offset), quotes in INDENTS:
-        yaml = _parser(mapping, sequence, offset, quotes=quotes)
-        try:
-            tree = yaml.load(source)
-        except YAMLError as error:
-            place = str(getattr(error, "problem_mark", "") or error).strip()
-            raise ArtifactError(f"`{path}` is not valid YAML", found=place, hint="mend the line named above") from error
-        if not isinstance(tree, CommentedMap):
-            raise ArtifactError(f"`{path}` holds no `key: value` lines", found=type(tree).__name__, hint="give a YAML mapping")
-        stream = io.StringIO()
-        yaml.dump(tree, stream)
-        if stream.getvalue() == source:
-            return _parser(mapping, sequence, offset, quotes=quotes), yaml.load(source), True
+    for quotes in (True, False):
+        tree = _parser(2, 2, 0, quotes=quotes).load(source)
+        for mapping, (sequence, offset) in INDENTS:
+            yaml = _parser(mapping, sequence, offset, quotes=quotes)
+            if _gives_back(yaml, tree, source):
+                return yaml, tree, True
     yaml = _parser(2, 2, 0, quotes=True)
     return yaml, yaml.load(source), False
+
+
+def _gives_back(yaml: YAML, tree: CommentedMap, source: str) -> bool:
+    stream = _Same(source)
+    try:
+        yaml.dump(tree, stream)
+    except _OtherError:
+        return False
+    return stream.tell() == len(source)
+
+
+class _OtherError(Exception):
+    """Text that is written is not the one it is to be."""
+
+
+class _Same(io.StringIO):
+    """Takes a text as long as it is one that is given: most indentations are wrong from the first lines on."""
+
+    def __init__(self, wanted: str) -> None:
+        super().__init__()
+        self._wanted = wanted
+
+    def write(self, text: str) -> int:
+        """Take a piece of text; raises _OtherError where it is not what stands at its place."""
+        if not self._wanted.startswith(text, self.tell()):
+            raise _OtherError
+        return super().write(text)
 
 
 def _spliced(path: Path, text: str, parent: CommentedMap, last: str, columns: Mapping[str, Sequence[float]]) -> str:
@@ -199,7 +235,7 @@ def _put(parent: CommentedMap, last: str, columns: Mapping[str, Sequence[float]]
 
 def _check(patch: Patch, key: str, columns: Mapping[str, Sequence[float]]) -> None:
     """Refuse a change that says something else than the columns under the key, or anything else elsewhere."""
-    old, new = (YAML(typ="safe").load(text) for text in (patch.before, patch.after))
+    old, new = (_values(patch.path, text) for text in (patch.before, patch.after))
     parts = _parts(key)
     for tree in (old, new):
         here = tree

@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fieldsid.artifacts import load_record, sha256_of
 from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError
 from fieldsid.extension.extend import Extension, Gain
 from fieldsid.logs.run import Run
 from fieldsid.models.model import KIND, Noise, load_model, save_model
+from fieldsid.records.check import ShapeError, check
+from fieldsid.records.model import EXTENSION
+from fieldsid.records.named_inputs import beside, sha256_of, sha256_of_named
+from fieldsid.records.reading import load_record
 
 INTACT, CHANGED, MISSING = "intact", "changed", "missing"
 
@@ -106,13 +109,11 @@ def parent_of(path: Path) -> Parent | None:
     named = load_record(path, KIND).get("parent")
     if named is None:
         return None
-    try:
-        said, digest = Path(str(named["path"])), str(named["sha256"])
-    except (KeyError, TypeError) as error:
-        raise ArtifactError(f"`{path}` names its parent badly", found=repr(named)[:80], hint="extend the parent again") from error
-    places = [p for p in (said, path.parent / said.name) if p.is_file()]
+    said, digest = Path(named["path"]), named["sha256"]
+    trial = path.resolve().parent.parent
+    places = [p for p in (said, path.parent / said.name) if beside([p], trial) is not None and not p.is_dir()]
     for place in places:
-        if sha256_of(place) == digest:
+        if sha256_of_named(place) == digest:
             return Parent(place, digest, INTACT)
     return Parent(places[0], digest, CHANGED) if places else Parent(said, digest, MISSING)
 
@@ -145,7 +146,8 @@ def history_of(path: Path) -> tuple[Generation, ...]:
 
 def _with_logs(generation: Generation, logs: Sequence[tuple[Path, str]]) -> Generation:
     """Return a generation that knows which of its logs are no longer what they were."""
-    changed = tuple(str(path) for path, digest in logs if _differs(path, digest))
+    trial = generation.path.resolve().parent.parent
+    changed = tuple(str(path) for path, digest in logs if _differs(path, digest, trial))
     return generation if generation.step is None else replace(generation, step=replace(generation.step, changed_data=changed))
 
 
@@ -154,14 +156,14 @@ def _step(path: Path, body: Any) -> tuple[Step | None, list[tuple[Path, str]]]:
     if body is None:
         return None, []
     try:
-        logs = [(Path(str(d["path"])), str(d["sha256"])) for d in body["data"]]
-        return Step(_gain(body), str(body["kept_by"])), logs
-    except (KeyError, TypeError, ValueError) as error:
+        check(body, EXTENSION, "info.extension")
+    except ShapeError as error:
         raise ArtifactError(
             f"`{path}` does not say completely how it was extended",
-            found=f"{type(error).__name__}: {error}",
+            found=str(error),
             hint="extend its parent again, with `--force`",
         ) from error
+    return Step(_gain(body), body["kept_by"]), [(Path(d["path"]), d["sha256"]) for d in body["data"]]
 
 
 def _gain(body: Mapping[str, Any]) -> Gain:
@@ -177,8 +179,8 @@ def _gain(body: Mapping[str, Any]) -> Gain:
     )
 
 
-def _differs(path: Path, digest: str) -> bool:
-    return (path.is_file() or path.is_dir()) and sha256_of(path) != digest
+def _differs(path: Path, digest: str, trial: Path) -> bool:
+    return beside([path], trial) is not None and sha256_of_named(path) not in (None, digest)
 
 
 def _pair(body: Mapping[str, Any]) -> Pair:

@@ -7,10 +7,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from fieldsid.artifacts import where_now
 from fieldsid.effects._user_folder import add_user_effects
 from fieldsid.errors import ArtifactError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
+from fieldsid.records.named_inputs import where_now
 from fieldsid.registry import near
 from fieldsid.vehicle import Vehicle, find_vehicle, load_vehicle
 
@@ -112,7 +112,7 @@ def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]
     if not any(m.effects for m in source.models):
         return []
     named = logs_of(source.paths)
-    there = [p for p in named if p.is_file() or p.is_dir()]
+    there = [p for _, p in named if p is not None]
     if len(there) < len(named):
         say("some runs of the models are not where they were: name them with `--runs` for the loss of speed")
     return there
@@ -127,7 +127,8 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
     if not source.models or not source.paths or source.axis is not Axis.YAW:
         return []
     named = logs_of(source.paths)
-    runs = [run for run in (attempt(load_run, path) for path in named if path.exists()) if not isinstance(run, FieldsidError)]
+    there = [p for _, p in named if p is not None]
+    runs = [run for run in (attempt(load_run, path) for path in there) if not isinstance(run, FieldsidError)]
     if len(runs) < len(named):
         say(f"{len(named) - len(runs)} of {len(named)} runs of the models cannot be read again: they show how the vehicle turns")
     return runs
@@ -135,15 +136,15 @@ def runs_behind(source: ParameterSource, say: Callable[[str], None]) -> list[Run
 
 def designed_from(schedule: Schedule, name: str) -> list[Path]:
     """Return the files of the models a schedule was designed from; raises ArtifactError where they are not there any more."""
-    named = [where_now(m, Path(name)) for m in schedule.provenance.get("models", [])]
-    missing = [p for p in named if not p.is_file()]
+    named = [(m["path"], where_now(m, Path(name))) for m in schedule.provenance.get("models", [])]
+    missing = [said for said, p in named if p is None]
     if not named or missing:
         raise ArtifactError(
             f"the models of `{name}` are not where they were",
-            found=", ".join(map(str, missing)) or "none named",
+            found=", ".join(missing) or "none named",
             hint=f"name them: `sysid schedule verify {name} --model MODEL`",
         )
-    return named
+    return [p for _, p in named if p is not None]
 
 
 def _trained(source: ParameterSource) -> float | None:

@@ -30,6 +30,8 @@ _COLUMN_EXAMPLE = """# columns are counted from 0:
 _TOPIC_EXAMPLE = (
     "# signals:\n#   yaw_rad: {topic: /heading, field: data, unit: deg}\n#   rudder_rad: {topic: /rudder_cmd, field: data}\n"
 )
+LISTED = 100
+"""Channels that are listed; of more, how many there are."""
 SHORT = 120
 """Letters up to which a finding tells what was found beside what is wrong."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
@@ -68,8 +70,9 @@ class Inspection(Brief):
             "format": inventory.form,
             "span": span,
             "duration_s": duration,
-            "channels": [_channel(c) for c in inventory.channels],
-            "shown": [_shown(c) for c in inventory.channels],
+            "channels": [_channel(c) for c in inventory.channels[:LISTED]],
+            "shown": [_shown(c) for c in inventory.channels[:LISTED]],
+            "more_channels": max(len(inventory.channels) - LISTED, 0) + inventory.more,
             "mapping_needed": not self.needs_none,
             "mapping": plain(self.proposal.body),
             "mapping_file": None if written is None else str(written),
@@ -96,12 +99,13 @@ def inspect_log(
     inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
     own = reader.own_map(path, options)
+    notes_of_size = [] if not inventory.more else [Note("many_channels", _many(inventory), {"more": inventory.more})]
     needs_none = own is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own.sources.keys()
     run = proposal.run
     if mapping is not None or needs_none:
         run = load_run(path, mapping, msg_path=msg_path, salvage=True, max_gap_s=math.inf)
     proposed = [] if needs_none or mapping is not None else list(proposal.notes)
-    notes = [*inventory.notes, *proposed, *(() if run is None else run.notes)]
+    notes = [*notes_of_size, *inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
         what, found, hint = proposal.problem.what, proposal.problem.found, proposal.problem.hint
         said = f"{what} ({found})" if len(found) <= SHORT else what
@@ -127,6 +131,11 @@ def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Pat
             hint="check that this is the log you meant",
         )
     return write_text(path, found.yaml(), force=force)
+
+
+def _many(inventory: Inventory) -> str:
+    looked, more = len(inventory.channels), inventory.more
+    return f"{looked + more} channels: the first {looked} by name were looked into for signals, {more} were not"
 
 
 def _line(item: dict[str, Any]) -> str:

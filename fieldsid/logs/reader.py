@@ -10,18 +10,20 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from fieldsid.artifacts import near_files
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, not_a_log
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.reading import near_files
 from fieldsid.registry import members
 
 PACKAGE = "fieldsid.logs.readers"
 DEFINED = "message"
 """The kind of a topic whose fields the format defines: its names are not guessed at."""
+MOST_CHANNELS = 5000
+"""Channels of a log that are looked into, twice those of a glider, which has the most; of others, how many there are is said."""
 WORTH_SALVAGING = 0.5
 """Share of a log from which its readable part is offered."""
 
@@ -93,8 +95,8 @@ class ChannelInfo:
 class Inventory(Brief):
     """What is in a log file; `table` says how a text table was understood, `samples` are a table's numbers.
 
-    `frame` is that of a log of topics whose format has one, `by_topic` whether it is such a log. `no_clock` is the column of a
-    table that is called its time, and why it is none.
+    `more` are channels beyond the MOST_CHANNELS that were looked into. `frame` is that of a log of topics whose format has one,
+    `by_topic` whether it is such a log. `no_clock` is the column of a table that is called its time, and why it is none.
     """
 
     path: Path
@@ -106,6 +108,7 @@ class Inventory(Brief):
     samples: Samples | None = None
     frame: str | None = None
     no_clock: tuple[Source, FieldsidError] | None = None
+    more: int = 0
 
     @property
     def by_topic(self) -> bool:

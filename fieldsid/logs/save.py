@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import IO
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import plain, replacing, sha256_of
+from fieldsid.artifacts import plain, replacing
 from fieldsid.errors import UsageError
 from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.run import READ_WITH, Run
+from fieldsid.records.named_inputs import sha256_of
 
 SCHEMA = "fieldsid/run/1"
 SUFFIXES = (".parquet", ".csv", ".csv.gz")

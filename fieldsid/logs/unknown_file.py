@@ -9,8 +9,8 @@ from pathlib import Path
 from shlex import quote
 from types import MappingProxyType
 
-from fieldsid.artifacts import inputs_of
 from fieldsid.errors import LogError
+from fieldsid.records.named_inputs import inputs_of
 
 COPY_AGAIN = "where the vehicle's own file is larger, copy it again"
 """What helps where a log holds less than it should, and is true of any."""

@@ -8,10 +8,10 @@ from math import isfinite
 from pathlib import Path
 from shlex import quote
 
-from fieldsid.artifacts import read_yaml
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.reader import ReadOptions, reader_of
+from fieldsid.records.reading import read_yaml
 
 
 @contextmanager

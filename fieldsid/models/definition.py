@@ -60,12 +60,12 @@ def definitions_body(own: Mapping[str, Definition]) -> list[dict[str, Any]]:
 def read_definitions(body: Sequence[Mapping[str, Any]], path: Path) -> dict[str, Definition]:
     """Return the definitions that a model's file holds, by the effect's name.
 
-    Raises ArtifactError where a text is not the one that was written, KeyError or TypeError where a key is missing or wrong.
+    Raises ArtifactError where a text is not the one that was written. The body has the shape that a model's file has.
     """
     found = {}
     for entry in body:
-        name, text = str(entry["name"]), str(entry.get("text", ""))
-        found[name] = Definition(str(entry["file"]), str(entry["sha256"]), text, str(entry.get("package", "")))
+        name, text = entry["name"], entry.get("text", "")
+        found[name] = Definition(entry["file"], entry["sha256"], text, entry.get("package", ""))
         if text and _digest(text) != entry["sha256"]:
             raise ArtifactError(
                 f"`{path}`: the definition of effect `{name}` is not the one that the model was made with",

@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fieldsid.artifacts import sha256_of
 from fieldsid.errors import EffectError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.definition import NONE, Definition
 from fieldsid.models.fin_path import FinPath
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.registry import Outside, define, pick
 
 if TYPE_CHECKING:

@@ -179,7 +179,10 @@ class OnlineIdentifier:
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> Self:
-        """Return the identifier of a state; raises DataError where it is none, or one of another version."""
+        """Return the identifier of a state; raises DataError where it is none, or one of another version.
+
+        What is in it has been looked through by its shape; here its parts must go together, and an estimate come of them.
+        """
         try:
             if state["version"] != STATE:
                 raise DataError("the state is of another version", found=str(state["version"]), hint="start without it")
@@ -191,9 +194,17 @@ class OnlineIdentifier:
             if state["filter"] is not None:
                 made._filter = made._new_filter()
                 made._filter.restore(state["filter"])
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+            made._try()
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError) as error:
             raise DataError("this is no state of an online estimate", found=f"{type(error).__name__}: {error}") from error
         return made
+
+    def _try(self) -> None:
+        """Raise ValueError or ArithmeticError where no estimate comes of what was read from a state."""
+        if self._seen and not np.isfinite(self._recent()[-self._seen :, 0]).all():
+            raise ValueError("samples without a time")
+        with np.errstate(all="ignore"):
+            self.estimate()
 
     def _chosen(self, time: float, angle: float, rate: float) -> SampleFilter | None:
         """Return the filter, made at the first sample that says which signals there are."""

@@ -20,6 +20,8 @@ DEFAULT_ACCURACY = 0.05
 """Relative standard error of damping, stiffness and authority that is asked for where nothing else is."""
 LOOK_BACK_S = 10.0
 """Time over which a parameter must stay where it is to be settled, and over which information is seen to grow."""
+MOST_LOOKS = 1000
+"""Looks that a watch can have kept: there are some forty in the time that it looks back."""
 SETTLED_SHARE = 0.05
 MIN_WEIGHT = 0.2
 """Weight of what was heard, reached after two seconds, from which on a root mean square is told."""
@@ -146,7 +148,10 @@ class Watch:
         self._looks.clear()
 
     def recall(self, state: Mapping[str, Any], axis: Axis) -> None:
-        """Take up the looks of another watch over the same source."""
+        """Take up the looks of another watch over the same source; raises ValueError where they are none of the axis."""
+        wrong = [e for e in state["looks"] if {*e["values"]} != {*NAMES[axis].base} or {*e["std_errors"]} != {*NAMES[axis].base}]
+        if wrong or len(state["looks"]) > MOST_LOOKS:
+            raise ValueError(f"{len(state['looks'])} looks, {len(wrong)} of them of other parameters")
         self.excitation.recall(state["excitation"])
         self._looks = [
             OnlineEstimate(

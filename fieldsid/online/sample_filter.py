@@ -8,6 +8,7 @@ late, so that spikes can be told.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from math import inf, isfinite, nan, remainder, tau
 from typing import Any
 
@@ -31,6 +32,8 @@ from fieldsid.online.spike_gate import SpikeGate
 
 CLOCK_RESTART_S = 1.0
 """A stamp so far before the last is a clock that started again; one less far is a sample that came late, and is left out."""
+HELD = 2
+"""Samples that wait until it can be told whether they are spikes."""
 MOST_MOVES = 64
 """Moves of the fin that a bridged gap may hold; with more it counts as a long one."""
 
@@ -71,7 +74,7 @@ class SampleFilter:
         self._late.append((time, fin, is_held))
         unwrapped = self._unwrapped(angle)
         ready = self.angle_gate.push(unwrapped), self.rate_gate.push(rate)
-        if len(self._late) < 3:
+        if len(self._late) <= HELD:
             return False
         time, fin, is_held = self._late.pop(0)
         return self._take(time, fin, *ready, is_held=is_held)
@@ -171,6 +174,7 @@ class SampleFilter:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from a state; raises ValueError, TypeError or KeyError where it is none."""
+        _check_times(state)
         self.memory[:], self.packed[:] = state["memory"], state["packed"]
         self._late = [(float(t), nan if f is None else float(f), bool(h)) for t, f, h in state["late"]]
         self._moves = [(float(t), float(f)) for t, f in state["moves"]]
@@ -180,6 +184,16 @@ class SampleFilter:
         self.colour.restore(state["colour"])
         self.angle_gate.restore(state["angle_gate"])
         self.rate_gate.restore(state["rate_gate"])
+
+
+def _check_times(state: Mapping[str, Any]) -> None:
+    """Raise ValueError where the times that a state holds do not go on: the filter divides by what lies between them."""
+    begin = float(state["memory"][TIME]) if state["memory"][SAMPLES] else -inf
+    moves, late = ([float(row[0]) for row in state[k]] for k in ("moves", "late"))
+    if len(late) > HELD or len(moves) > MOST_MOVES + 1:
+        raise ValueError(f"{len(late)} samples and {len(moves)} moves of the fin that wait")
+    if any(b <= a for a, b in pairwise([begin, *moves, *late])):
+        raise ValueError("times that do not go on")
 
 
 def present_step(memory: FloatArray) -> float:

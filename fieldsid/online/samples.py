@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from math import isfinite, nan
 from typing import NamedTuple
@@ -16,8 +15,13 @@ from fieldsid.logs.mapping.canonical_names import TIME, canonical
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.records.reading import read_json
 
 SURGE = "surge_m_s"
+LONGEST_LINE = 1 << 14
+"""Bytes of a line or datagram that are read: a vehicle's whole state has some hundred numbers."""
+LARGEST = 1e18
+"""A time in ns since 1970 is as large; of what lies beyond no sum of squares would be a number."""
 
 
 class Sample(NamedTuple):
@@ -66,11 +70,11 @@ class MessageReader:
         self.unreadable = 0
         self.fin_is_measured: bool | None = None
 
-    def read(self, line: str | bytes) -> Sample | None:
-        """Return the sample of a line, None where it holds no time or is no JSON object; blank lines are passed over."""
+    def read(self, line: bytes) -> Sample | None:
+        """Return the sample of a line; None for one that is too long, no JSON object or without a time, and for a blank one."""
         if not line.strip():
             return None
-        signals = _signals(line)
+        signals = _signals(line) if len(line) <= LONGEST_LINE else None
         if signals is None or not isfinite(signals.get(TIME, nan)):
             self.unreadable += 1
             return None
@@ -82,19 +86,23 @@ class MessageReader:
         return Sample(signals[TIME], fin, angle, rate, speed, not self.fin_is_measured)
 
 
-def _signals(line: str | bytes) -> dict[str, float] | None:
-    """Return what a line says by canonical signal in SI; None where it is no JSON object of numbers."""
+def _signals(line: bytes) -> dict[str, float] | None:
+    """Return what a line says by canonical signal in SI; None where it is no JSON object, or a number is none of a vehicle."""
     try:
-        body = json.loads(line)
-    except (ValueError, RecursionError):
+        body = read_json(line)
+    except ValueError:
         return None
     if not isinstance(body, dict):
         return None
     found: dict[str, float] = {}
     for key, value in body.items():
         said = canonical(key)
-        if said is None or isinstance(value, bool) or not isinstance(value, (int, float)):
+        if said is None or value is None:
             continue
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return None
         factor = UNITS[said.unit].factor if said.signal == TIME else factor_to(said.signal, said.unit)
+        if abs(value) > LARGEST:
+            return None
         found[said.signal] = float(value) * factor
     return found

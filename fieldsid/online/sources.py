@@ -9,8 +9,9 @@ import queue
 import socket
 import threading
 import time as clock
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
+from io import BufferedIOBase
 from math import inf, isfinite
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from fieldsid.logs.load import map_for
 from fieldsid.logs.reader import ReadOptions, reader_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.online.samples import MessageReader, Sample, samples_of
+from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples_of
 
 TICK_S = 0.2
 POLL_S = 0.5
@@ -32,6 +33,7 @@ READING_SHARE = 0.25
 LOCALHOST = "127.0.0.1"
 LARGEST_DATAGRAM = 65536
 WAITING_LINES = 10_000
+PIECE_BYTES = 1 << 18
 
 
 def replayed(run: Run, axis: Axis, factor: float, after: float = -inf) -> Iterator[Sample | None]:
@@ -74,14 +76,18 @@ def followed(
         yield from samples_of(run, axis, after)
 
 
-def lines_of(stream: Iterable[str | bytes], reader: MessageReader) -> Iterator[Sample | None]:
-    """Yield the samples of a stream of JSON lines until it ends."""
-    waiting: queue.Queue[str | bytes | None] = queue.Queue(WAITING_LINES)
+def lines_of(stream: BufferedIOBase, reader: MessageReader) -> Iterator[Sample | None]:
+    """Yield the samples of a stream of JSON lines until it ends, or cannot be read any more."""
+    waiting: queue.Queue[bytes | None] = queue.Queue(WAITING_LINES)
 
     def listen() -> None:
-        for line in stream:
-            waiting.put(line)
-        waiting.put(None)
+        try:
+            for line in _lines(stream):
+                waiting.put(line)
+        except OSError:  # what was at the other end is gone
+            return
+        finally:
+            waiting.put(None)
 
     threading.Thread(target=listen, daemon=True).start()
     while True:
@@ -94,6 +100,20 @@ def lines_of(stream: Iterable[str | bytes], reader: MessageReader) -> Iterator[S
             return
         if (sample := reader.read(line)) is not None:
             yield sample
+
+
+def _lines(stream: BufferedIOBase) -> Iterator[bytes]:
+    """Yield lines as their ends come; of one that is too long no more is kept than shows that."""
+    kept = b""
+    while piece := stream.read1(PIECE_BYTES):
+        if len(kept) > LONGEST_LINE and b"\n" not in piece:
+            continue
+        first, *others = piece.split(b"\n")
+        kept = kept if len(kept) > LONGEST_LINE else kept + first
+        for line in others:
+            yield kept
+            kept = line
+    yield kept
 
 
 def datagrams(port: int, reader: MessageReader, *, idle_s: float = inf) -> Iterator[Sample | None]:

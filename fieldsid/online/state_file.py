@@ -6,11 +6,14 @@ import json
 from pathlib import Path
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import plain, read_text, write_text
+from fieldsid.artifacts import plain, write_text
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.online.identifier import OnlineIdentifier
 from fieldsid.online.progress import Watch
+from fieldsid.records.check import check
+from fieldsid.records.online import STATE
+from fieldsid.records.reading import read_json, read_text
 
 SCHEMA = "fieldsid/online/1"
 
@@ -29,14 +32,15 @@ def load_state(path: Path, axis: Axis, watch: Watch) -> tuple[OnlineIdentifier, 
     """
     hint = "name another file with `--state`, or remove this one"
     try:
-        body = json.loads(read_text(path))
+        body = read_json(read_text(path))
         if not isinstance(body, dict) or body.get("schema") != SCHEMA:
             raise ArtifactError(f"`{path}` is no state of `sysid live`", found=f"no `schema: {SCHEMA}`", hint=hint)
+        check(body, STATE)
         identifier = OnlineIdentifier.from_state(body["state"])
         if identifier.axis is axis:
             watch.recall(body["watch"], axis)
-    except (ValueError, KeyError, TypeError, DataError) as error:
+    except (ValueError, DataError) as error:
         raise ArtifactError(f"`{path}` is no state of `sysid live`", found=str(error).splitlines()[0], hint=hint) from error
     if identifier.axis is not axis:
-        raise UsageError(f"`{path}` is of {identifier.axis.value}, not {axis.value}", found=str(body.get("source")), hint=hint)
-    return identifier, str(body.get("source", ""))
+        raise UsageError(f"`{path}` is of {identifier.axis.value}, not {axis.value}", found=body["source"], hint=hint)
+    return identifier, body["source"]

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import read_yaml, where_now
 from fieldsid.display import Brief
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import DataError, UsageError
@@ -26,6 +25,8 @@ from fieldsid.plant.laws.parameter_law import ParameterLaw
 from fieldsid.plant.points import EQUAL_SPEED_SHARE, Point, check_authority, distinct_speeds, of_known_sign, points_of
 from fieldsid.plant.table import read_table
 from fieldsid.plant.yaw_plant import EXPONENT
+from fieldsid.records.named_inputs import where_now
+from fieldsid.records.reading import read_yaml
 from fieldsid.rounding import nine_digits
 
 MAX_PROPOSALS = 40
@@ -333,11 +334,11 @@ def _is_fit(body: Mapping[str, Any]) -> bool:
     return str(body.get("schema", "")).startswith(f"{FIT_KIND}/")
 
 
-def logs_of(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Return the logs that model files, or a fit file's models, name as what they were made from, each once."""
+def logs_of(paths: Sequence[Path]) -> tuple[tuple[str, Path | None], ...]:
+    """Return the logs that model files, or a fit file's models, name as what they were made from, and where each is now."""
     bodies = [(p, read_yaml(p)) for p in paths]
     records = [(p, r) for p, b in bodies for r in ([m["record"] for m in b["models"]] if _is_fit(b) else [b])]
-    return tuple(dict.fromkeys(where_now(i, p) for p, r in records for i in r.get("inputs", [])))
+    return tuple(dict.fromkeys((str(i["path"]), where_now(i, p)) for p, r in records for i in r.get("inputs") or ()))
 
 
 def _with_laws(

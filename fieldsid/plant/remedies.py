@@ -7,10 +7,10 @@ from math import ceil, degrees
 from shlex import quote
 
 from fieldsid.angles import FIN
-from fieldsid.artifacts import inputs_of
 from fieldsid.dynamics.free_run import LIMITING_EFFECT
 from fieldsid.models.axis import NAMES
 from fieldsid.plant.parameter_source import ParameterSource, logs_of
+from fieldsid.records.named_inputs import inputs_of
 
 USUAL_FIN_DEG = 15.0
 
@@ -25,7 +25,8 @@ def wider_fin(option: str, needed: float, source: ParameterSource) -> str:
         return f"the models' runs had the fin at up to {flown:.4g} rad: `{option} {flown:.4g}`"
     if needed <= FIN:
         return f"trim the fin: a limit has to be above {needed:.4g} rad, {degrees(needed):.1f} deg"
-    names, runs = NAMES[source.axis], " ".join(quote(str(p)) for p in logs_of(source.paths)) if source.models else ""
+    names, logs = NAMES[source.axis], logs_of(source.paths) if source.models else ()
+    runs = " ".join(quote(str(now or named)) for named, now in logs)
     if not source.models:
         return f"no fin is trimmed that far: check unit and sign of `{names.trim}` and `{names.authority}` in the table"
     return (

@@ -10,6 +10,7 @@ from fieldsid.trial_folder.state import LOG, RUN, FolderState, Item, Source
 
 FEW = 3
 """Files of one folder up to which each is named with its folder."""
+NOT_HASHED = "too large"
 HASH = 8
 """Characters of a SHA-256 that are shown."""
 
@@ -19,7 +20,7 @@ def lineage_rows(state: FolderState) -> list[dict[str, str]]:
     hashes = Hashes(state.folder, state.entries)
     used = {_name(s, state) for run in state.of_kind(RUN) for s in run.sources}
     items = [i for i in state.items if not (i.kind == LOG and i.path in used)]
-    now = {i.path: hashes.stamp(state.place(i)).sha256 for i in items}
+    now = {i.path: hashes.of_named(state.place(i)) or NOT_HASHED for i in items}
     return [_row(i, state, now) for i in items]
 
 

@@ -15,6 +15,8 @@ from fieldsid.logs import Run, load_run
 from fieldsid.logs.segments import may_show
 from fieldsid.models.model import Model, load_model
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
+from fieldsid.records.check import ShapeError, check
+from fieldsid.records.kinds import DRAWN_DIAGNOSIS
 from fieldsid.trial_folder.next_step import chosen_models, next_step, single_models
 from fieldsid.trial_folder.state import MODEL, RUN, FolderState, Item
 from fieldsid.vehicle import Vehicle, find_vehicle
@@ -69,7 +71,7 @@ def material_of(state: FolderState) -> Material:
         raise UsageError(
             f"there is nothing to report in `{state.folder}`", found=found, hint="begin with `sysid import LOG -o runs/`"
         )
-    skipped: list[str] = []
+    skipped = list(state.unreadable)
     vehicle = find_vehicle(state.folder)
     runs = _runs(state, vehicle, skipped)
     axes = tuple(a for axis in ("yaw", "pitch") if (a := _axis(state, axis, runs, skipped)) is not None)
@@ -117,23 +119,38 @@ def _axis(state: FolderState, axis: str, runs: Sequence[Run], skipped: list[str]
     best = chosen_models(state, axis)
     if not best:
         return None
-    line = history_of(state.folder / best[0]) if len(best) == 1 else ()
+    line = _line(state.folder / best[0], skipped) if len(best) == 1 else ()
     ancestors = [g.path for g in reversed(line[:-1]) if g.state != "missing"]
     paths = [*(state.folder / b for b in best), *ancestors][:MOST_MODELS]
     if len(best) > MOST_MODELS:
         skipped.append(f"{len(best) - MOST_MODELS} of {len(best)} {axis} models are not drawn")
     singles = [state.folder / p for p in single_models(state, axis)]
+    shown = tuple(s for p in paths if (s := _shown(state, p, runs, skipped)) is not None)
+    if not shown:
+        return None
     return AxisMaterial(
         axis,
-        tuple(_shown(state, p, runs, skipped) for p in paths),
+        shown,
         line,
         _source(singles if len(singles) > 1 else [state.folder / b for b in best], skipped),
-        *(_last(state, kind, axis) for kind in ("diagnosis", "turn-radius", "schedule")),
+        *(_last(state, kind, axis, skipped) for kind in ("diagnosis", "turn-radius", "schedule")),
     )
 
 
-def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown:
-    model = load_model(path)
+def _line(path: Path, skipped: list[str]) -> tuple[Generation, ...]:
+    try:
+        return history_of(path)
+    except FieldsidError as error:
+        skipped.append(f"no history of {path.name}: {error.what}")
+        return ()
+
+
+def _shown(state: FolderState, path: Path, runs: Sequence[Run], skipped: list[str]) -> Shown | None:
+    try:
+        model = load_model(path)
+    except FieldsidError as error:
+        skipped.append(f"{path.name}: {error.what}; {error.found}")
+        return None
     mine, found = [run for run in runs if may_show(run, model.axis)], []
     for run in mine:
         try:
@@ -153,10 +170,19 @@ def _source(paths: Sequence[Path], skipped: list[str]) -> ParameterSource | None
         return None
 
 
-def _last(state: FolderState, kind: str, axis: str) -> Item | None:
-    """Return the newest file of a kind for an axis; a turning radius is that of the yaw."""
-    items = [i for i in state.of_kind(kind) if _axis_of(i) == axis]
+def _last(state: FolderState, kind: str, axis: str, skipped: list[str]) -> Item | None:
+    """Return the newest file of a kind for an axis that says enough to be drawn; a turning radius is that of the yaw."""
+    items = [i for i in state.of_kind(kind) if _axis_of(i) == axis and _is_complete(i, skipped)]
     return max(items, key=lambda i: state.place(i).stat().st_mtime_ns, default=None)
+
+
+def _is_complete(item: Item, skipped: list[str]) -> bool:
+    try:
+        check(item.body, DRAWN_DIAGNOSIS if item.kind == "diagnosis" else {})
+    except ShapeError as error:
+        skipped.append(f"{item.path}: {error}")
+        return False
+    return True
 
 
 def _axis_of(item: Item) -> Any:

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import sha256_of
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import Note, Run
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.runtime.lockstep import parallel_map
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.design import PROPORTIONAL, Wish, check_wish, design_gains

@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, save_record
+from fieldsid.artifacts import save_record
 from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import Axis
-from fieldsid.models.model import finite_number
-from fieldsid.schedule.controller import KINDS, Gains
+from fieldsid.records.check import ShapeError
+from fieldsid.records.reading import load_record
+from fieldsid.schedule.controller import Gains
 
 KIND = "fieldsid/schedule"
 COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad", "depth_gain", "supported")
@@ -147,67 +148,42 @@ def load_schedule(path: Path) -> Schedule:
         body = load_record(path, KIND)
     try:
         rows = tuple(_row(r) for r in body["rows"])
-        first = rows[0]
-        _refuse_falling(rows)
-        return Schedule(
-            axis=Axis(body["axis"]),
-            kind=_controller(body["controller"]),
-            damping=float(body["damping_ratio"]),
-            phase_margin_deg=float(body["phase_margin_wanted_deg"]),
-            depth=bool(body["depth"]),
-            rows=(first, *rows[1:]),
-            actuator=_limits(body["actuator"]),
-            provenance=_provenance(body),
-            stated=_limits(body["stated"]),
-            notes=tuple(Note(str(n["code"]), str(n["message"])) for n in body.get("warnings", ())),
-        )
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        _check_rows(rows)
+    except ShapeError as error:
         raise ArtifactError(
-            f"`{path}` is not a complete schedule",
-            found=f"{type(error).__name__}: {error}",
-            hint="design it again, with `--force`",
+            f"`{path}` is not a complete schedule", found=str(error), hint="design it again, with `--force`"
         ) from error
+    return Schedule(
+        axis=Axis(body["axis"]),
+        kind=body["controller"],
+        damping=float(body["damping_ratio"]),
+        phase_margin_deg=float(body["phase_margin_wanted_deg"]),
+        depth=body["depth"],
+        rows=rows,
+        actuator=dict(body["actuator"]),
+        provenance={**body["provenance"], "inputs": body.get("inputs", [])},
+        stated=dict(body["stated"]),
+        notes=tuple(Note(n["code"], n["message"]) for n in body.get("warnings", ())),
+    )
 
 
-def _controller(kind: object) -> str:
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise ValueError(f"`controller` is none of {', '.join(KINDS)}")
-    return kind
-
-
-def _refuse_falling(rows: Sequence[Row]) -> None:
+def _check_rows(rows: Sequence[Row]) -> None:
+    """Raise ShapeError where there is no row, their speeds do not rise, or the fin would turn one way here, the other there."""
+    if not rows:
+        raise ShapeError("`rows` is empty: no gains at any speed")
     if any(b.speed <= a.speed for a, b in pairwise(rows)):
-        raise ValueError(f"the speeds do not rise: {', '.join(f'{r.speed:g}' for r in rows)}")
+        raise ShapeError(f"the speeds do not rise: {', '.join(f'{r.speed:g}' for r in rows)}")
+    if min(r.gains.kp for r in rows) * max(r.gains.kp for r in rows) <= 0.0:
+        raise ShapeError(f"`kp` is zero or changes its sign: {', '.join(f'{r.gains.kp:g}' for r in rows)}")
 
 
 def _row(r: Mapping[str, Any]) -> Row:
     def margin(name: str) -> float:
         return float("inf") if r[name] is None else float(r[name])
 
-    def number(name: str) -> float:
-        return finite_number(r[name], name)
-
-    speed, gains = number("speed_m_s"), Gains(number("kp"), number("ki"), number("kd"))
-    if speed <= 0.0:
-        raise ValueError(f"speed_m_s = {speed:g} is not above zero")
     return Row(
-        speed, gains, number("feed_forward_rad"), number("reference_gain"), number("fin_limit_rad"),
-        number("depth_gain"), bool(r["supported"]), number("slowed"), margin("phase_margin_deg"), margin("gain_margin_db"),
-        margin("delay_margin_s"), number("draws_held"), margin("settling_s"),
+        float(r["speed_m_s"]), Gains(float(r["kp"]), float(r["ki"]), float(r["kd"])), float(r["feed_forward_rad"]),
+        float(r["reference_gain"]), float(r["fin_limit_rad"]), float(r["depth_gain"]), r["supported"], float(r["slowed"]),
+        margin("phase_margin_deg"), margin("gain_margin_db"), margin("delay_margin_s"), float(r["draws_held"]),
+        margin("settling_s"),
     )  # fmt: skip
-
-
-def _limits(body: Mapping[str, Any]) -> dict[str, float | None]:
-    return {str(name): None if value is None else finite_number(value, name) for name, value in body.items()}
-
-
-def _provenance(body: Mapping[str, Any]) -> dict[str, Any]:
-    """Return where a schedule came from, as an export writes it: files with their SHA-256, speeds and runs."""
-    said = dict(body["provenance"])
-    files = [{**m, "path": str(m["path"]), "sha256": str(m["sha256"])} for m in said.get("models", [])]
-    runs = [str(r) for r in said.get("runs", [])]
-    inputs = [{**i, "path": str(i["path"])} for i in body.get("inputs", [])]
-    if "supported_m_s" in said:
-        low, high = said["supported_m_s"]
-        said["supported_m_s"] = [finite_number(low, "supported_m_s"), finite_number(high, "supported_m_s")]
-    return {**said, "models": files, "runs": runs, "inputs": inputs}

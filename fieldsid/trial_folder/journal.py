@@ -7,19 +7,43 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from fieldsid._version import __version__
-from fieldsid.artifacts import sha256_of
 from fieldsid.display import Brief
+from fieldsid.errors import shortened
+from fieldsid.records.check import Shape, ShapeError, check, number, text, whole
+from fieldsid.records.named_inputs import sha256_of, sha256_of_named
+from fieldsid.records.reading import read_json
 
 JOURNAL = "journal.jsonl"
 SCHEMA = "fieldsid/journal/1"
 GROUPS = (("schedule",), ("effects",))
 """First words of commands whose second word says which of several they are."""
+LARGEST = 32 << 20
+"""Bytes of a journal that are read: those of some 30,000 commands."""
+STAMP = {"path": text, "sha256": text, "size": whole, "modified_ns": whole}
+SHAPE: Shape = {
+    "schema": text,
+    "time": text,
+    "command": [text],
+    "exit": whole,
+    "seconds": number(),
+    "verdict": text,
+    "inputs": [STAMP],
+    "outputs": [STAMP],
+    "named": [text],
+}
+"""What a line of the journal holds."""
+_OF_FOLDER = -1
+"""Stands for the bytes of a folder: the hash that the journal has of one is not believed, for its files may be others by now."""
+_ODD = re.compile("[\ud800-\udfff]")
+"""What Python makes of the bytes of a name that is no UTF-8: written by its number, for a line has to be text."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -55,34 +79,47 @@ class Entry(Brief):
 
 
 def is_trial(folder: Path) -> bool:
-    """Whether a folder is that of a trial: it holds a journal."""
-    return (folder / JOURNAL).is_file()
+    """Whether a folder is that of a trial: it holds a journal, which is a file of its own and no link to another."""
+    return (folder / JOURNAL).is_file() and not is_linked(folder)
+
+
+def is_linked(folder: Path) -> bool:
+    """Whether what would be the journal of a folder is a symbolic link: it is neither read nor written, wherever it leads."""
+    return (folder / JOURNAL).is_symlink()
 
 
 def append(folder: Path, entry: Entry) -> None:
-    """Add one line to the journal of a folder, which makes it that of a trial."""
+    """Add one line to the journal of a folder, which makes it that of a trial; raises OSError where it is a link."""
     body = {"schema": SCHEMA, "tool": f"fieldsid {__version__}", **asdict(entry)}
-    path = folder / JOURNAL
-    with path.open("ab+") as stream:
-        cut = stream.seek(0, os.SEEK_END) > 0 and _last_byte(path) != b"\n"
-        stream.write((b"\n" if cut else b"") + json.dumps(body, ensure_ascii=False).encode() + b"\n")
+    line = _ODD.sub(lambda found: f"\\\\u{ord(found[0]):04x}", json.dumps(body, ensure_ascii=False))
+    with open(folder / JOURNAL, "ab+", opener=_no_link) as stream:
+        cut = stream.seek(0, os.SEEK_END) > 0 and _last_byte(stream) != b"\n"
+        stream.write((b"\n" if cut else b"") + line.encode() + b"\n")
         stream.flush()
         os.fsync(stream.fileno())
 
 
 def read(folder: Path) -> tuple[tuple[Entry, ...], int]:
-    """Return the entries of a folder's journal, the oldest first, and how many of its lines are none."""
-    path = folder / JOURNAL
-    if not path.is_file():
+    """Return the entries of a folder's journal, the oldest first, and how many of its lines are none.
+
+    Of a journal beyond LARGEST bytes the newest are read.
+    """
+    if not is_trial(folder):
         return (), 0
     found: list[Entry] = []
     broken = 0
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        try:
-            found.append(_entry(json.loads(line)))
-        except (ValueError, KeyError, TypeError):
-            broken += bool(line.strip())
+    with open(folder / JOURNAL, "rb", opener=_no_link) as stream:
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - LARGEST))
+        for line in stream.read(LARGEST).split(b"\n"):
+            try:
+                found.append(_entry(read_json(line)))
+            except (ValueError, OverflowError):
+                broken += bool(line.strip())
     return tuple(found), broken
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
 class Hashes:
@@ -91,14 +128,23 @@ class Hashes:
     def __init__(self, folder: Path, entries: Iterable[Entry]) -> None:
         self._folder = folder.resolve()
         stamps = (s for e in entries for s in (*e.inputs, *e.outputs))
-        self._known = {(s.path, s.size, s.modified_ns): s.sha256 for s in stamps}
+        self._known: dict[tuple[str, int, int], str | None] = {(s.path, s.size, s.modified_ns): s.sha256 for s in stamps}
 
     def stamp(self, path: Path) -> Stamp:
-        """Return a file or folder as it is now."""
+        """Return a file or folder as it is now, however large it is."""
         name, is_folder, state = relative_to(path, self._folder), path.is_dir(), path.stat()
         size = 0 if is_folder else state.st_size
         known = None if is_folder else self._known.get((name, size, state.st_mtime_ns))
         return Stamp(name, known or sha256_of(path), size, state.st_mtime_ns)
+
+    def of_named(self, path: Path) -> str | None:
+        """Return the SHA-256 of what a record or the folder names, from the journal or as far as it is hashed; else None."""
+        state = path.stat()
+        size = _OF_FOLDER if path.is_dir() else state.st_size
+        key = (relative_to(path, self._folder), size, state.st_mtime_ns)
+        if key not in self._known:
+            self._known[key] = sha256_of_named(path)
+        return self._known[key]
 
 
 def relative_to(path: Path, folder: Path) -> str:
@@ -113,17 +159,17 @@ def made_by(entries: Sequence[Entry], path: str) -> Entry | None:
     return next((e for e in reversed(entries) if any(s.path == path for s in e.outputs)), None)
 
 
-def _entry(body: Mapping[str, Any]) -> Entry:
-    if not str(body["schema"]).startswith("fieldsid/journal/"):
-        raise ValueError(body["schema"])
-    ins, outs = (tuple(Stamp(**s) for s in body[k]) for k in ("inputs", "outputs"))
-    words, named = (tuple(str(w) for w in body[k]) for k in ("command", "named"))
-    return Entry(
-        str(body["time"]), words, int(body["exit"]), float(body["seconds"]), str(body["verdict"]), ins, outs, named
-    )  # fmt: skip
+def _entry(body: Any) -> Entry:
+    """Return the entry of a line; raises ValueError where it is none, OverflowError for a time that cannot be."""
+    check(body, SHAPE)
+    datetime.fromisoformat(body["time"]).astimezone()
+    if not body["schema"].startswith("fieldsid/journal/") or len(body["command"]) < 2:
+        raise ShapeError(f"`schema` is {shortened(body['schema'])}, or no command is named")
+    ins, outs = (tuple(Stamp(**{f: s[f] for f in STAMP}) for s in body[k]) for k in ("inputs", "outputs"))
+    words, named = tuple(body["command"]), tuple(body["named"])
+    return Entry(body["time"], words, body["exit"], float(body["seconds"]), body["verdict"], ins, outs, named)
 
 
-def _last_byte(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        stream.seek(-1, os.SEEK_END)
-        return stream.read(1)
+def _last_byte(stream: BinaryIO) -> bytes:
+    stream.seek(-1, os.SEEK_END)
+    return stream.read(1)

@@ -9,10 +9,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from fieldsid.artifacts import sha256_of
 from fieldsid.comparison.sufficient import is_noise, pooled_over_noise
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.rounding import MANY
 from fieldsid.trial_folder.journal import Entry, is_trial, made_by
 from fieldsid.trial_folder.make import LOGS, RUNS

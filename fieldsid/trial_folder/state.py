@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fieldsid.artifacts import read_yaml
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
 from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
+from fieldsid.records.named_inputs import beside
+from fieldsid.records.reading import check_kind, read_json, read_yaml
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
 from fieldsid.trial_folder.make import RUNS
 
@@ -52,12 +52,16 @@ class Item(Brief):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class FolderState(Brief):
-    """A folder with its files in order, the journal's entries, and how many of its lines could not be read."""
+    """A folder with its files in order, the journal's entries, and how many of its lines could not be read.
+
+    `unreadable` says of each file of this program that is not among the items why it cannot be read.
+    """
 
     folder: Path
     items: tuple[Item, ...]
     entries: tuple[Entry, ...]
     broken_lines: int
+    unreadable: tuple[str, ...] = ()
 
     def of_kind(self, kind: str) -> tuple[Item, ...]:
         """Return the files of one kind."""
@@ -80,12 +84,13 @@ def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
     entries, broken = read(folder)
     hashes = Hashes(folder, entries)
     wanted = None if files is None else {p.resolve() for p in files}
-    found = (i for i in _items(folder) if wanted is None or (folder / i.path).resolve() in wanted)
+    unreadable: list[str] = []
+    found = (i for i in _items(folder, unreadable) if wanted is None or (folder / i.path).resolve() in wanted)
     items = {i.path: replace(i, kind=SIMULATED) if _is_simulated(i, entries) else i for i in found}
     done: dict[str, Item] = {}
     for path in items:
         _judge(path, items, done, hashes, folder)
-    return FolderState(folder, tuple(done[p] for p in items), entries, broken)
+    return FolderState(folder, tuple(done[p] for p in items), entries, broken, tuple(unreadable))
 
 
 def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
@@ -94,23 +99,26 @@ def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
     return maker is not None and maker.command[1:2] == ("simulate",)
 
 
-def _items(folder: Path) -> Iterator[Item]:
+def _items(folder: Path, unreadable: list[str]) -> Iterator[Item]:
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)
         if not path.is_file() or path.name == JOURNAL or any(p.startswith(".") for p in inside.parts):
             continue
-        item = _item(path, inside.as_posix(), folder)
+        try:
+            item = _item(path, inside.as_posix(), folder)
+        except ArtifactError as error:
+            unreadable.append(f"{inside.as_posix()}: {error.found}")
+            continue
         if item is not None:
             yield item
 
 
 def _item(path: Path, name: str, folder: Path) -> Item | None:
     if path.name.endswith(".parquet") and (head := _run_head(path)) is not None:
-        notes = head.get("notes") or ()
-        made = any(note.get("code") == SIMULATED for note in notes)
-        told = [n["data"] for n in notes if n.get("code") in OF_LIMITS and "reach_rad" in (n.get("data") or {})]
-        fins = {str(d["signal"]): float(d["reach_rad"]) for d in told}
-        return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs"), folder), fins=fins)
+        made = any(note["code"] == SIMULATED for note in head["notes"])
+        told = [n["data"] for n in head["notes"] if n["code"] in OF_LIMITS and "reach_rad" in n["data"]]
+        fins = {str(d.get("signal")): float(d["reach_rad"]) for d in told}
+        return Item(name, SIMULATED if made else RUN, _sources(head.get("inputs") or (), folder), fins=fins)
     kind = own_kind(path) if path.suffix in (".yaml", ".yml") else None
     if kind is not None:
         return _own(path, name, kind, folder)
@@ -121,23 +129,30 @@ def _item(path: Path, name: str, folder: Path) -> Item | None:
     return Item(name, RUN if name.startswith(f"{RUNS}/") else LOG)
 
 
-def _own(path: Path, name: str, kind: str, folder: Path) -> Item | None:
-    try:
-        body = read_yaml(path)
-    except ArtifactError:  # who uses it says why it cannot be read
-        return None
-    parent = body.get("parent")
-    both = [*(body.get("inputs") or ()), *([parent] if isinstance(parent, dict) else [])]
-    return Item(name, kind, () if kind in SETTINGS else _sources(both, folder), body=body)
+def _own(path: Path, name: str, kind: str, folder: Path) -> Item:
+    """Return the item of a file of this program; raises ArtifactError where it cannot be read, or is not what its kind is."""
+    if kind in SETTINGS:  # who uses it says what is wrong with it
+        return Item(name, kind)
+    body = read_yaml(path)
+    check_kind(body, f"fieldsid/{kind}", path)
+    return Item(name, kind, _sources([*(body.get("inputs") or ()), *_parent(body)], folder), body=body)
+
+
+def _parent(body: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [] if body.get("parent") is None else [body["parent"]]
 
 
 def _run_head(path: Path) -> Mapping[str, Any] | None:
+    """Return what a run of ours keeps beside its columns, None for another table; raises ArtifactError where that is spoilt."""
     try:
         metadata = import_module("pyarrow.parquet").read_schema(path).metadata or {}
-        body = json.loads(metadata.get(METADATA_KEY, b"null"))
+        body = read_json(metadata.get(METADATA_KEY, b"null"))
     except (OSError, ValueError):
         return None
-    return body if isinstance(body, dict) and str(body.get("schema", "")).startswith("fieldsid/run/") else None
+    if not isinstance(body, dict) or not str(body.get("schema", "")).startswith("fieldsid/run/"):
+        return None
+    check_kind(body, "fieldsid/run", path)
+    return body
 
 
 def _is_log(path: Path) -> bool:
@@ -156,21 +171,24 @@ def _is_planned(path: Path) -> bool:
     return path.name.startswith("leg") and plan.is_file() and own_kind(plan) == "plan"
 
 
-def _sources(named: Any, folder: Path) -> tuple[Source, ...]:
-    entries = [e for e in named or () if isinstance(e, dict) and "path" in e]
-    return tuple(Source(str(e["path"]), _found(str(e["path"]), folder), str(e.get("sha256", ""))) for e in entries)
+def _sources(named: Sequence[Mapping[str, Any]], folder: Path) -> tuple[Source, ...]:
+    return tuple(Source(e["path"], _found(e["path"], folder), e["sha256"]) for e in named)
 
 
 def _found(named: str, folder: Path) -> Path | None:
     """Return where a file is that was named from the folder, from the one above it, or from where the program runs."""
     # the folder above the working folder, "." as a rule, is none of its path
-    places = (folder / named, folder.resolve().parent / named, Path(named))
-    return next((p.resolve() for p in places if p.exists()), None)
+    there = beside((folder / named, folder.resolve().parent / named, Path(named)), folder.resolve())
+    return None if there is None else there.resolve()
+
+
+def _unknown(source: Source) -> str:
+    """Return how an input is told of which nothing is known."""
+    return source.named if source.path is None else f"{source.named} (too large to be hashed)"
 
 
 def _parents(item: Item, folder: Path) -> tuple[Source, ...]:
-    parent = _body(item).get("parent")
-    return _sources([parent] if isinstance(parent, dict) else [], folder)
+    return _sources(_parent(_body(item)), folder)
 
 
 def _body(item: Item) -> Mapping[str, Any]:
@@ -182,13 +200,14 @@ def _judge(path: str, items: Mapping[str, Item], done: dict[str, Item], hashes: 
     if path in done:
         return done[path]
     item = done[path] = items[path]  # a file that names itself ends here
-    missing = tuple(s.named for s in item.sources if s.path is None)
+    now = {s: hashes.of_named(s.path) for s in item.sources if s.path is not None and s.sha256}
+    missing = tuple(_unknown(s) for s in item.sources if s.path is None or (s in now and now[s] is None))
     because = ""
     for source in item.sources:
         if source.path is None or because:
             continue
         name = relative_to(source.path, folder)
-        if source.sha256 and hashes.stamp(source.path).sha256 != source.sha256:
+        if now.get(source) not in (None, source.sha256):
             because = f"{name} has changed"
         elif name in items and _judge(name, items, done, hashes, folder).stale:
             because = f"{name} is stale"

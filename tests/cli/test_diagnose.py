@@ -7,12 +7,12 @@ import pytest
 from cli import trial
 from in_time import in_time
 
-from fieldsid.artifacts import load_record
 from fieldsid.effects import forget_effects
 from fieldsid.logs import save_run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.planning.discriminate.rivals import rivals_from
+from fieldsid.records.reading import load_record
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,9 @@ import hidden_lag
 import pytest
 from cli import trial
 
-from fieldsid.artifacts import load_record, sha256_of
 from fieldsid.models.model import load_model
+from fieldsid.records.named_inputs import sha256_of
+from fieldsid.records.reading import load_record
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from bags import MAPPING, write_bag
 
-from fieldsid.artifacts import sha256_of, to_yaml
+from fieldsid.artifacts import to_yaml
 from fieldsid.logs import Run, load_run, save_run
+from fieldsid.records.named_inputs import sha256_of
 
 TIME = np.arange(400) / 20
 SIGNALS = {

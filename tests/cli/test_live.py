@@ -85,10 +85,18 @@ def test_lines_on_standard_input_are_taken(run_cli, tmp_path, monkeypatch):
         json.dumps({"time_s": t, "rudder_rad": d, "yaw_rad": y, "yaw_rate_rad_s": r})
         for t, d, y, r in zip(log.time, log["rudder_rad"], log["yaw_rad"], log["yaw_rate_rad_s"], strict=True)
     ]
-    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(["rubbish", *lines])))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(["rubbish", *lines]).encode())))
     last = looks(run_cli("live", "-", "--axis", "yaw", "--json"))[-1]
     assert last["counts"]["unreadable"] == 1
     assert last["samples"] > 0.9 * len(lines)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"\xff\n" + b"9" * 100_000 + b"\n" + "\n".join(lines).encode())))
+    assert "2 lines could not be read" in run_cli("live", "-", "--axis", "yaw").out
+
+
+def test_what_cannot_be_read_is_counted_where_nothing_follows_it(run_cli, monkeypatch):
+    raw = b'{"time_s": 1, "rudder_rad": 0.1}\n\xff\n' + b"9" * 100_000
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(raw)))
+    assert looks(run_cli("live", "-", "--axis", "yaw", "--json"))[-1]["counts"]["unreadable"] == 2
 
 
 def test_the_goal_is_what_a_plan_promised(run_cli, tmp_path):
@@ -136,7 +144,7 @@ def test_a_narrow_terminal_shows_every_name_and_goal(width, has_band):
         "said": "enough data, come up", "verdict": "enough", "axis": "yaw", "samples": 644, "speed_m_s": 1.8,
         "goals_from": "`--want`", "parameters": {"a22": known, "b2": known}, "share": 1.0,
         "excitation": {"fin_rms_rad": 0.1, "rate_rms_rad_s": 0.1},
-        "counts": {},
+        "counts": {"unreadable": 0},
     }  # fmt: skip
     to = Console(width=width, file=io.StringIO())
     to.print(screen(body))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from cli import trial
 
-from fieldsid.artifacts import load_record
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.effects import forget_effects
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model, save_model
 from fieldsid.planning.discriminate.rivals import rivals_named
+from fieldsid.records.reading import load_record
 
 PULL = (
     "# drag of a towed line\nname: pull\naxes: [yaw]\nmoment: '-pull_k * rate * abs(rate)'\n"

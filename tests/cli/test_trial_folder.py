@@ -15,6 +15,7 @@ import pytest
 import yaml
 from cli import trial
 
+from fieldsid.artifacts import to_yaml
 from fieldsid.cli.headlines.typed import pasted
 from fieldsid.cli.trial.filled import FILLS
 from fieldsid.cli.trial.parsed import parse
@@ -475,7 +476,12 @@ def test_gains_of_a_model_that_was_extended_since_are_designed_again_verified_ag
     assert run_cli("identify", "--axis", "yaw", "--joint", "--no-figures").code == 0
     diagnosis(folder, ("pulses_1.0", "pulses_1.4"), effects=())
     made_of = f"inputs:\n- path: models/joint_yaw.yaml\n  sha256: {stamped(folder, 'models/joint_yaw.yaml')}\n"
-    (folder / "gains.yaml").write_text(f"schema: fieldsid/schedule/1\n{made_of}")
+    row = {"speed_m_s": 1.0, "kp": -0.5, "ki": 0.0, "kd": -0.2, "feed_forward_rad": 0.0, "reference_gain": 0.0, "depth_gain": 0.0,
+           "fin_limit_rad": 0.3, "supported": True, "slowed": 1.0, "phase_margin_deg": 60.0, "gain_margin_db": None,
+           "delay_margin_s": 1.0, "draws_held": 1.0, "settling_s": 4.0}  # fmt: skip
+    gains = {"axis": "yaw", "controller": "pd", "damping_ratio": 0.7, "phase_margin_wanted_deg": 45.0, "depth": False,
+             "actuator": {}, "stated": {}, "rows": [row], "provenance": {}}  # fmt: skip
+    (folder / "gains.yaml").write_text(f"schema: fieldsid/schedule/1\n{made_of}{to_yaml(gains)}")
     entries = iter(range(1, 9))
 
     def done(*command, inputs=(), outputs=()):

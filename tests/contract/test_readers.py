@@ -9,12 +9,12 @@ import pytest
 from bags import MAPPING, write_bag
 from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 
-from fieldsid.artifacts import sha256_of
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs import Run, load_run, save_run
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import PACKAGE, RawLog, ReadOptions, reader_of
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.registry import members
 
 READERS = tuple(members(PACKAGE, "READER").values())

@@ -24,10 +24,10 @@ if __name__ == "__main__":
 import numpy as np
 from cli import trial
 
-from fieldsid.artifacts import sha256_of
 from fieldsid.logs import load_run, save_run
 from fieldsid.models.model import load_model
 from fieldsid.plant.laws.axis_laws import load_laws
+from fieldsid.records.named_inputs import sha256_of
 from fieldsid.schedule.record import load_schedule
 
 SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM)

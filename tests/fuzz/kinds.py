@@ -22,12 +22,14 @@ from fuzz.mutate import (
     spoil_bytes,
     spoil_column,
     spoil_heads,
+    spoil_json,
+    spoil_lines,
     spoil_names,
     spoil_parquet,
     spoil_sqlite,
     spoil_text,
     spoil_yaml,
-)  # fmt: skip
+)
 
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.cli.app import run as command
@@ -37,7 +39,21 @@ from fieldsid.logs.inspection import inspect_log
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import load_model, save_model
 from fieldsid.models.speed_law import SpeedLaw
+from fieldsid.online.identifier import OnlineIdentifier
+from fieldsid.online.look import look_body
+from fieldsid.online.progress import Watch, default_goals
+from fieldsid.online.samples import MessageReader, Sample, samples_of
+from fieldsid.online.sources import lines_of
+from fieldsid.online.state_file import load_state, save_state
+from fieldsid.plant.laws.axis_laws import load_laws
+from fieldsid.registry import members
+from fieldsid.reporting.material import material_of
+from fieldsid.reporting.page import html_of
+from fieldsid.reporting.sections import context_of
+from fieldsid.schedule.record import load_schedule
 from fieldsid.templates import template_path
+from fieldsid.trial_folder.journal import Entry, Stamp, append
+from fieldsid.trial_folder.state import state_of
 
 TIME = 0.05 * np.arange(120)
 SIGNALS = {
@@ -321,6 +337,19 @@ def shown(*words):
                 out.write(str(error))
         check_lines(out.getvalue())
 
+
+def in_a_trial(name, *, journal=False):
+    """Put a spoilt file into a trial of one model, as what its name says."""
+
+    def door(path):
+        folder = path.parent / "trial"
+        (folder / "models").mkdir(parents=True, exist_ok=True)
+        (folder / "models" / "m.yaml").write_bytes((good_files() / "m1.0.yaml").read_bytes())
+        if not journal:
+            (folder / "journal.jsonl").write_bytes(as_journal(path.parent).read_bytes())
+        (folder / name).write_bytes(path.read_bytes())
+        reported(folder, page=len(path.read_bytes()) % PAGES == 0)
+
     return door
 
 
@@ -340,7 +369,115 @@ def printed(path):
     check_lines(stream.getvalue())
 
 
+PAGES = 8
+"""Of so many files one's page is laid out too: compiling its template takes ten times as long as all else."""
+
+
+def reported(folder, *, page):
+    """Make all of a folder's report but the page's file; what to do next in it is a part of that."""
+    context = context_of(material_of(state_of(folder)))
+    if page:
+        html_of(context).encode()
+
+
+def as_journal(folder):
+    path = folder / "journal.jsonl"
+    path.unlink(missing_ok=True)
+    stamps = (Stamp("models/m.yaml", "0" * 64, 3000, 10**18), Stamp("runs/x.parquet", "1" * 64, 9000, 10**18))
+    for i, words in enumerate((("identify", "x"), ("diagnose", "x"), ("schedule", "verify", "gains.yaml"), ("report",))):
+        done = Entry(f"2026-05-01T10:0{i}:00+00:00", ("sysid", *words), 0, 1.5, "says so", stamps[:1], stamps, ("servo_lag",))
+        append(folder, done)
+    return path
+
+
+def as_diagnosis(folder):
+    errors = {
+        "train": {"angle_rms_rad": 0.016, "rate_rms_rad_s": 0.02},
+        "validation": {"angle_rms_rad": 0.01, "rate_rms_rad_s": None},
+    }
+    found = {"effect": "servo_lag", "probability": 0.97, "explained": 0.99, "log_evidence": 10.0, "worse": False, **errors}
+    body = {"schema": "fieldsid/diagnosis/1", "inputs": [{"path": "runs/x.parquet", "sha256": "a" * 64}], "parent": None,
+            "axis": "yaw", "verdict": "effect", "says": "so", "effects": ["servo_lag"], "base": errors, "noiseless": False,
+            "noise_floor": {"angle_rad": 0.005, "rate_rad_s": 0.003}, "candidates": [found, {**found, "effect": "delay"}],
+            "runs": ["x"], "validation_runs": ["y"]}  # fmt: skip
+    return written_yaml(folder / "diagnosis.yaml", body)
+
+
+def as_turns(folder):
+    row = {"speed_m_s": 1.0, "side": "port", "radius_m": 5.3, "interval95": [4.8, 5.9], "steady_radius_m": 5.3,
+           "u_turn_radius_m": 5.8,
+           "u_turn_time_s": 18.0, "yaw_rate_max_rad_s": 0.19, "extrapolated": False, "trust": "identified"}  # fmt: skip
+    rows = [{**row, "side": side, "speed_m_s": speed} for side in ("port", "starboard") for speed in (1.0, 1.8)]
+    return written_yaml(
+        folder / "turns.yaml", {"schema": "fieldsid/turn-radius/1", "inputs": [], "rudder_max_rad": 0.27, "rows": rows}
+    )
+
+
+def written_yaml(path, body):
+    path.write_text(to_yaml(body))
+    return path
+
+
+@cache
+def flown_state() -> str:
+    identifier, watch = OnlineIdentifier("yaw"), Watch(default_goals(Axis.YAW))
+    for sample in samples_of(load_run(good_files() / "flown.parquet"), Axis.YAW):
+        identifier.update(*sample[:-1], fin_is_held=sample.fin_is_held)
+        watch.excitation.hear(sample.time, sample.fin, sample.rate)
+        if sample.time % 1.0 < 0.02:
+            watch.look(identifier.estimate())
+    return save_state(good_files() / "state.json", identifier, watch, "flown.parquet").read_text()
+
+
+def as_state(folder):
+    path = folder / "state.json"
+    path.write_text(flown_state())
+    return path
+
+
+def state_read(path):
+    """Go on from a state with forty samples more, and keep it again."""
+    watch = Watch(default_goals(Axis.YAW))
+    identifier, source = load_state(path, Axis.YAW, watch)
+    begin = identifier.time if math.isfinite(identifier.time) else 0.0
+    feed(identifier, watch, [Sample(begin + 0.05 * i, 0.1, 0.01 * i, 0.2, 1.0) for i in range(1, 40)])
+    save_state(path, identifier, watch, source)
+
+
+def feed(identifier, watch, samples):
+    for sample in samples:
+        identifier.update(*sample[:-1], fin_is_held=sample.fin_is_held)
+        watch.excitation.hear(sample.time, sample.fin, sample.rate)
+    now = identifier.estimate()
+    json.dumps(look_body(now, watch.look(now), source="x", goals_from="y", unreadable=0, then=""), allow_nan=False)
+
+
+def as_messages(folder):
+    path = folder / "lines.jsonl"
+    rows = [{"time_s": round(0.05 * i, 3), "rudder_deg": 5.0 * (-1) ** (i // 20), "yaw_deg": 90.0 + i, "yaw_rate_rad_s": 0.1,
+             "surge_m_s": 1.2, "mode": "auto"} for i in range(80)]  # fmt: skip
+    path.write_text("\n".join(json.dumps(row) for row in rows) + "\n")
+    return path
+
+
+def messages_read(path):
+    """Take lines as live input, and keep the state they leave."""
+    watch, identifier = Watch(default_goals(Axis.YAW)), OnlineIdentifier("yaw")
+    with path.open("rb") as stream:
+        feed(identifier, watch, [s for s in lines_of(stream, MessageReader(Axis.YAW)) if s is not None])
+    save_state(path, identifier, watch, "-")
+
+
+def schedule_exported(path):
+    """Read a schedule, and write it for every vehicle."""
+    schedule = load_schedule(path)
+    schedule.at(1.3)
+    for target in members("fieldsid.exports", "EXPORT").values():
+        target.render(schedule, "", None)
+
+
 TABLE = (spoil_text, spoil_text, spoil_column, spoil_bytes)
+LINES = (spoil_lines, spoil_lines, spoil_lines, spoil_text, spoil_bytes)
 NODES = (spoil_yaml, spoil_yaml, spoil_yaml, spoil_text, spoil_bytes)
 LOG = (imported(None), inspected)
 BAG = (imported(MAPPING), inspected)
@@ -368,6 +505,15 @@ KINDS = (
     Kind("model", good("m1.0.yaml"), NODES, (model_read,)),
     Kind("law", good("law.yaml"), NODES, (law_read,)),
     Kind("schedule", good("gains.yaml"), NODES, (schedule_read,)),
+    Kind("schedule_exports", good("gains.yaml"), NODES, (schedule_exported,)),
+    Kind("journal", as_journal, LINES, (in_a_trial("journal.jsonl", journal=True),)),
+    Kind("diagnosis_record", as_diagnosis, NODES, (in_a_trial("diagnosis.yaml"),)),
+    Kind("turn_record", as_turns, NODES, (in_a_trial("turns.yaml"),)),
+    Kind("schedule_record", good("gains.yaml"), NODES, (in_a_trial("gains.yaml"),)),
+    Kind("model_record", good("m1.0.yaml"), NODES, (in_a_trial("models/m.yaml"),)),
+    Kind("law_record", good("law.yaml"), NODES, (in_a_trial("law.yaml"), load_laws)),
+    Kind("live_state", as_state, (spoil_json, spoil_json, spoil_json, spoil_text, spoil_bytes), (state_read,)),
+    Kind("live_input", as_messages, LINES, (messages_read,)),
     Kind("prior", good("prior.yaml"), NODES, (prior_read,)),
     Kind("export", good("gains.yaml"), (spoil_names,), (exported, shown("schedule", "export", "FILE", "--to", "moos"))),
     Kind("mission", as_plan, (spoil_names,), (flown_from_list,)),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import sqlite3
 import tempfile
 from collections.abc import Callable
 from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,7 @@ ODD_WORDS = (
 ODD_VALUES = (
     None, "", "x", "nan", -1, 0, 1, 2,
     1e308, -1e308, 1e-320, float("nan"), float("inf"), -float("inf"), True, False, [], {}, [[]],
+    10**400, 1e6, -1e9, "\u202e", "0.97", "no",
     [None], [1, 2, 3], {"a": 1}, {"value": None}, [{}], 10**30, "1.5", "yaw", "pitch", b"\x00\x01", "A" * 300, 3.5, [0.0] * 9,
 )  # fmt: skip
 
@@ -168,13 +171,42 @@ def _places(body):
 
 
 def spoil_yaml(data: bytes, random: np.random.Generator) -> bytes:
-    """Spoil nodes of a YAML file."""
-    yaml = YAML(typ="safe")
-    body = yaml.load(data.decode())
+    """Spoil nodes of a YAML file, written as a block or, most of the time, as JSON, which is YAML as well and done faster."""
+    body = deepcopy(_loaded(data))
     spoil_tree(body, random)
+    if random.random() < 0.7:
+        return json.dumps(body, default=str).encode()
     stream = io.BytesIO()
-    yaml.dump(body, stream)
+    YAML(typ="safe").dump(body, stream)
     return stream.getvalue()
+
+
+@lru_cache(maxsize=4)
+def _loaded(data: bytes) -> object:
+    return YAML(typ="safe").load(data.decode())
+
+
+def spoil_json(data: bytes, random: np.random.Generator) -> bytes:
+    """Spoil nodes of a JSON text."""
+    body = json.loads(data)
+    spoil_tree(body, random)
+    return json.dumps(body, default=str).encode()
+
+
+LONG_LINES = (b"[" * 20_000, b'{"a":' * 2_000, b"9" * 5_000, b"\xff" * 50, b'"\\ud800"', b"x" * 300_000, b"null", b"[]", b"{}")
+
+
+def spoil_lines(data: bytes, random: np.random.Generator) -> bytes:
+    """Spoil nodes of lines of JSON, or put a line that is none in their place."""
+    lines = data.split(b"\n")
+    for _ in range(int(random.integers(1, 4))):
+        at = int(random.integers(0, len(lines)))
+        if random.random() < 0.2:
+            lines[at] = LONG_LINES[int(random.integers(0, len(LONG_LINES)))]
+        elif lines[at].startswith(b"{"):
+            with contextlib.suppress(ValueError, RecursionError):
+                lines[at] = spoil_json(lines[at], random)
+    return b"\n".join(lines)
 
 
 def spoil_parquet(data: bytes, random: np.random.Generator) -> bytes:

@@ -13,7 +13,7 @@ import pytest
 from binary_logs import write_mat, write_ulog
 from fuzz.kinds import SIGNALS, TIME, as_radius_table, as_run, bag, good_files
 
-from fieldsid.artifacts import read_yaml, to_yaml
+from fieldsid.artifacts import to_yaml
 from fieldsid.cli.app import run as command
 from fieldsid.dynamics.free_run import effects_of
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, LogError, MappingError, ModelError
@@ -30,6 +30,7 @@ from fieldsid.models.model import load_model
 from fieldsid.models.record import record_of
 from fieldsid.planning.belief.prior_file import load_prior
 from fieldsid.plant.laws.axis_laws import carried_models, load_laws
+from fieldsid.records.reading import read_yaml
 from fieldsid.schedule.record import load_schedule
 
 

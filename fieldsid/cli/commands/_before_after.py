@@ -98,7 +98,8 @@ def _side(path: Path) -> Side:
 
 def _in_both(sides: Sequence[Side]) -> list[str]:
     """Return the logs that models of both sides were fitted to; raises UsageError where the models themselves are the same."""
-    from fieldsid.artifacts import read_yaml, sha256_of
+    from fieldsid.records.named_inputs import sha256_of
+    from fieldsid.records.reading import read_yaml
 
     files = [[p for names in s.files.values() for p in names] for s in sides]
     if {sha256_of(p) for p in files[0]} == {sha256_of(p) for p in files[1]}:
@@ -153,7 +154,7 @@ def _next(found: Change, sides: Sequence[Side]) -> str | None:
 
 
 def _runs(model: Path) -> list[str]:
-    from fieldsid.artifacts import inputs_of
+    from fieldsid.records.named_inputs import inputs_of
 
     return [str(p) for p in inputs_of(model)]
 

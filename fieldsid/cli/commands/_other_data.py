@@ -16,13 +16,13 @@ def fitted_to(path: Path, model: Model, runs: Iterable[Run]) -> frozenset[str]:
 
     By their hashes. Where the model's own log is gone, or of another format, its name is all there is to go by.
     """
-    from fieldsid.artifacts import inputs_of, sha256_of
     from fieldsid.logs.several.run_names import stem_of
+    from fieldsid.records.named_inputs import inputs_of, sha256_of, sha256_of_named
 
     own = {(stem_of(p), p.suffix): p for p in inputs_of(path)}
     pairs = [(r.name, r.source, own.get((stem_of(r.source), r.source.suffix))) for r in runs if r.source is not None]
     return frozenset(model.runs) - frozenset(
         name
         for name, here, there in pairs
-        if there is not None and here.is_file() and there.is_file() and sha256_of(here) != sha256_of(there)
+        if there is not None and here.is_file() and there.is_file() and sha256_of(here) != sha256_of_named(there)
     )

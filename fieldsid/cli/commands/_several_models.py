@@ -72,9 +72,9 @@ def several_models(
         "figures": figures,
         "skipped_runs": skips.records,
     }
-    from fieldsid.artifacts import inputs_of
     from fieldsid.cli.headlines.models import of_several
     from fieldsid.cli.inputs import files_of
+    from fieldsid.records.named_inputs import inputs_of
 
     headline = of_several(body, names, files_of(logs), inputs_of(Path(str(body["best"]))), close=CLOSE)
     notes = left_out(logs, models[0].axis)

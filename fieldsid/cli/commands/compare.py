@@ -114,9 +114,9 @@ def command(
         "skipped_runs": skips.records,
         "warnings": [{"code": n.code, "message": n.message} for n in notes],
     }
-    from fieldsid.artifacts import inputs_of
     from fieldsid.cli.headlines.models import of_compare
     from fieldsid.cli.inputs import files_of
+    from fieldsid.records.named_inputs import inputs_of
 
     headline = of_compare(body, files_of(logs), inputs_of(model))
     result = emit(body, as_json=as_json, render=lambda to: _render(to, entries, top), headline=headline, notes=notes)

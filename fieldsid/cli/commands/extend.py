@@ -147,10 +147,10 @@ def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], valid
 
 
 def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> dict[str, Any]:
-    from fieldsid.artifacts import sha256_of
     from fieldsid.effects import pick_effect
     from fieldsid.extension import gain_body, kept_by
     from fieldsid.models.effect import as_fitted
+    from fieldsid.records.named_inputs import sha256_of
 
     new = [c for n in found.gain.added for c in as_fitted(pick_effect(n), found.model.values).shared]
     return {

@@ -48,8 +48,8 @@ def command(
         "intact": all(g.state == "intact" and not (g.step and g.step.changed_data) for g in line),
         "figure": _drawn(line, model, figure, context, force=force),
     }
-    from fieldsid.artifacts import inputs_of
     from fieldsid.cli.headlines.models import of_history
+    from fieldsid.records.named_inputs import inputs_of
 
     headline = of_history(body, inputs_of(model))
     return emit(body, as_json=as_json, render=lambda to: _render(to, line, body), headline=headline, notes=_notes(line))

@@ -48,6 +48,8 @@ def _render(found: Inspection, console: Console) -> None:
     record: dict[str, Any] = found.record(None)
     rows = [(c["name"], c["type"], str(c["count"]), c["rate"], c["holds"]) for c in record["shown"]]
     console.print(table("", ("channel", "type", "samples", "Hz", "holds"), rows, left=2))
+    if record["more_channels"]:
+        console.print(f"and {record['more_channels']} more channels")
     console.print()
     console.print(words("mapping" + (" (canonical names, none is needed)" if found.needs_none else " (proposed)"), "bold"))
     for line in found.yaml().rstrip().split("\n"):

@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -20,6 +20,8 @@ from fieldsid.cli.voice import voice
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
+    from io import BufferedIOBase
+
     from fieldsid.online.identifier import OnlineIdentifier
     from fieldsid.online.progress import Goal, Watch
     from fieldsid.online.samples import MessageReader, Sample
@@ -207,7 +209,7 @@ class _Feed:
             self.reader = MessageReader(self.axis)
             if self.udp is not None:
                 return datagrams(self.udp, self.reader, idle_s=self.idle_s)
-            return lines_of(sys.stdin, self.reader)
+            return lines_of(cast("BufferedIOBase", sys.stdin.buffer), self.reader)
         if self.log is None or not self.follow:
             run = read_run(Path(str(self.log)), mapping=self.mapping)
             return replayed(run, self.axis, self.factor, after)
@@ -265,7 +267,7 @@ def _looks(
 
     from fieldsid.online.look import look_body
 
-    due, saved, fresh = -inf, clock.monotonic(), True
+    due, saved, fresh, unreadable = -inf, clock.monotonic(), True, 0
 
     def look() -> Mapping[str, Any]:
         now = identifier.estimate()
@@ -284,11 +286,11 @@ def _looks(
             if sample.time >= due or sample.time < due - 2.0 * every:
                 due = sample.time + every
                 yield look()
-                fresh = False
+                fresh, unreadable = False, feed.unreadable
             if state is not None and clock.monotonic() - saved >= SAVE_EVERY_S:
                 _save(state, identifier, watch, feed.name)
                 saved = clock.monotonic()
-    if fresh:
+    if fresh or feed.unreadable > unreadable:
         yield look()
 
 

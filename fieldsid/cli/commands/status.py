@@ -59,6 +59,7 @@ def command(folder: Folder = Path(), as_json: JsonFlag = False) -> Mapping[str, 
     state = state_of(folder)
     broken = f"{state.broken_lines} lines of the journal cannot be read"
     notes = [*([Note("journal", broken, {})] if state.broken_lines else []), *contradicted_limits(state)]
+    notes += [Note("unreadable", said, {}) for said in state.unreadable]
     why, line = next_step(state)
     if line and folder.resolve() != Path.cwd():
         line = f"cd {shlex.quote(str(folder))} && {line}"

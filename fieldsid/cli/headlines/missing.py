@@ -110,8 +110,9 @@ def _stem(log: Path) -> str:
 
 def _identified(runs: Sequence[Path], axis: str) -> Path | None:
     """Return a model without effects that was fitted to just these runs, in `models` here or beside them."""
-    from fieldsid.artifacts import inputs_of, read_yaml
     from fieldsid.logs.unknown_file import own_kind
+    from fieldsid.records.named_inputs import inputs_of
+    from fieldsid.records.reading import read_yaml
 
     wanted = {p.resolve() for p in runs}
     places = dict.fromkeys([Path(MODELS), *(p.parent.parent / MODELS for p in runs[:1])])

@@ -91,8 +91,8 @@ def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Head
 
 def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:
     """Return what to do with a model that does or does not follow its runs; one may leave more on those it was extended on."""
-    from fieldsid.artifacts import read_yaml
     from fieldsid.models.model import load_model
+    from fieldsid.records.reading import read_yaml
     from fieldsid.trial_folder.next_step import left_by
 
     more = fails or not is_noise(left_by(read_yaml(Path(model))))
@@ -110,8 +110,9 @@ def _searched(model: Path) -> bool:
 
     A model without effects is what a diagnosis of its own runs begins with, whether it is named there or not.
     """
-    from fieldsid.artifacts import inputs_of, read_yaml
     from fieldsid.logs.unknown_file import own_kind
+    from fieldsid.records.named_inputs import inputs_of
+    from fieldsid.records.reading import read_yaml
 
     own = {p.resolve() for p in inputs_of(model)} if not read_yaml(model).get("effects") else set()
 

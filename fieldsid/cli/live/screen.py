@@ -40,13 +40,20 @@ def line(body: Mapping[str, Any]) -> str:
     known = (
         f"{name} {with_error(p['value'], p['std_error'])}" for name, p in body["parameters"].items() if p["std_error"] is not None
     )
-    return f"{body['time_s'] or 0.0:8.1f} s  {body['verdict']:<11} {100.0 * body['share']:3.0f} %  {'  '.join(known)}"
+    return (
+        f"{body['time_s'] or 0.0:8.1f} s  {body['verdict']:<11} {100.0 * body['share']:3.0f} %  {'  '.join(known)}{_unread(body)}"
+    )
 
 
 def rests_on(body: Mapping[str, Any]) -> str:
     """Say what a verdict rests on."""
     speed = "" if body["speed_m_s"] is None else f" at {body['speed_m_s']:.2f} m/s"
-    return f"{body['axis']}, {body['samples']} samples{speed}; goals: {body['goals_from']}"
+    return f"{body['axis']}, {body['samples']} samples{speed}; goals: {body['goals_from']}{_unread(body)}"
+
+
+def _unread(body: Mapping[str, Any]) -> str:
+    count = body["counts"]["unreadable"]
+    return f"; {count} line{'s' * (count > 1)} could not be read" if count else ""
 
 
 def headline_of(body: Mapping[str, Any]) -> Headline:

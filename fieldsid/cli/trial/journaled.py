@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -18,6 +19,7 @@ from fieldsid.cli.exit_codes import BAD_INPUT, DONE, OUR_BUG
 from fieldsid.cli.trial.filled import filled, in_words, left_out, wants
 from fieldsid.cli.trial.parsed import Parsed, parse
 from fieldsid.errors import FieldsidError
+from fieldsid.records.named_inputs import is_there
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, Stamp, append, read
 from fieldsid.trial_folder.state import FolderState, state_of
 
@@ -75,7 +77,7 @@ class _Kept:
         entries, _ = read(folder)
         self._hashes = Hashes(folder, entries)
         read_from = [*_inputs(parsed), *([Path("vehicle.yaml")] if "vehicle" in parsed.values else [])]
-        self._inputs = self._stamps(dict.fromkeys(p for p in read_from if p.exists()))
+        self._inputs = self._stamps(dict.fromkeys(p for p in read_from if is_there(p)))
         self._before = _snapshot(folder)
 
     def write(self, code: int, verdict: str, result: Any = None) -> None:
@@ -103,15 +105,16 @@ def _inputs(parsed: Parsed) -> list[Path]:
 
 
 def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return size and time of writing of every file below a folder, hidden ones and the journal left out."""
+    """Return size and time of writing of every plain file below a folder, hidden ones, links and the journal left out."""
     found = {}
     for place, folders, files in os.walk(folder):
         folders[:] = [f for f in folders if not f.startswith(".")]
         for name in files:
             if not name.startswith(".") and name != JOURNAL:
                 path = Path(place) / name
-                state = path.stat()
-                found[path.as_posix()] = (state.st_size, state.st_mtime_ns)
+                state = path.lstat()
+                if stat.S_ISREG(state.st_mode):
+                    found[path.as_posix()] = (state.st_size, state.st_mtime_ns)
     return found
 
 

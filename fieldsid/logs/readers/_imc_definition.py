@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from types import MappingProxyType
 from xml.etree import ElementTree as ET
 
 from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 FILES = ("IMC.xml", "IMC.xml.gz")
@@ -41,11 +41,20 @@ def definition_of(path: Path, folder: Path | None) -> dict[int, Message]:
         )
     try:
         raw = file.read_bytes()
-        return _messages(gzip.decompress(raw) if file.suffix == ".gz" else raw)
-    except (ET.ParseError, LookupError, ValueError, EOFError, OSError, zlib.error) as error:
+        return _messages(_unpacked(raw, file) if file.suffix == ".gz" else raw)
+    except (ET.ParseError, LookupError, ValueError, zlib.error) as error:
         raise LogError(
             f"`{file}` is no definition of IMC messages", found=f"{type(error).__name__}: {error}", hint=COPY_AGAIN
         ) from error
+
+
+def _unpacked(raw: bytes, file: Path) -> bytes:
+    unpack, size = zlib.decompressobj(wbits=31), UnpackedSize(file)
+    plain = unpack.decompress(raw, size.left + 1)
+    size.add(len(plain))
+    if not unpack.eof:
+        raise ValueError("it is cut off")
+    return plain
 
 
 def _messages(text: bytes) -> dict[int, Message]:

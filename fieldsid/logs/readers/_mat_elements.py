@@ -13,6 +13,7 @@ from math import prod
 from pathlib import Path
 
 from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
 HEAD = 128
@@ -34,23 +35,32 @@ class _DamagedError(Exception):
 
 def refuse_damaged(path: Path) -> None:
     """Raise LogError where an element of a file has a type, a length or a dimension that the format does not allow."""
-    data = path.read_bytes()
+    data, size = path.read_bytes(), UnpackedSize(path)
     try:
-        _check_file(memoryview(data))
+        _check_file(memoryview(data), size)
     except (_DamagedError, zlib.error, struct.error) as error:
         raise LogError(f"`{path}` is a MATLAB file that is damaged", found=str(error), hint=COPY_AGAIN) from error
 
 
-def _check_file(data: memoryview) -> None:
+def _check_file(data: memoryview, size: UnpackedSize) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(bytes(data[126:128]))
     if order is None:
         raise _DamagedError("no mark of the order of bytes")
     for kind, body in _elements(data[HEAD:], order, padded=False):
-        packed = memoryview(zlib.decompress(body)) if kind == COMPRESSED else None
+        packed = _unpacked(body, size) if kind == COMPRESSED else None
         for inner, array in ((kind, body),) if packed is None else _elements(packed, order, padded=False):
             if inner != MATRIX:
                 raise _DamagedError(f"an element of type {inner} among the variables")
             _check_array(array, order, 0)
+
+
+def _unpacked(body: memoryview, size: UnpackedSize) -> memoryview:
+    unpack = zlib.decompressobj()
+    plain = unpack.decompress(body, size.left + 1)
+    size.add(len(plain))
+    if not unpack.eof:
+        raise _DamagedError("a packed variable that is cut off")
+    return memoryview(plain)
 
 
 def _elements(data: memoryview, order: str, *, padded: bool = True) -> Iterator[tuple[int, memoryview]]:

@@ -16,7 +16,7 @@ import numpy as np
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source
 from fieldsid.logs.mapping.canonical_names import stated_unit, unit_in_name
-from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo, Inventory, RawLog, Series
+from fieldsid.logs.reader import DEFINED, MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Series
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -60,17 +60,26 @@ def unheard() -> Iterator[None]:
 
 
 def inventory_of(
-    path: Path, form: str, topics: Mapping[str, Topic], means: Means, notes: tuple[Note, ...] = (), *, kind: str = DEFINED
+    path: Path,
+    form: str,
+    topics: Mapping[str, Topic],
+    means: Means,
+    notes: tuple[Note, ...] = (),
+    *,
+    kind: str = DEFINED,
+    more: int = 0,
 ) -> Inventory:
     """Return what is in a log of topics, all of them north-east-down; raises LogError where it holds none.
 
-    `kind` is what a topic is called; of what the format has defined nothing is guessed by its name.
+    `kind` is what a topic is called; of what the format has defined nothing is guessed by its name. `more` are topics that were
+    not looked into.
     """
     _check_not_empty(path, topics)
-    channels = tuple(_channel(name, topics[name], means, kind) for name in sorted(topics))
+    names = sorted(topics)
+    channels = tuple(_channel(name, topics[name], means, kind) for name in names[:MOST_CHANNELS])
     ends = [(float(t.time[0]), float(t.time[-1])) for t in topics.values()]
     duration = max(end for _, end in ends) - min(start for start, _ in ends)
-    return Inventory(path, form, duration, channels, notes=notes, frame="NED/FRD")
+    return Inventory(path, form, duration, channels, notes=notes, frame="NED/FRD", more=more + len(names) - len(channels))
 
 
 def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:

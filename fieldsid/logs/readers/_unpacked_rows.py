@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 
 LEAST_BYTES = 1.0
 """Packed bytes that a row must have: with a clock of its own and constants beside it one takes 2.1 to 2.6 at the best that gzip
@@ -44,15 +45,16 @@ class UnpackedRows:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.rows = 0
-        self._packed = 0
+        self._size = UnpackedSize(path, 0)
         self._line = 0
 
     def add(self, text: bytes, packed: int) -> None:
         """Count a piece of text that so many packed bytes gave. Raises LogError for rows that repeat, and a line without end."""
         self.rows += max(text.count(end) for end in LINE_ENDS)
-        self._packed += packed
+        self._size.packed += packed
+        self._size.add(len(text))
         last = max(text.rfind(end) for end in LINE_ENDS)
         self._line = len(text) - last - 1 if last >= 0 else self._line + len(text)
-        refuse_repeated(self.path, self.rows, self._packed)
+        refuse_repeated(self.path, self.rows, self._size.packed)
         if self._line > LONGEST_ROW:
             refuse_endless(self.path, self._line, text[-40:].decode("latin-1"))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
 
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.reader import MOST_CHANNELS, Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import DATA, Means, Topic, inventory_of, raw_log_of, topic_of
 from fieldsid.logs.run import Note
 
@@ -38,7 +39,8 @@ def sniff(path: Path) -> bool:
     return head.startswith(b"%%") and b"%% LOGSTART" in head
 
 
-def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+def _topics(path: Path, wanted: Collection[str] = ()) -> tuple[dict[str, Topic], tuple[Note, ...], int]:
+    """Return as many topics as are looked into and those that are wanted, what was noticed, and how many others there are."""
     times: dict[str, list[float]] = {}
     values: dict[str, list[float]] = {}
     odd = 0
@@ -55,9 +57,11 @@ def _topics(path: Path) -> tuple[dict[str, Topic], tuple[Note, ...]]:
             if time is not None and value is not None:
                 times.setdefault(parts[1], []).append(time)
                 values.setdefault(parts[1], []).append(value)
-    found = {name: topic_of(np.array(t), {DATA: np.array(values[name])}) for name, t in times.items()}
+    taken = {*sorted(times)[:MOST_CHANNELS], *(n for n in wanted if n in times)}
+    found = {name: topic_of(np.array(times[name]), {DATA: np.array(values[name])}) for name in taken}
     message = f"lines of the log that are cut off or no posting, left out: {odd}"
-    return {n: t for n, t in found.items() if t is not None}, (Note("truncated", message, {"count": odd}),) if odd else ()
+    notes = (Note("truncated", message, {"count": odd}),) if odd else ()
+    return {n: t for n, t in found.items() if t is not None}, notes, len(times) - len(taken)
 
 
 def _number(text: str) -> float | None:
@@ -70,13 +74,13 @@ def _number(text: str) -> float | None:
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the variables that are numbers, with count, rate and first values."""
-    topics, notes = _topics(path)
-    return inventory_of(path, "MOOS log", topics, MEANS, notes, kind="variable")
+    topics, notes, more = _topics(path)
+    return inventory_of(path, "MOOS log", topics, MEANS, notes, kind="variable", more=more)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped variables; raises MappingError for one that is not there."""
-    topics, notes = _topics(path)
+    topics, notes, _ = _topics(path, {s.topic for s in mapping.sources.values() if s.topic is not None})
     return raw_log_of(path, topics, mapping, notes)
 
 

@@ -23,6 +23,7 @@ from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._imc_definition import Message, definition_of
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import Note
 from fieldsid.logs.unknown_file import COPY_AGAIN, imc_order
 from fieldsid.numerics.arrays import FloatArray
@@ -66,10 +67,12 @@ def _unpacked(path: Path) -> tuple[bytes, bool]:
     raw = path.read_bytes()
     if not raw.startswith(GZIP):
         return raw, False
-    unpack, out = zlib.decompressobj(wbits=31), bytearray()
+    unpack, out, size = zlib.decompressobj(wbits=31), bytearray(), UnpackedSize(path)
     try:
         for start in range(0, len(raw), BLOCK):
-            out += unpack.decompress(raw[start : start + BLOCK])
+            piece = unpack.decompress(raw[start : start + BLOCK], size.left + 1)
+            size.add(len(piece))
+            out += piece
     except zlib.error:
         return bytes(out), True
     return bytes(out), not unpack.eof

@@ -18,6 +18,7 @@ from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._mat_elements import refuse_damaged
 from fieldsid.logs.readers._topics import library
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.unknown_file import COPY_AGAIN
 from fieldsid.numerics.arrays import FloatArray
 
@@ -100,9 +101,11 @@ def _of_array(name: str, value: Any) -> Iterator[tuple[str, FloatArray]]:
 def _of_hdf5(path: Path) -> Iterator[tuple[str, FloatArray]]:
     h5py = library("h5py", path, "a MATLAB 7.3 file", "matlab")
     found: list[tuple[str, FloatArray]] = []
+    size = UnpackedSize(path)
 
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not name.startswith("#"):
+            size.add(item.size * item.dtype.itemsize)
             found.extend(_of_array(name.rpartition("/")[2], np.squeeze(np.asarray(item))))
 
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,23 @@ import numpy as np
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.mapping.canonical_names import TIME
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
+from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._unpacked_rows import refuse_repeated
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import SIGNALS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.records.check import check
+from fieldsid.records.kinds import RUN_HEAD
+from fieldsid.records.reading import read_json
 
 MAGIC = b"PAR1"
 METADATA_KEY = b"fieldsid"
+NUMBER_BYTES = 8
+TOLD = 3
+"""Cells of a column of lists that are looked at."""
 AGAIN = "import the log again, with `--force`"
 
 
@@ -49,7 +56,8 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     samples = samples_of(columns, clock.time, clock.source) if clock else None
     problem = why_no_clock(columns) if clock is None and options.clock is None else None
     duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())
-    return Inventory(path, "Parquet table", duration, tuple(channels), notes=notes, samples=samples, no_clock=problem)
+    more = len(import_module("pyarrow.parquet").read_schema(path).names) - len(channels)
+    return Inventory(path, "Parquet table", duration, tuple(channels), notes=notes, samples=samples, no_clock=problem, more=more)
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
@@ -77,11 +85,45 @@ def _columns(path: Path, table: Any) -> Columns:
 def _table(path: Path) -> Any:
     try:
         # read_table refuses a file in which two columns have one name
-        with import_module("pyarrow.parquet").ParquetFile(path) as file:
+        with import_module("pyarrow.parquet").ParquetFile(path, read_dictionary=_texts(path)) as file:
             refuse_repeated(path, file.metadata.num_rows, path.stat().st_size)
-            return file.read()
+            size = UnpackedSize(path)
+            for bytes_of in _claimed(file.metadata):
+                size.add(bytes_of)
+            table = file.read(columns=_first_columns(file.schema_arrow.names))
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from error
+    for column in table.columns:
+        size.add(_spelt_out(column))
+    return table
+
+
+def _texts(path: Path) -> list[str]:
+    """Return the columns of text: they are read with each word once, as they are packed, for one may stand in every row."""
+    kinds, schema = import_module("pyarrow.types"), import_module("pyarrow.parquet").read_schema(path)
+    return [f.name for f in schema if kinds.is_string(f.type) or kinds.is_binary(f.type)]
+
+
+def _claimed(metadata: Any) -> Iterator[int]:
+    """Yield the bytes that each part of a file says it unpacks to, numbers that repeat counted as often as they stand there."""
+    for i in range(metadata.num_row_groups):
+        group = metadata.row_group(i)
+        columns = (group.column(j) for j in range(group.num_columns))
+        yield sum(max(c.total_uncompressed_size, NUMBER_BYTES * c.num_values) for c in columns)
+
+
+def _spelt_out(column: Any) -> int:
+    """Return the bytes of a column of words when each stands in its row; zero for any other."""
+    if not import_module("pyarrow.types").is_dictionary(column.type):
+        return 0
+    compute = import_module("pyarrow.compute")
+    lengths = (compute.take(compute.binary_length(c.dictionary), c.indices) for c in column.chunks)
+    return sum(compute.sum(n).as_py() or 0 for n in lengths)
+
+
+def _first_columns(names: list[str]) -> list[str] | None:
+    """Return the columns of a very wide table that are looked into, None for all."""
+    return names[:MOST_CHANNELS] if len(names) > MOST_CHANNELS else None
 
 
 def _unreadable(path: Path, error: Exception) -> LogError:
@@ -98,14 +140,13 @@ def _notes_of_ours(path: Path, table: Any) -> tuple[Note, ...] | None:
     if not text:
         return None
     try:
-        body = json.loads(text)
-        if not str(body["schema"]).startswith("fieldsid/run/"):
+        body = read_json(text)
+        if not isinstance(body, dict) or not str(body.get("schema", "")).startswith("fieldsid/run/"):
             return None
-        return tuple(Note(str(n["code"]), str(n["message"]), dict(n["data"])) for n in body["notes"])
-    except (ValueError, TypeError, LookupError) as error:
-        raise LogError(
-            f"`{path}` is a run of ours whose notes are spoilt", found=f"{type(error).__name__}: {error}"[:160], hint=AGAIN
-        ) from error
+        check(body, RUN_HEAD)
+    except ValueError as error:
+        raise LogError(f"`{path}` is a run of ours whose notes are spoilt", found=str(error)[:160], hint=AGAIN) from error
+    return tuple(Note(n["code"], n["message"], n["data"]) for n in body["notes"])
 
 
 def _series_of_ours(path: Path, table: Any) -> dict[str, Series]:
@@ -133,7 +174,10 @@ def _cells(column: Any) -> Any:
         return column.cast(arrow.timestamp("ns"), safe=False).to_numpy()
     if kinds.is_duration(held):
         return column.cast(arrow.duration("ns"), safe=False).cast(arrow.int64()).to_numpy() / 1e9
-    return np.array([None if cell is None else str(cell) for cell in column.to_pylist()], dtype=object)
+    told = len(column) if not kinds.is_nested(held) else TOLD  # lists are no numbers of a signal: a few are shown
+    cells = np.full(len(column), None, dtype=object)
+    cells[:told] = [None if cell is None else str(cell) for cell in column.slice(0, told).to_pylist()]
+    return cells
 
 
 READER = Reader(

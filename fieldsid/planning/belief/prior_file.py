@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, read_yaml
 from fieldsid.effects import pick_effect
-from fieldsid.errors import ArtifactError
+from fieldsid.errors import ArtifactError, shortened
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.model import LARGEST, Model, Noise, load_model
+from fieldsid.models.model import Model, Noise, load_model
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.records.check import LARGEST
+from fieldsid.records.reading import load_record, read_yaml
 from fieldsid.registry import near
 
 KIND = "fieldsid/prior"
@@ -93,6 +94,6 @@ def _noise(body: Mapping[str, Any]) -> Noise:
 def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
         raise ArtifactError(
-            f"`{name}` must be a number up to {LARGEST:g}", found=repr(value)[:80], hint=f"write a number after `{name}:`"
+            f"`{name}` must be a number up to {LARGEST:g}", found=shortened(value), hint=f"write a number after `{name}:`"
         )
     return float(value)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record
 from fieldsid.effects import pick_effect, refuse_clash
 from fieldsid.errors import ArtifactError, UsageError
 from fieldsid.logs.wrong_file import unless_log
@@ -17,6 +16,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Coefficient, definitions_of, effect_held
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import TRIM_OF_FIN, SpeedLaw
+from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/diagnosis"
 PLAIN = "none"

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, plain, save_record
-from fieldsid.errors import ArtifactError, FieldsidError
+from fieldsid.artifacts import plain, save_record
+from fieldsid.errors import ArtifactError, FieldsidError, shortened
 from fieldsid.maneuvers import Autopilot, pick_maneuver
 from fieldsid.models.axis import Axis
 from fieldsid.planning.design.abort_conditions import aborts_of
@@ -19,6 +19,7 @@ from fieldsid.planning.design.leg import Expected, Leg
 from fieldsid.planning.design.plan import MOST_PASSES, Plan
 from fieldsid.planning.flight.excitation import Excitation, Window, fits
 from fieldsid.planning.safety.envelope import LARGEST_SPEED, Envelope, limits_said
+from fieldsid.records.reading import load_record
 
 KIND = "fieldsid/plan"
 MAX_LEG_S = 3600.0
@@ -171,7 +172,7 @@ def _fin(value: Any) -> float:
 
 def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ArtifactError(f"`{name}` must be a finite number", found=repr(value), hint=f"write a number after `{name}:`")
+        raise ArtifactError(f"`{name}` must be a finite number", found=shortened(value), hint=f"write a number after `{name}:`")
     return float(value)
 
 

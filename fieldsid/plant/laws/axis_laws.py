@@ -10,22 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from fieldsid.artifacts import load_record, save_record
+from fieldsid.artifacts import save_record
 from fieldsid.display import Plotted
 from fieldsid.errors import ArtifactError, DataError, UsageError
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import KIND as MODEL_KIND
-from fieldsid.models.model import Model, finite_number, model_of
+from fieldsid.models.model import Model, model_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.plant.laws.parameter_law import ParameterLaw, authority_law, other_law, without_candidates
 from fieldsid.plant.laws.regression import Regression, regression_of
 from fieldsid.plant.points import Point, check_authority, distinct_speeds
+from fieldsid.records.check import ShapeError
+from fieldsid.records.laws import LARGEST_COEFFICIENT
+from fieldsid.records.reading import load_record
 from fieldsid.rounding import nine_digits
 
 KIND = "fieldsid/fit"
-LARGEST_COEFFICIENT = 1e6
-"""Of a law of one's own, SI: no vehicle damps or turns so fast."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -156,14 +157,13 @@ def carried_models(path: Path) -> tuple[tuple[str, Model], ...]:
     A file that does not say which models it came from would lose their effects without a word: it is refused.
     """
     body = load_record(path, KIND)
-    try:
-        return tuple((str(m["name"]), model_of(m["record"], path)) for m in body["models"])
-    except (KeyError, TypeError, AttributeError) as error:
+    if "models" not in body:
         raise ArtifactError(
             f"`{path}` does not carry the models it was made from: their effects would be lost",
-            found=f"{type(error).__name__}: {error}",
+            found="no key `models`",
             hint="make it again: `sysid fit MODEL... -o " + f"{path} --force`",
-        ) from error
+        )
+    return tuple((m["name"], model_of(m["record"], path)) for m in body["models"])
 
 
 def load_laws(path: Path) -> Laws:
@@ -172,27 +172,25 @@ def load_laws(path: Path) -> Laws:
     try:
         points = _points_of(body["points"])
         laws = {n: _law_of(n, r, points) for n, r in body["laws"].items()}
-        return Laws(Axis(body["axis"]), points, MappingProxyType(laws))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except ShapeError as error:
         raise ArtifactError(
-            f"`{path}` is not a complete fit file",
-            found=f"{type(error).__name__}: {error}",
-            hint="make it again: `sysid fit MODEL...`",
+            f"`{path}` is not a complete fit file", found=str(error), hint="make it again: `sysid fit MODEL...`"
         ) from error
+    return Laws(Axis(body["axis"]), points, MappingProxyType(laws))
 
 
 def _points_of(records: Sequence[Mapping[str, Any]]) -> tuple[Point, ...]:
     points = tuple(
         Point(
-            str(p["name"]),
-            finite_number(p["speed_m_s"], "speed_m_s"),
-            MappingProxyType({k: finite_number(v, k) for k, v in p["values"].items()}),
-            MappingProxyType({k: finite_number(v, k) for k, v in p["std_errors"].items()}),
+            p["name"],
+            float(p["speed_m_s"]),
+            MappingProxyType({k: float(v) for k, v in p["values"].items()}),
+            MappingProxyType({k: float(v) for k, v in p["std_errors"].items()}),
         )
         for p in records
     )
     if not points:
-        raise ValueError("`points` is empty: no law comes from none")
+        raise ShapeError("`points` is empty: no law comes from none")
     return points
 
 
@@ -234,11 +232,13 @@ def _law_record(law: ParameterLaw) -> dict[str, Any]:
 def _law_of(name: str, record: Mapping[str, Any], points: Sequence[Point]) -> ParameterLaw:
     held = [p for p in points if name in p.values]
     sign = float(record["sign"])
+    if abs(sign) != 1.0:
+        raise ShapeError(f"the sign of {name} is {sign:g}, not 1 or -1")
     lines = tuple(regression_of(c) for c in record["candidates"].values())
     values = sign * np.array([p.values[name] for p in held])
     speeds = np.array([p.speed for p in held])
     if record["chosen"] not in {line.kind for line in lines}:
-        raise ValueError(f"chosen law {record['chosen']!r} of {name} is not among its candidates")
+        raise ShapeError(f"chosen law {record['chosen']!r} of {name} is not among its candidates")
     return ParameterLaw(name, sign, speeds, values, _errors(name, held), lines, str(record["chosen"]), None, ())
 
 

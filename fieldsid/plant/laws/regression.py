@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.display import Brief
-from fieldsid.errors import ArtifactError, DataError
+from fieldsid.errors import DataError
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.tail_probabilities import student_quantile
+from fieldsid.records.check import ShapeError, finite_number
+from fieldsid.records.laws import LARGEST_COEFFICIENT, LARGEST_LOGARITHM
 
 CONFIDENCE_LEVEL = 0.95
 ROUNDING_SHARE = 1e-9
@@ -72,33 +74,24 @@ class Regression(Brief):
 
 
 def regression_of(record: Mapping[str, Any]) -> Regression:
-    """Return the law of a plain record; raises ArtifactError when a key is missing or wrong."""
-    try:
-        count = len(record["coefficients"])
-        covariance = [[np.nan if v is None else v for v in row] for row in record["covariance"]]
-        return Regression(
-            kind=str(record["kind"]),
-            powers=_powers_of(record["powers"], count),
-            coefficients=np.array(record["coefficients"], dtype=np.float64).reshape(count),
-            covariance=np.array(covariance, dtype=np.float64).reshape(count, count),
-            dof=int(record["dof"]),
-            r2=_number(record["r2"]),
-            rms=_number(record["rms"]),
-        )
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise ArtifactError(
-            "a law in the file is not complete",
-            found=f"{type(error).__name__}: {error}",
-            hint="make it again: `sysid fit MODEL...`",
-        ) from error
-
-
-def _powers_of(said: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return the powers of a record: one for each coefficient, or none for the power law, which has two coefficients."""
-    powers = tuple(float(p) for p in said)
+    """Return the law of a record that has the shape REGRESSION; raises ShapeError where its parts do not belong together."""
+    powers, count = tuple(float(p) for p in record["powers"]), len(record["coefficients"])
+    largest = LARGEST_COEFFICIENT if powers else LARGEST_LOGARITHM
+    coefficients = [finite_number(c, "coefficients", -largest, largest) for c in record["coefficients"]]
+    covariance = [[np.nan if v is None else v for v in row] for row in record["covariance"]]
     if len(powers) != (count if powers else 0) or (not powers and count != 2):
-        raise ValueError(f"{len(powers)} powers for {count} coefficients")
-    return powers
+        raise ShapeError(f"{len(powers)} powers for {count} coefficients")
+    if [len(row) for row in covariance] != [count] * count:
+        raise ShapeError(f"a covariance that is not {count} by {count}")
+    return Regression(
+        kind=record["kind"],
+        powers=powers,
+        coefficients=np.array(coefficients, dtype=np.float64),
+        covariance=np.array(covariance, dtype=np.float64).reshape(count, count),
+        dof=record["dof"],
+        r2=_number(record["r2"]),
+        rms=_number(record["rms"]),
+    )
 
 
 def fit_powers(

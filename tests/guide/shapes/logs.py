@@ -174,9 +174,11 @@ class Inspection(Result):
     duration_s: Number
     """Its length."""
     channels: list[Channel]
-    """Everything in it."""
+    """What is in it, the first hundred."""
     shown: list[Shown]
     """The same as the page shows it."""
+    more_channels: int
+    """How many channels there are besides."""
     mapping_needed: bool
     """False where the columns have the canonical names."""
     mapping: dict[str, Any]

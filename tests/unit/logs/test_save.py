@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fieldsid.artifacts import sha256_of
 from fieldsid.errors import ArtifactError, LogError, UsageError
 from fieldsid.logs import Note, Run, load_run, save_run
 from fieldsid.logs.convert.conditioning import MAX_PLAUSIBLE_VALUE
 from fieldsid.logs.run import SIGNALS
+from fieldsid.records.named_inputs import sha256_of
 
 finite = st.floats(-MAX_PLAUSIBLE_VALUE, MAX_PLAUSIBLE_VALUE, width=64)
 

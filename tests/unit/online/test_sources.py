@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import socket
 import threading
@@ -16,7 +17,7 @@ from fieldsid.errors import DataError, UsageError
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
-from fieldsid.online.samples import MessageReader, Sample, samples_of
+from fieldsid.online.samples import LONGEST_LINE, MessageReader, Sample, samples_of
 from fieldsid.online.sources import datagrams, followed, lines_of, replayed
 
 HEAD = "time_s,yaw_deg,yaw_rate_rad_s,rudder_rad\n"
@@ -34,27 +35,57 @@ def taken(source):
 def test_a_message_is_taken_in_any_unit_and_what_is_none_is_counted():
     reader = MessageReader(Axis.YAW)
     sample = reader.read(
-        '{"time_ms": 1500, "rudder_deg": 90, "yaw_rate_deg_s": 180, "surge_kn": 1, "battery": "low", "yaw_rad": null}'
+        b'{"time_ms": 1500, "rudder_deg": 90, "yaw_rate_deg_s": 180, "surge_kn": 1, "battery": "low", "yaw_rad": null}'
     )
     assert sample is not None
     np.testing.assert_allclose(sample[:2] + sample[3:5], (1.5, np.pi / 2, np.pi, 1852 / 3600))
     assert np.isnan(sample.angle)
-    assert reader.read("  ") is None
+    assert reader.read(b"  ") is None
     assert reader.unreadable == 0
-    for wrong in ("{", "[1]", '{"yaw_rad": 1}', b"\xff\xfe", '{"time_s": "noon"}', '{"time_s": NaN}'):
-        assert reader.read(wrong) is None
-    assert reader.unreadable == 6
+    told = (b'{"yaw_rad": 1}', b'{"time_s": "noon"}', b'{"time_s": NaN}', b'{"time_s": 1, "yaw_rad": "0.1"}')
+    beyond = (b'{"time_s": 1, "yaw_rad": ' + b"9" * 400 + b"}", b'{"time_s": 1, "yaw_rad": 1e300}', b'{"time_s":' + b"[" * 9000)
+    long = b'{"time_s": 1, "rudder_rad": 0}' + b" " * LONGEST_LINE
+    wrong = (b"{", b"[1]", b"\xff\xfe", *told, *beyond, long)
+    assert [reader.read(line) for line in wrong] == [None] * len(wrong)
+    assert reader.unreadable == len(wrong)
 
 
 def test_a_measured_fin_goes_straight_a_command_holds():
-    assert MessageReader(Axis.YAW).read('{"time_s": 1, "rudder_rad": 0.1}').fin_is_held
-    measured = MessageReader(Axis.YAW).read('{"time_s": 1, "rudder_rad": 0.1, "rudder_measured_rad": 0.05}')
+    assert MessageReader(Axis.YAW).read(b'{"time_s": 1, "rudder_rad": 0.1}').fin_is_held
+    measured = MessageReader(Axis.YAW).read(b'{"time_s": 1, "rudder_rad": 0.1, "rudder_measured_rad": 0.05}')
     assert (measured.fin, measured.fin_is_held) == (0.05, False)
 
 
 def test_a_stream_of_lines_ends_with_the_stream():
-    lines = [json.dumps({"time_s": i, "rudder_rad": 0.0}) for i in range(5)]
-    assert [s.time for s in taken(lines_of(lines, MessageReader(Axis.YAW)))] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    lines = [json.dumps({"time_s": i, "rudder_rad": 0.0}).encode() for i in range(5)]
+    stream = io.BytesIO(b"\n".join(lines))
+    assert [s.time for s in taken(lines_of(stream, MessageReader(Axis.YAW)))] == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_lines_that_cannot_be_read_are_counted_and_those_behind_them_are_read():
+    good = b'{"time_s": 1, "rudder_rad": 0.1}\n'
+    reader = MessageReader(Axis.YAW)
+    stream = io.BytesIO(b"\xff\n" + b"x" * (10 * LONGEST_LINE) + b"\n" + good + b"9" * (3 * LONGEST_LINE))
+    assert [s.time for s in taken(lines_of(stream, reader))] == [1.0]
+    assert reader.unreadable == 3
+
+
+@pytest.mark.parametrize("size", [1, 7, 31, 32, 33, 1 << 16])
+def test_lines_are_the_same_whatever_pieces_they_come_in(size, monkeypatch):
+    monkeypatch.setattr("fieldsid.online.sources.PIECE_BYTES", size)
+    good = b'{"time_s": %d, "rudder_rad": 0.1}\n'
+    reader = MessageReader(Axis.YAW)
+    stream = io.BytesIO(good % 1 + b"\n" + b"x" * (3 * LONGEST_LINE) + b"\n" + good % 2 + (good % 3)[:-1])
+    assert [s.time for s in taken(lines_of(stream, reader))] == [1.0, 2.0, 3.0]
+    assert reader.unreadable == 1
+
+
+def test_a_stream_that_breaks_is_one_that_ends():
+    class Broken(io.BytesIO):
+        def read1(self, *_size):
+            raise OSError(5, "Input/output error")
+
+    assert taken(lines_of(Broken(), MessageReader(Axis.YAW))) == []
 
 
 def test_a_replay_keeps_the_logs_time_or_waits_for_nothing():

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from fieldsid.artifacts import inputs_of
 from fieldsid.errors import ArtifactError, DataError, FieldsidError, UsageError
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise, save_model
@@ -21,6 +20,7 @@ from fieldsid.plant.laws.axis_laws import fit_laws, load_laws, save_laws
 from fieldsid.plant.parameter_source import draw_values, load_parameter_source, logs_of, source_of_models
 from fieldsid.plant.points import distinct_speeds
 from fieldsid.plant.table import read_table
+from fieldsid.records.named_inputs import inputs_of
 
 TABLE = """thrust_percent,speed_m_s,a22,b2,C0,b2_std_error
 60,1.0,1.1,-0.6,-0.01,0.02
@@ -218,7 +218,7 @@ def test_a_fit_file_carries_its_models_with_effects_covariance_and_logs(tmp_path
     for one, other in zip(given.models, carried.models, strict=True):
         assert one.values == other.values
         assert np.array_equal(one.covariance, other.covariance)
-    assert logs_of([path]) == logs_of(paths) == (log,)
+    assert logs_of([path]) == logs_of(paths) == ((str(log), log),)
 
 
 def test_logs_are_found_from_another_folder_and_where_the_trial_was_moved_to(tmp_path, monkeypatch):
@@ -227,14 +227,15 @@ def test_logs_are_found_from_another_folder_and_where_the_trial_was_moved_to(tmp
     (tmp_path / "day" / "runs" / "log.csv").write_text("x\n")
     monkeypatch.chdir(tmp_path / "day")
     save_model(yaw_model(1.0, ()), Path("models/m.yaml"), inputs=[Path("runs/log.csv")])
-    assert logs_of([Path("models/m.yaml")]) == (Path("runs/log.csv"),)
+    assert logs_of([Path("models/m.yaml")]) == (("runs/log.csv", Path("runs/log.csv")),)
     monkeypatch.chdir(tmp_path / "day" / "models")
-    assert logs_of([Path("m.yaml")]) == inputs_of(Path("m.yaml")) == (Path("../runs/log.csv"),)
+    assert logs_of([Path("m.yaml")]) == (("runs/log.csv", Path("../runs/log.csv")),)
+    assert inputs_of(Path("m.yaml")) == (Path("../runs/log.csv"),)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "day").rename(tmp_path / "moved")
-    assert logs_of([Path("moved/models/m.yaml")]) == (Path("moved/runs/log.csv"),)
+    assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", Path("moved/runs/log.csv")),)
     (tmp_path / "moved" / "runs" / "log.csv").write_text("another\n")
-    assert logs_of([Path("moved/models/m.yaml")]) == (Path("runs/log.csv"),)  # as it was named: what is there now is another
+    assert logs_of([Path("moved/models/m.yaml")]) == (("runs/log.csv", None),)  # what is there now is another
     assert inputs_of(Path("moved/models/m.yaml")) == ()
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fieldsid.errors import LogError
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions
+from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, ReadOptions
 from fieldsid.logs.readers.bags.messages.definitions import DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets
 from fieldsid.logs.readers.bags.signals import check_not_empty, not_decodable
@@ -20,7 +20,8 @@ def contents_of(path: Path, collector: Collector, options: ReadOptions) -> Inven
     notes = list(collector.notes)
     search = DefinitionSearch(path, options.msg_path)
     channels = []
-    for topic in sorted(collector.connections):
+    names = sorted(collector.connections)
+    for topic in names[:MOST_CHANNELS]:
         connection = collector.connections[topic]
         packets = collector.packets[topic]
         channels.append(_channel(connection, packets, search, notes))
@@ -28,7 +29,7 @@ def contents_of(path: Path, collector: Collector, options: ReadOptions) -> Inven
     duration = (max(stamps) - min(stamps)) / 1e9 if stamps else 0.0
     serialization = next((c.serialization for c in collector.connections.values()), "")
     form = {ROS1: "ROS 1 bag", CDR: "ROS 2 bag"}.get(serialization, "bag")
-    return Inventory(path, form, duration, tuple(channels), notes=tuple(notes))
+    return Inventory(path, form, duration, tuple(channels), notes=tuple(notes), more=len(names) - len(channels))
 
 
 def _channel(connection: Connection, packets: TopicPackets, search: DefinitionSearch, notes: list[Note]) -> ChannelInfo:

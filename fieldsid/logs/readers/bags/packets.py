@@ -5,9 +5,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.run import Note
 
 ROS1, CDR = "ros1", "cdr"
@@ -81,7 +83,7 @@ class Collector:
     """What the reading of a bag brings in: connections by topic, and packets of the topics that are wanted (all when None).
 
     `expected` is the number of messages that the bag's own index states, by topic; `file` the one that is being read; `size`
-    the bytes of all, of which `progress` is given the share.
+    the bytes of all, of which `progress` is given the share; `unpacked` counts what they unpack to.
     """
 
     def __init__(
@@ -99,6 +101,7 @@ class Collector:
         self.damages = 0
         self.file = ""
         self.size = 1
+        self.unpacked = UnpackedSize(Path(), 0)
         self._settle = settle
         self._progress = progress
         self._waiting = self._read = 0

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fieldsid.errors import LogError
+from fieldsid.logs.readers._unpacked_size import UnpackedSize
 from fieldsid.logs.readers.bags.containers import db3, mcap, ros1
 from fieldsid.logs.readers.bags.containers.metadata import check_against_metadata
 from fieldsid.logs.readers.bags.packets import Collector, Connection, Settle, TopicPackets, UnknownFormError, keep_all
@@ -43,6 +44,7 @@ def collected(
     collector = Collector(wanted, unpacked_first, progress)
     parts = _parts(path) if path.is_dir() else [path]
     collector.size = sum(part.stat().st_size for part in parts)
+    collector.unpacked = UnpackedSize(path, collector.size)
     for part in parts:
         with _plain_part(part, collector) as plain:
             collector.file = plain.name
@@ -112,4 +114,5 @@ def _unpack_messages(packets: TopicPackets, collector: Collector) -> None:
     plain = [unzstd(p) if p.startswith(ZSTD) else p for p in packets.payloads]
     if None in plain:
         collector.damaged(f"{plain.count(None)} compressed messages on {packets.topic}", {"topic": packets.topic})
+    collector.unpacked.add(sum(len(p) for p in plain if p is not None))
     packets.payloads[:] = [p or b"" for p in plain]

@@ -11,11 +11,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from fieldsid.logs.readers._unpacked_size import MOST_TIMES, UnpackedSize
 from fieldsid.logs.readers.bags.packets import UnknownFormError
 
 PIECE_BYTES = 1 << 20
-LARGEST = 1 << 30
-"""Bytes of a chunk or message that is one: recorders write some 1e6, and a few packed bytes may claim any number."""
+LARGEST = 1 << 26
+"""Bytes of a chunk or message that is one: recorders write some 1e6, and a few packed bytes may claim any number. Larger ones are
+unpacked where so many are packed that they can be meant."""
 KNOWN = ("", "none", "bz2", "lz4", "zstd")
 
 
@@ -27,7 +29,7 @@ def unpacked(data: bytes, compression: str, size: int) -> bytes | None:
     """
     if compression in ("", "none"):
         return data
-    if compression in KNOWN and size > LARGEST:
+    if compression in KNOWN and size > max(LARGEST, MOST_TIMES * len(data)):
         return None
     try:
         if compression == "bz2":
@@ -58,7 +60,11 @@ def _decompressed(decompressor: Any, data: bytes, most: int) -> bytes:
 
 
 def unpack_file(packed: Path, plain: Path) -> str | None:
-    """Write what a zstd file holds, piece by piece; return `cut off` or `damaged` where it does not go to its end."""
+    """Write what a zstd file holds, piece by piece; return `cut off` or `damaged` where it does not go to its end.
+
+    Raises LogError where it unpacks to far more than a log does.
+    """
+    size = UnpackedSize(packed)
     module = _zstd()
     decompressor = module.ZstdDecompressor()
     with packed.open("rb") as source, plain.open("wb") as target:
@@ -67,9 +73,9 @@ def unpack_file(packed: Path, plain: Path) -> str | None:
                 while piece:
                     if decompressor.eof:
                         decompressor = module.ZstdDecompressor()
-                    target.write(decompressor.decompress(piece, PIECE_BYTES))
+                    size.add(target.write(decompressor.decompress(piece, PIECE_BYTES)))
                     while not (decompressor.eof or decompressor.needs_input):
-                        target.write(decompressor.decompress(b"", PIECE_BYTES))
+                        size.add(target.write(decompressor.decompress(b"", PIECE_BYTES)))
                     piece = decompressor.unused_data
         except module.ZstdError:
             return "damaged"

@@ -222,6 +222,7 @@ class _Records:
         if plain is None or (not place.is_cut and (len(plain) != head.size or _is_wrong(plain, head.crc))):
             self.collector.damaged_at(f"a compressed chunk of {head.seconds:.2f} s", place.chunk)
             return 0
+        self.collector.unpacked.add(len(plain))
         counts = self.collector.counts()
         self.run(plain, 0, len(plain), place)
         if not head.crc and not place.is_cut and not self._agrees_with_index(data, stop, counts):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from fieldsid.artifacts import read_yaml
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.readers.bags.packets import Collector
 from fieldsid.logs.run import Note
+from fieldsid.records.reading import read_yaml
 
 NAME = "metadata.yaml"
 

@@ -256,6 +256,7 @@ class _Records:
             if plain is None or (not place.is_cut and len(plain) != size):
                 self.collector.damaged_at(f"a compressed chunk of {size} bytes", pos)
                 return
+            self.collector.unpacked.add(len(plain))
             counts = self.collector.counts()
             self.run(plain, 0, len(plain), place)
             if not place.is_cut and not self._agrees_with_index(data, stop, counts):

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_
 
 from fieldsid.errors import LogError
 from fieldsid.logs.readers.bags.messages.by_rosbags import ObjectDecoder
-from fieldsid.logs.readers.bags.messages.message_layout import Decoder, types_in
+from fieldsid.logs.readers.bags.messages.message_layout import Decoder, refuse_endless, types_in
 from fieldsid.logs.readers.bags.packets import CDR, Connection, UnknownFormError
 from fieldsid.logs.run import Note
 
@@ -89,6 +89,7 @@ def _sources(connection: Connection, search: DefinitionSearch) -> Iterator[tuple
 def _fitting(known: Fields, connection: Connection, payload: bytes) -> AnyDecoder:
     """Return the decoder that can read a message by these definitions; raises the reason of the first that cannot."""
     is_cdr = connection.serialization == CDR
+    refuse_endless(known, connection.type_name)
     decoder = Decoder(known, connection.type_name, cdr=is_cdr)
     try:
         decoder.layout(payload)
@@ -181,7 +182,7 @@ def _parsed(text: str, name: str, language: str) -> Fields:
                 )
         else:
             types = dict(get_types_from_msg(text, name))
-    except TypesysError as error:
+    except (TypesysError, RecursionError) as error:
         first = str(error).splitlines()[0][:120]
         raise LogError(
             f"the definition of `{name}` cannot be parsed", found=first, hint="give a clean one: `--msg-path DIR`"

@@ -11,7 +11,7 @@ Encodings: ROS 1 (packed, little endian) and CDR (OMG CORBA 3.0, 15.3: a number 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,6 +33,9 @@ DTYPES = {
 PADDING = "structure_needs_at_least_one_member"
 """The name of the member that an empty structure is given."""
 QUATERNION = ("x", "y", "z", "w")
+DEEPEST, MOST_PARTS = 50, 100_000
+"""Types inside one another, and fields of all of them together: a message with more could be no message of any length."""
+DEEPEST_SHOWN = 5
 ROWS_APART = 32
 """Layouts tried on whole blocks before messages are taken one by one."""
 
@@ -128,7 +131,7 @@ class Walker:
     def _row(self, inner: Any, count: int, path: str) -> None:
         kind, what = inner
         if kind == NAME or what[0] == "string":
-            if count > len(self.raw):
+            if count > min(len(self.raw), MOST_PARTS):
                 raise IndexError(count)
             begin = self.pos
             if kind == NAME:
@@ -219,9 +222,45 @@ def _no_field(layout: Layout, path: str) -> MappingError:
 
 def types_in(fields: Sequence[tuple[str, Any]]) -> list[str]:
     """Return the message types that the fields of a type are made of."""
-    return [
-        what if kind == NAME else what[0][1] for _, (kind, what) in fields if kind == NAME or (kind > NAME and what[0][0] == NAME)
-    ]
+    return [name for name, _ in _inner(fields)]
+
+
+def refuse_endless(definitions: Definitions, type_name: str) -> None:
+    """Raise LogError for a type that holds itself, or comes to more numbers and texts than a message has."""
+    known: dict[str, int] = {}
+
+    def parts_of(name: str, above: tuple[str, ...]) -> int:
+        if name in above or len(above) > DEEPEST:
+            raise LogError(
+                f"message type `{type_name}` is a type that holds itself, or one in one without end",
+                found=" in ".join([name, *above[::-1]][:DEEPEST_SHOWN]),
+                hint="give a definition that ends: `--msg-path DIR`",
+            )
+        if name not in known:
+            fields = definitions.get(name, ())
+            known[name] = sum(_count(what) * parts_of(inner, (*above, name)) for inner, what in _inner(fields)) + len(fields) + 1
+        return known[name]
+
+    if (count := parts_of(type_name, ())) > MOST_PARTS:
+        raise LogError(
+            f"message type `{type_name}` is none that is recorded: it comes to {count} parts",
+            found=f"more than {MOST_PARTS}",
+            hint="give the definition the vehicle was built with: `--msg-path DIR`",
+        )
+
+
+def _inner(fields: Sequence[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """Yield the message types that fields are of, with their descriptions."""
+    for _, (kind, what) in fields:
+        if kind == NAME:
+            yield what, (kind, what)
+        elif kind > NAME and what[0][0] == NAME:
+            yield what[0][1], (kind, what)
+
+
+def _count(description: Any) -> int:
+    kind, what = description
+    return int(what[1]) if kind == ARRAY else 1
 
 
 class Decoder:

@@ -1,0 +1,183 @@
+"""What a record must hold, said as data: a value of another type, sign, range or word is refused with the way to it.
+
+A shape is a mapping of keys to shapes (one that ends in `?` may be left out), a list of one shape for each item, a tuple of
+shapes for a list of just so many, or a function that looks at one value. Keys that a shape does not name are left alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from fieldsid.errors import shortened
+
+LARGEST = 1e9
+"""No number of a vehicle in SI is larger: what is beyond is damage, and its powers would overflow."""
+LARGEST_SPEED_M_S = 50.0
+"""Nothing goes faster through water: what is above is another unit."""
+LARGEST_FIN_RAD = 1.5708
+"""A fin across the flow: no limit of one is larger."""
+
+AXES = ("yaw", "pitch")
+SIDES = ("port", "starboard")
+
+Shape = Any
+"""A mapping, list or tuple of shapes, or what looks at a value and a place and raises ShapeError."""
+
+
+class ShapeError(ValueError):
+    """A value that is not what its place in a record needs, with both in words."""
+
+
+def check(value: object, shape: Shape, place: str = "") -> None:
+    """Raise ShapeError where a value, at a place of a record, has not some shape."""
+    if isinstance(shape, Mapping):
+        _refuse(not isinstance(value, Mapping), value, place, "keys with values")
+        for name, inner in shape.items():
+            _check_key(value, str(name), inner, place)
+    elif isinstance(shape, list):
+        for i, item in enumerate(_items(value, place)):
+            check(item, shape[0], f"{place}[{i}]")
+    elif isinstance(shape, tuple):
+        items = _items(value, place)
+        _refuse(len(items) != len(shape), value, place, f"a list of {len(shape)}")
+        for i, (item, inner) in enumerate(zip(items, shape, strict=True)):
+            check(item, inner, f"{place}[{i}]")
+    else:
+        shape(value, place)
+
+
+def _check_key(value: Any, name: str, inner: Shape, place: str) -> None:
+    key, is_optional = name.removesuffix("?"), name.endswith("?")
+    if key in value:
+        check(value[key], inner, _way(place, key))
+    elif not is_optional:
+        raise ShapeError(f"`{_way(place, key)}` is missing")
+
+
+def _way(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key
+
+
+def _items(value: object, place: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise _wrong(value, place, "a list")
+    return value
+
+
+def finite_number(value: object, name: str, low: float = -LARGEST, high: float = LARGEST) -> float:
+    """Return a value of a record as the number it must be, within bounds; raises ShapeError for what is none of a vehicle."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise _wrong(value, name, "a finite number")
+    if not low <= value <= high:
+        bounds = f"at least {low:g}" if high == LARGEST and low > -LARGEST else f"within {low:g} .. {high:g}"
+        raise ShapeError(f"`{name}` is {value:g}, and must be {bounds}: it is no such number of a vehicle")
+    return float(value)
+
+
+def number(low: float = -LARGEST, high: float = LARGEST) -> Shape:
+    """Return the shape of a finite number within bounds."""
+
+    def look(value: object, place: str) -> None:
+        finite_number(value, place, low, high)
+
+    return look
+
+
+def above_zero(high: float = LARGEST) -> Shape:
+    """Return the shape of a finite number above zero."""
+
+    def look(value: object, place: str) -> None:
+        if finite_number(value, place, high=high) <= 0.0:
+            raise ShapeError(f"`{place}` is {shortened(value)}, which is not above zero")
+
+    return look
+
+
+def maybe(shape: Shape) -> Shape:
+    """Return the shape of what may be nothing too: a number that could not be found is written so."""
+
+    def look(value: object, place: str) -> None:
+        if value is not None:
+            check(value, shape, place)
+
+    return look
+
+
+def each(shape: Shape) -> Shape:
+    """Return the shape of a mapping whose keys are any words, each value of one shape."""
+
+    def look(value: object, place: str) -> None:
+        _refuse(not isinstance(value, Mapping), value, place, "keys with values")
+        for key, item in value.items():  # type: ignore[attr-defined]
+            check(item, shape, _way(place, str(key)))
+
+    return look
+
+
+def at_least_one(shape: Shape) -> Shape:
+    """Return the shape of a list of one shape that is not empty."""
+
+    def look(value: object, place: str) -> None:
+        check(value, [shape], place)
+        _refuse(not value, value, place, "a list with anything in it")
+
+    return look
+
+
+def times(count: int, shape: Shape) -> Shape:
+    """Return the shape of a list of so many of one shape."""
+
+    def look(value: object, place: str) -> None:
+        check(value, (shape,) * count, place)
+
+    return look
+
+
+def one_of(words: Collection[str]) -> Shape:
+    """Return the shape of one of some words."""
+
+    def look(value: object, place: str) -> None:
+        _refuse(not isinstance(value, str) or value not in words, value, place, f"one of {', '.join(words)}")
+
+    return look
+
+
+def anything(_value: object, _place: str) -> None:
+    """Take any value: what reads it further on has a shape of its own."""
+
+
+def text(value: object, place: str) -> None:
+    """Raise ShapeError where a value is no text."""
+    _refuse(not isinstance(value, str), value, place, "text")
+
+
+def whole(value: object, place: str) -> None:
+    """Raise ShapeError where a value is no whole number, or a negative one."""
+    _refuse(isinstance(value, bool) or not isinstance(value, int) or value < 0, value, place, "a whole number, 0 or more")
+
+
+def flag(value: object, place: str) -> None:
+    """Raise ShapeError where a value is neither true nor false."""
+    _refuse(not isinstance(value, bool), value, place, "true or false")
+
+
+def _refuse(is_wrong: bool, value: object, place: str, wanted: str) -> None:  # noqa: FBT001 - the condition itself
+    if is_wrong:
+        raise _wrong(value, place, wanted)
+
+
+def _wrong(value: object, place: str, wanted: str) -> ShapeError:
+    return ShapeError(f"`{place or 'the record'}` is {shortened(value)}, not {wanted}")
+
+
+SOURCE: Shape = {"path": text, "sha256": text}
+"""A file that a record was made from."""
+HEAD: Shape = {"inputs?": maybe([SOURCE]), "parent?": maybe(SOURCE)}
+"""What the head of every record holds beside its schema."""
+ERRORS: Shape = {"angle_rms_rad": maybe(number(0.0)), "rate_rms_rad_s": maybe(number(0.0))}
+"""The error of a free run; nothing where a channel was not measured."""
+BOTH_SIDES: Shape = {"train": ERRORS, "validation": ERRORS}
+FLOOR: Shape = {"angle_rad": maybe(number(0.0)), "rate_rad_s": maybe(number(0.0))}
+"""The noise floor that errors are told over."""

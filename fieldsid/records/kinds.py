@@ -1,0 +1,105 @@
+"""The kinds of records by their schema: the shape of each, what it is called, and how it is made again.
+
+A plan and a prior are looked through number by number where they are read, for there the bounds are those of their maneuvers and
+effects; here they have what a folder's overview needs of them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fieldsid.records.check import (
+    AXES,
+    BOTH_SIDES,
+    ERRORS,
+    FLOOR,
+    HEAD,
+    LARGEST_FIN_RAD,
+    SIDES,
+    Shape,
+    above_zero,
+    anything,
+    at_least_one,
+    flag,
+    maybe,
+    number,
+    one_of,
+    text,
+)
+from fieldsid.records.laws import FIT
+from fieldsid.records.model import MODEL, SPEED
+from fieldsid.records.schedule import SCHEDULE
+
+
+class Kind(NamedTuple):
+    """What a record of one kind holds, is called in an error, and how it is made again."""
+
+    shape: Shape
+    name: str
+    again: str
+
+
+DIAGNOSIS: Shape = {
+    **HEAD,
+    "axis": one_of(AXES),
+    "verdict?": text,
+    "says?": text,
+    "effects?": [text],
+    "base?": BOTH_SIDES,
+    "noise_floor?": FLOOR,
+    "noiseless?": flag,
+    "runs?": [text],
+    "validation_runs?": [text],
+    "candidates?": [
+        {
+            "effect": text,
+            "train?": ERRORS,
+            "validation?": ERRORS,
+            "probability?": number(0.0, 1.0),
+            "explained?": number(0.0, 1.0),
+            "log_evidence?": number(),
+            "worse?": flag,
+        }
+    ],
+}
+DRAWN_DIAGNOSIS: Shape = {
+    **dict.fromkeys(("verdict", "base", "noise_floor"), anything),
+    "candidates": [{"train": anything, "validation": anything}],
+}
+"""What a report needs of a diagnosis beside that."""
+TURN_RADIUS: Shape = {
+    **HEAD,
+    "rudder_max_rad?": above_zero(LARGEST_FIN_RAD),
+    "rows": at_least_one(
+        {
+            "speed_m_s": SPEED,
+            "side": one_of(SIDES),
+            "radius_m": above_zero(),
+            "interval95": (number(0.0), number(0.0)),
+            "yaw_rate_max_rad_s": number(0.0),
+            "trust": text,
+            "extrapolated": flag,
+            **dict.fromkeys(("steady_radius_m?", "u_turn_radius_m?", "u_turn_time_s?"), maybe(number(0.0))),
+        }
+    ),
+}
+PLAN: Shape = {**HEAD, "axis?": one_of(AXES)}
+RUN_HEAD: Shape = {
+    **HEAD,
+    "schema": text,
+    "notes": [{"code": text, "message": text, "data": {"signal?": anything, "reach_rad?": number(0.0)}}],
+}
+"""What a run keeps beside its columns."""
+
+ANY = Kind(HEAD, "record", "make it again")
+"""A record of a kind that nothing is read back from but its head."""
+KINDS = {
+    "fieldsid/model": Kind(MODEL, "model file", "identify again, with `--force`"),
+    "fieldsid/fit": Kind(FIT, "fit file", "make it again: `sysid fit MODEL...`"),
+    "fieldsid/schedule": Kind(SCHEDULE, "schedule", "design it again, with `--force`"),
+    "fieldsid/diagnosis": Kind(DIAGNOSIS, "diagnosis", "diagnose again, with `-o`"),
+    "fieldsid/turn-radius": Kind(TURN_RADIUS, "prediction of turns", "predict it again, with `--force`"),
+    "fieldsid/run": Kind(RUN_HEAD, "run", "import the log again, with `--force`"),
+    "fieldsid/plan": Kind(PLAN, "plan", "plan again, with `--force`"),
+    "fieldsid/prior": Kind(HEAD, "prior", "correct it; `sysid init NAME` writes an example"),
+}

@@ -1,0 +1,27 @@
+"""What a fit file holds: laws over speed, the points they were drawn through, and the models these came from."""
+
+from __future__ import annotations
+
+from fieldsid.records.check import AXES, HEAD, Shape, at_least_one, each, maybe, number, one_of, text, whole
+from fieldsid.records.model import EXPONENT, MODEL, SPEED
+
+LARGEST_COEFFICIENT = 1e6
+"""Of a law of powers of the speed, SI: no vehicle damps or turns so fast."""
+LARGEST_LOGARITHM = 50.0
+"""Of the two numbers of a law k u^e, which are ln k and e."""
+REGRESSION: Shape = {
+    "kind": text,
+    "powers": [EXPONENT],
+    "coefficients": [number(-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT)],
+    "covariance": [[maybe(number(-(LARGEST_COEFFICIENT**2), LARGEST_COEFFICIENT**2))]],
+    "dof": whole,
+    "r2": maybe(number()),
+    "rms": maybe(number(0.0)),
+}
+FIT: Shape = {
+    **HEAD,
+    "axis": one_of(AXES),
+    "points": at_least_one({"name": text, "speed_m_s": SPEED, "values": each(number()), "std_errors": each(number(0.0))}),
+    "laws": each({"sign": number(-1.0, 1.0), "chosen": text, "candidates": each(REGRESSION)}),
+    "models?": [{"name": text, "record": MODEL}],
+}

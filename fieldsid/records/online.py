@@ -1,0 +1,55 @@
+"""What a saved state of a live estimate holds, array by array."""
+
+from __future__ import annotations
+
+from fieldsid.records.check import AXES, Shape, above_zero, each, flag, maybe, number, one_of, text, times, whole
+
+ANY = number(-1e60, 1e60)
+"""A number whose squares are numbers still."""
+NOT_MEASURED = maybe(ANY)
+COUNT = number(0.0, 1e15)
+RECENT = 256
+GATE: Shape = {"recent": times(RECENT, NOT_MEASURED), "seen": whole, "limit": maybe(number(0.0)), "spikes": whole}
+FILTER: Shape = {
+    "memory": times(30, ANY),
+    "packed": times(14, ANY),
+    "late": [(ANY, NOT_MEASURED, flag)],
+    "moves": [(ANY, ANY)],
+    "numbers": {"fin": NOT_MEASURED, "last_angle": NOT_MEASURED},
+    "counts": dict.fromkeys(("used", "missing", "repeated", "gaps", "restarts", "late"), whole),
+    "colour": {
+        "numbers": (COUNT, ANY, COUNT, COUNT, COUNT),
+        "0": times(5, ANY),
+        "1": times(129 * 5, ANY),
+        "2": times(129 * 25, ANY),
+    },
+    "angle_gate": GATE,
+    "rate_gate": GATE,
+}
+LOOK: Shape = {
+    "time": NOT_MEASURED,
+    "values": each(NOT_MEASURED),
+    "std_errors": each(NOT_MEASURED),
+    "used": whole,
+    "speed": NOT_MEASURED,
+}
+STATE: Shape = {
+    "schema": text,
+    "source": text,
+    "state": {
+        "version": whole,
+        "axis": one_of(AXES),
+        "settings": {"bandwidth": number(0.01, 1000.0), "forgetting": above_zero(1.0)},
+        "by_rate": maybe(flag),
+        "first_time": NOT_MEASURED,
+        "window": times(1024, (NOT_MEASURED, NOT_MEASURED, NOT_MEASURED, NOT_MEASURED)),
+        "seen": whole,
+        "noise": (above_zero(), above_zero()),
+        "speed": (ANY, whole),
+        "filter": maybe(FILTER),
+    },
+    "watch": {
+        "looks": [LOOK],
+        "excitation": {"time": NOT_MEASURED, **dict.fromkeys(("weights", "means", "squares"), (ANY, ANY))},
+    },
+}
