@@ -31,7 +31,7 @@ SUB_ROOMS = {
     "models": ("helpers",),
     "noise": ("kalman",),
     "fitting": ("problem", "regression", "optimise", "covariance", "initial", "predict", "checks"),
-    "diagnosis": ("data", "evidence", "residual_tests", "search", "report"),
+    "diagnosis": ("data", "evidence", "residual_tests", "moves", "search", "report"),
     "planning": ("specify", "belief", "flight", "safety", "design", "discriminate", "output"),
     "plant": ("laws",),
     "turning": ("measured", "steady", "maneuvering"),

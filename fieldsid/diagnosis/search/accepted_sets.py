@@ -10,7 +10,7 @@ import numpy as np
 from fieldsid.diagnosis.evidence.acceptance import is_accepted, lowers_error, settles_error, worst_error
 from fieldsid.diagnosis.evidence.noise_kind import sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.search.archive import Archive, Names
+from fieldsid.diagnosis.moves.archive import Archive, Names
 from fieldsid.diagnosis.thresholds import EXPLAINED_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.models.model import Noise
 

@@ -25,16 +25,16 @@ from fieldsid.diagnosis.evidence.acceptance import (
 )
 from fieldsid.diagnosis.evidence.noise_kind import fit_base, sensor_noise
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
+from fieldsid.diagnosis.moves.archive import Archive, Names
+from fieldsid.diagnosis.moves.drop_effect import drop_each
+from fieldsid.diagnosis.moves.grounds import Grounds
+from fieldsid.diagnosis.moves.grow import Growth
+from fieldsid.diagnosis.moves.refit import refit_from_parts
+from fieldsid.diagnosis.moves.speed_law_search import error_product, fit_base_output_error, other_speed_law, speed_laws
+from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
-from fieldsid.diagnosis.search.archive import Archive, Names
 from fieldsid.diagnosis.search.budget import Budget
-from fieldsid.diagnosis.search.drop_effect import drop_each
-from fieldsid.diagnosis.search.grounds import Grounds
-from fieldsid.diagnosis.search.grow import Growth
-from fieldsid.diagnosis.search.refit import refit_from_parts
-from fieldsid.diagnosis.search.speed_law_search import error_product, fit_base_output_error, other_speed_law, speed_laws
-from fieldsid.diagnosis.search.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.search.whole_hull import whole_hull
 from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of

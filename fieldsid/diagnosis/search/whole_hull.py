@@ -14,10 +14,10 @@ import numpy as np
 
 from fieldsid.diagnosis.evidence.likelihood_fit import LikelihoodFit
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.search.add_effect import likelihood_linearisation
-from fieldsid.diagnosis.search.archive import Archive
-from fieldsid.diagnosis.search.grounds import Grounds
-from fieldsid.diagnosis.search.variant_search import VariantRequest, try_variants
+from fieldsid.diagnosis.moves.add_effect import likelihood_linearisation
+from fieldsid.diagnosis.moves.archive import Archive
+from fieldsid.diagnosis.moves.grounds import Grounds
+from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.fitting.initial.effect_screen import ScreenResult, backtrack, screen_points
 from fieldsid.models.effect import Effect
 

@@ -13,14 +13,14 @@ import pytest
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, likelihood_at
 from fieldsid.diagnosis.evidence.scored_model import score_model
+from fieldsid.diagnosis.moves import grow
+from fieldsid.diagnosis.moves.add_effect import Addition, by_effects, foremost, mechanisms, screen_addition
+from fieldsid.diagnosis.moves.archive import Archive
+from fieldsid.diagnosis.moves.drop_effect import drop_each
+from fieldsid.diagnosis.moves.grow import Growth
+from fieldsid.diagnosis.moves.refit import refit_from_parts
 from fieldsid.diagnosis.records import Errors
-from fieldsid.diagnosis.search import grow
 from fieldsid.diagnosis.search.accepted_sets import core_of
-from fieldsid.diagnosis.search.add_effect import Addition, by_effects, foremost, mechanisms, screen_addition
-from fieldsid.diagnosis.search.archive import Archive
-from fieldsid.diagnosis.search.drop_effect import drop_each
-from fieldsid.diagnosis.search.grow import Growth
-from fieldsid.diagnosis.search.refit import refit_from_parts
 from fieldsid.diagnosis.search.search import MAX_CANDIDATES, Search
 from fieldsid.diagnosis.search.whole_hull import HULLS_OWN, whole_hull
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS, EVIDENCE_TEMPERATURE

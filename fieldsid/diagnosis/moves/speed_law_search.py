@@ -10,8 +10,8 @@ import numpy as np
 from fieldsid.diagnosis.evidence.acceptance import keeps_error, leaves_error
 from fieldsid.diagnosis.evidence.likelihood_fit import FittedProblem, fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
-from fieldsid.diagnosis.search.archive import Archive, Names
-from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.diagnosis.moves.archive import Archive, Names
+from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.diagnosis.thresholds import ALTERNATIVE_LOG_ODDS
 from fieldsid.fitting.initial.effect_screen import (
     backtrack,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.search.archive import Archive
-from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.diagnosis.moves.archive import Archive
+from fieldsid.diagnosis.moves.grounds import Grounds
 
 
 def refit_from_parts(models: Sequence[ScoredModel], tried: Archive, grounds: Grounds) -> bool:

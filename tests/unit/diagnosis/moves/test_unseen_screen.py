@@ -11,8 +11,8 @@ from truth.physics import Physics
 
 from fieldsid.diagnosis.diagnose import diagnose
 from fieldsid.diagnosis.evidence.acceptance import validation_error_ratio
+from fieldsid.diagnosis.moves.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.search.search import Search
-from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
 from fieldsid.diagnosis.thresholds import MAX_VALIDATION_ERROR_RATIO
 from fieldsid.effects import all_effects
 from fieldsid.logs.run import Run

@@ -11,8 +11,8 @@ import numpy as np
 from fieldsid.diagnosis.evidence.acceptance import gains_evidence, keeps_error, leaves_error, validation_error_ratio
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, score_model
-from fieldsid.diagnosis.search.archive import Archive
-from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.diagnosis.moves.archive import Archive
+from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.diagnosis.thresholds import MAX_VALIDATION_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.initial.effect_screen import carry_parameters

@@ -12,8 +12,7 @@ from dataclasses import replace
 
 from fieldsid.diagnosis.evidence.likelihood_fit import fit_output_error
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search.add_effect import (
+from fieldsid.diagnosis.moves.add_effect import (
     MAX_EFFECTS_LATER,
     MIN_OUTPUT_ERROR_COST_SHARE,
     SearchMove,
@@ -21,6 +20,7 @@ from fieldsid.diagnosis.search.add_effect import (
     iterate_points,
     mechanisms,
 )
+from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.fitting.initial.effect_screen import carry_parameters, linearise_at, screen_points, with_effect
 from fieldsid.fitting.problem.parameters import layout_of, speed_groups
 from fieldsid.fitting.problem.problem import Problem

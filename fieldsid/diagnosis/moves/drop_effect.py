@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.search.archive import Archive
-from fieldsid.diagnosis.search.grounds import Grounds
+from fieldsid.diagnosis.moves.archive import Archive
+from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.fitting.initial.effect_screen import carry_parameters
 from fieldsid.fitting.optimise.levenberg_marquardt import cost_of
 from fieldsid.models.effect import Effect

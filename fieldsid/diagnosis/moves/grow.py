@@ -26,7 +26,7 @@ from fieldsid.diagnosis.evidence.likelihood_fit import (
     prefer_smaller_equivalent,
 )
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel, prefer_output_error, score_model
-from fieldsid.diagnosis.search.add_effect import (
+from fieldsid.diagnosis.moves.add_effect import (
     FOREMOST_EFFECTS,
     MAX_EFFECTS_AT_BASE,
     MAX_EFFECTS_LATER,
@@ -37,11 +37,11 @@ from fieldsid.diagnosis.search.add_effect import (
     is_redundant_start,
     screen_addition,
 )
-from fieldsid.diagnosis.search.archive import Archive, Names
-from fieldsid.diagnosis.search.grounds import Grounds
-from fieldsid.diagnosis.search.speed_law_search import under_other_law
-from fieldsid.diagnosis.search.unseen_screen import moves_of_all_runs
-from fieldsid.diagnosis.search.variant_search import VariantRequest, try_variants
+from fieldsid.diagnosis.moves.archive import Archive, Names
+from fieldsid.diagnosis.moves.grounds import Grounds
+from fieldsid.diagnosis.moves.speed_law_search import under_other_law
+from fieldsid.diagnosis.moves.unseen_screen import moves_of_all_runs
+from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.thresholds import (
     MAIN_EXPLAINED_SHARE,
     MAX_ERROR_RATIO,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fieldsid.diagnosis.evidence.scored_model import ScoredModel
-from fieldsid.diagnosis.search.archive import Archive
+from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.search.search import Search
 from fieldsid.effects import all_effects
 from fieldsid.models.axis import Axis
