@@ -49,8 +49,15 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Canonical signal names and their units; `thrust` may be in any unit."""
+PART = "["
+"""What stands behind a signal in the name of an entry of its sum: `rudder_rad[0]`."""
 GOALS = frozenset({"yaw_goal_rad", "pitch_goal_rad"})
 """The angles that an autopilot was told to hold."""
+
+
+def signal_of(name: str) -> str:
+    """Return the signal that a source is for: the entries of a sum are named `rudder_rad[0]`, `rudder_rad[1]` and so on."""
+    return name.partition(PART)[0]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
