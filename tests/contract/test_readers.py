@@ -74,6 +74,15 @@ def as_lsf(folder):
     )
 
 
+def as_tables(folder):
+    """The motion in one table, the command in another."""
+    place = folder / "log"
+    place.mkdir()
+    for name, kept in (("fins", ["rudder_rad"]), ("motion", [s for s in SIGNALS if s != "rudder_rad"])):
+        save_run(Run(name, TIME, {s: SIGNALS[s] for s in kept}), place / f"{name}.csv")
+    return place, by_topic({n: ("fins" if n == "rudder_rad" else "motion", n) for n in SIGNALS})
+
+
 MADE = {
     "csv_table": as_csv,
     "parquet": as_parquet,
@@ -84,6 +93,7 @@ MADE = {
     "ardupilot": as_ardupilot,
     "slocum": as_slocum,
     "lsf": as_lsf,
+    "several_tables": as_tables,
 }
 
 
@@ -94,6 +104,7 @@ MISSPELT = {
     "ardupilot": Source(topic="TRI", path="S33"),
     "slocum": Source(topic="rudder_rd", path="data"),
     "lsf": Source(topic="EstimatedState", path="rudder_rd"),
+    "several_tables": Source(topic="fins", path="rudder_rd"),
 }
 """Sources of logs of topics that are not there; all others are tables."""
 

@@ -145,7 +145,7 @@ def channel_of(text: str) -> tuple[str, Source]:
 
 def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
     frame = frame_of(file.frame, place)
-    sources = {name: source for signal, item in file.signals.items() for name, source in _sources(signal, item, place).items()}
+    sources = {name: source for signal, item in file.signals.items() for name, source in _sources(signal, item, place)}
     if not sources:
         raise MappingError(
             f"{place} maps no signal",
@@ -203,17 +203,18 @@ def _time(time: _Time, place: str) -> Source:
     )
 
 
-def _sources(signal: str, item: _Source | str | int, place: str) -> dict[str, Source]:
-    """Return where a signal is, under its own name, or each entry of its sum under a name with a number."""
+def _sources(signal: str, item: _Source | str | int, place: str) -> list[tuple[str, Source]]:
+    """Return where a signal is with its own name, or each entry of its sum with a name that has a number."""
     known = (*COMBINED, *SIGNALS)
     if signal not in known:
         raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
     if not isinstance(item, _Source):
         item = validated(_Source, {"column": item}, place=f"{place}, `{signal}`", error=MappingError)
     if item.sum is None:
-        return {signal: _source(signal, item, place)}
+        return [(signal, _source(signal, item, place))]
     _check_sum(signal, item, place)
-    return {f"{signal}{PART}{i}]": _source(f"{signal}{PART}{i}]", entry, place) for i, entry in enumerate(item.sum)}
+    named = [(f"{signal}{PART}{i}]", entry) for i, entry in enumerate(item.sum)]
+    return [(name, _source(name, entry, place)) for name, entry in named]
 
 
 def _check_sum(signal: str, item: _Source, place: str) -> None:
@@ -239,8 +240,9 @@ def _check_sum(signal: str, item: _Source, place: str) -> None:
 
 def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
     _check_place(signal, item, place)
-    if item.unit is not None and not (isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit) is not None):
-        # The scale of an entry turns its unit, as the N of a thruster, to that of the sum.
+    # The scale of an entry turns its unit, as the N of a thruster, to that of the sum.
+    is_turned = isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit or "") is not None
+    if item.unit is not None and not is_turned:
         _check_unit(signal, item.unit, place)
     if (signal in COMBINED or item.columns) and (item.sign != 1 or item.unit):
         raise MappingError(

@@ -69,6 +69,11 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
         raise _unreadable(path, error) from error
 
 
+def columns_of(path: Path, form: TableForm, options: ReadOptions) -> Columns:
+    """Return all columns of a table; raises LogError where it cannot be read."""
+    return _columns(path, _table(path))
+
+
 def _columns(path: Path, table: Any) -> Columns:
     names = tuple(table.column_names)
     return Columns(path, names, len(names), lambda i: _cells(table.column(i)))
