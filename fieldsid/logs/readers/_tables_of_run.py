@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 
-from fieldsid.errors import FieldsidError, LogError
+from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.reader import check_readable
 from fieldsid.logs.readers import csv_table
 from fieldsid.logs.several.run_names import common_start, name_of_run, names_apart, shared_start, stem_of
 
@@ -74,8 +75,11 @@ def _names(path: Path) -> tuple[str, ...]:
     if path.name.startswith(".") or not path.name.endswith(csv_table.READER.suffixes) or not path.is_file():
         return ()
     try:
+        check_readable(path)
         return csv_table.names_of(path, TableForm()) if csv_table.sniff(path) else ()
-    except (FieldsidError, OSError):  # a text that is no table, or that cannot be opened, is no part of a run
+    except LogError as error:
+        if isinstance(error.__cause__, OSError):  # what is in it is not known
+            raise
         return ()
 
 

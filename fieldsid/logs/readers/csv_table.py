@@ -65,10 +65,10 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
         return series_of(path, columns, mapping, tuple(table.notes), options)
 
 
-def columns_of(path: Path, form: TableForm, options: ReadOptions) -> Columns:
-    """Return all columns of a table; raises LogError where it is none."""
+def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
+    """Return all columns of a table, and notes on it; raises LogError where it is none."""
     with _opened(path, form, options) as table:
-        return table.columns(range(table.form.width))
+        return table.columns(range(table.form.width)), tuple(table.notes)
 
 
 def names_of(path: Path, form: TableForm) -> tuple[str, ...]:

@@ -69,9 +69,9 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
         raise _unreadable(path, error) from error
 
 
-def columns_of(path: Path, form: TableForm, options: ReadOptions) -> Columns:
-    """Return all columns of a table; raises LogError where it cannot be read."""
-    return _columns(path, _table(path))
+def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
+    """Return all columns of a table, and no notes; raises LogError where it cannot be read."""
+    return _columns(path, _table(path)), ()
 
 
 def _columns(path: Path, table: Any) -> Columns:

@@ -29,10 +29,10 @@ from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import name_of_run
 from fieldsid.numerics.arrays import FloatArray
 
-TABLES: Mapping[str, Callable[[Path, TableForm, ReadOptions], Columns]] = MappingProxyType(
+TABLES: Mapping[str, Callable[[Path, TableForm, ReadOptions], tuple[Columns, tuple[Note, ...]]]] = MappingProxyType(
     {csv_table.READER.name: csv_table.columns_of, parquet.READER.name: parquet.columns_of}
 )
-"""The readers of one table, and what gives its columns."""
+"""The readers of one table, and what gives its columns and notes."""
 ALIKE_STEPS = 5.0
 """Steps by which two tables that count from a start of their own may begin and end apart, and be taken for one run unsaid."""
 
@@ -81,29 +81,33 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
 def _parts(
     path: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap, wanted: Collection[str] = ()
 ) -> tuple[dict[str, Part], tuple[Note, ...]]:
-    """Return the parts of a run by name, those of tables that a mapping may want, and a note on tables without a clock."""
+    """Return the parts of a run by name, those of tables that a mapping may want, and notes on the tables."""
     tables = names_in_run(run_of(path, options.joined))
     bare = {name.partition("[")[0] for name in wanted}
     chosen = {n: p for n, p in tables.items() if n in wanted or n.partition("[")[0] in bare} or tables
     parts: dict[str, Part] = {}
+    notes: list[Note] = []
     without: list[str] = []
     for i, (name, file) in enumerate(chosen.items()):
-        found = _of_table(name, file, options, form, mapping)
+        found, said = _of_table(name, file, options, form, mapping)
         parts |= found
+        notes += said
         without += [] if found else [file.name]
         options.progress((i + 1) / len(chosen))
     message = f"tables without a clock that is known, left out: {', '.join(without[:6])}{', ...' if len(without) > 6 else ''}"
-    return parts, (Note("no_clock", message, {"tables": without}),) if without else ()
+    return parts, (*notes, *([Note("no_clock", message, {"tables": without})] if without else []))
 
 
-def _of_table(name: str, file: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap) -> dict[str, Part]:
-    """Return the parts of one table; raises LogError for a file that is none."""
+def _of_table(
+    name: str, file: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap
+) -> tuple[dict[str, Part], list[Note]]:
+    """Return the parts of one table, and notes that name it; raises LogError for a file that is none."""
     reader = reader_of(file)
     if reader.name not in TABLES:
         raise LogError(
             f"`{file}` is no table, and only tables are joined", found=reader.says, hint="import it by itself, as it is"
         )
-    columns = TABLES[reader.name](file, form, replace(options, progress=lambda _: None))
+    columns, notes = TABLES[reader.name](file, form, replace(options, progress=lambda _: None))
     found = {}
     for device, rows in devices_of(columns).items():
         known = mapping.time if mapping.time is not None and set(mapping.time.places) <= {*rows.names} else None
@@ -111,7 +115,7 @@ def _of_table(name: str, file: Path, options: ReadOptions, form: TableForm, mapp
         topic = None if clock is None else topic_of(clock.time + clock.origin_s, _numbers(rows, clock))
         if clock is not None and topic is not None and topic.time.size > 1 and topic.fields:
             found[name + device] = Part(file, topic, _counts_from(clock))
-    return found
+    return found, [replace(note, message=f"{file.name}: {note.message}") for note in notes]
 
 
 def _numbers(columns: Columns, clock: Clock) -> dict[str, FloatArray]:
