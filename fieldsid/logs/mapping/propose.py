@@ -13,6 +13,7 @@ import numpy as np
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
+from fieldsid.logs.mapping.fins import with_several_fins
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps
 from fieldsid.logs.mapping.mend import mended
@@ -78,8 +79,20 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
             left = body["signals"].pop(signal)
             notes.append(Note("left_out", f"{signal} is not proposed from {_label(left)}: {error.what}", {"signal": signal}))
         else:
+            done = _with_several_fins(inventory, reader, options, done)
             return replace(done, notes=(*notes, *done.notes))
     return Proposal(body, notes=tuple(notes))
+
+
+def _with_several_fins(inventory: Inventory, reader: Reader, options: ReadOptions, done: Proposal) -> Proposal:
+    """Return a proposal with the fins that move each plane, where a log has several alike."""
+    if done.run is None:
+        return done
+    body, why = with_several_fins(inventory, reader, options, done.body, done.run)
+    if not why:
+        return done
+    again = _tried(inventory, reader, options, body)
+    return replace(again, notes=(*done.notes, *why, *again.notes))
 
 
 def _in_degrees_by_span(signals: dict[str, Any], inventory: Inventory) -> None:

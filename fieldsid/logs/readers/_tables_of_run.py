@@ -1,8 +1,8 @@
 """Which tables of a folder are one run, and what each of them is called in it.
 
 Loggers that write a file for each kind of message name them by it: `EstimatedState.csv`, `run7_state.csv`, `LOG_attitude_0.csv`.
-Tables with the same columns are several runs where each of their names goes with one of every other kind, or where each of them
-is a run by itself; else they are several devices of one run.
+Tables with the same columns are several runs where each of their names goes with one of every other kind, and where each of them
+is a run by itself or there is no other kind; else they are several devices of one run, as are those whose columns have no name.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from shlex import quote
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
+from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import check_readable
 from fieldsid.logs.readers import csv_table
@@ -42,7 +43,8 @@ def runs_in(folder: Path) -> list[list[Path]]:
         if len(names) > 1:
             by_header.setdefault(names, []).append(path)
     kinds = list(by_header.values())
-    if sum(map(len, kinds)) < 2 or any(len(kind) > 1 and _is_whole(names) for names, kind in by_header.items()):
+    signals = {names: _signals(names) for names, kind in by_header.items() if len(kind) > 1}
+    if sum(map(len, kinds)) < 2 or any(map(_is_whole, signals.values())) or (len(kinds) == 1 and any(signals.values())):
         return []
     marks = [_marks(kind) for kind in kinds]
     if len(kinds) > 1 and len(kinds[0]) > 1 and all(m.keys() == marks[0].keys() for m in marks):
@@ -83,9 +85,13 @@ def _names(path: Path) -> tuple[str, ...]:
         return ()
 
 
-def _is_whole(names: Sequence[str]) -> bool:
-    """Whether a table is a run by itself: it has a fin and what it turns."""
-    signals = {found[0] for name in names if (found := meaning_of(name)) is not None}
+def _signals(names: Sequence[str]) -> set[str]:
+    """Return what the columns of a table are by their names."""
+    return {found[0] for name in names if (found := meaning_of(name)) is not None and found[0] != TIME}
+
+
+def _is_whole(signals: set[str]) -> bool:
+    """Whether a table of some signals is a run by itself: it has a fin and what it turns."""
     return bool(signals & set(FINS)) and bool(signals & set(TURNING))
 
 
@@ -95,6 +101,5 @@ def _several(folder: Path, runs: Sequence[Sequence[Path]]) -> LogError:
     return LogError(
         f"`{folder}` holds {len(runs)} runs of {len(runs[0])} tables each",
         found=shown + ("; ..." if len(runs) > 4 else ""),
-        hint=f"one at a time: `sysid inspect --join {first} --write-mapping mapping.yaml`, then "
-        f"`sysid import --join {first} --mapping mapping.yaml -o runs/` and so on for each",
+        hint=f"one at a time, all with one mapping: `sysid inspect --join {first} --write-mapping mapping.yaml`",
     )

@@ -163,7 +163,7 @@ def _apart(parts: Mapping[str, Part]) -> LogError | None:
     return LogError(
         "the tables were never logged at the same time, and are not joined",
         found=f"`{first.file.name}` ends at {first.span[1]:.3f} s, `{latest.file.name}` starts at {latest.span[0]:.3f} s",
-        hint="they are several runs: join those that belong together, `sysid inspect --join A B`",
+        hint="they are several runs: name those that belong together, with --join",
     )
 
 

@@ -1,0 +1,229 @@
+"""Which fins move a plane, where a log has several alike: the sum of them that a mapping reads, with what speaks for it.
+
+Fins of one vehicle are called alike but for a number or a side. What each does to the rate of the plane is told by the numbers,
+see fin_shares.py; of an X tail the shares are 1/4 each, of twin rudders 1/2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import FieldsidError
+from fieldsid.logs.convert.clock import Track, held
+from fieldsid.logs.convert.servo_counts import COUNTS, FULL_RAD, servo_of
+from fieldsid.logs.convert.units import pick_unit
+from fieldsid.logs.mapping.fin_shares import FinShares, fin_shares
+from fieldsid.logs.mapping.mapping_file import mapping_of
+from fieldsid.logs.mapping.recognise import EXPLAINS, WINDOWS_S
+from fieldsid.logs.mapping.word_meaning import words_of
+from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Series
+from fieldsid.logs.run import Note, Run
+from fieldsid.numerics.arrays import FloatArray
+
+CALLED = frozenset({
+    "fin", "fins", "servo", "servomotor", "rudder", "rudders", "rud", "elevator", "elevators", "elev", "plane", "planes",
+    "sternplane", "sternplanes", "surface", "surfaces", "flap", "flaps", "foil", "actuator", "actuators", "output", "outputs",
+    "controls", "rcou", "delta", "pwm", "u", "input", "inputs",
+})  # fmt: skip
+"""Words of what may be a fin among others."""
+THRUSTERS = frozenset({"thrust", "thruster", "thrusters", "motor", "motors", "prop", "propeller", "esc", "jet", "engine", "rpm"})
+"""Words of what turns a vehicle by pushing more on one side."""
+STARBOARD = frozenset({"starboard", "stbd", "right", "s", "r", "sb"})
+SIDES = STARBOARD | frozenset({
+    "port", "left", "p", "l", "upper", "lower", "top", "bottom", "up", "down", "t", "b", "a", "c", "d", "ul", "ur", "ll", "lr",
+    "tl", "tr", "bl", "br", "pu", "pl", "su", "sl", "ne", "nw", "se", "sw", "i", "ii", "iii", "iv",
+})  # fmt: skip
+"""Words of where one of several fins is."""
+MOST = 16
+"""Fins and motors alike: more are no vehicle's."""
+PLANES = {
+    "rudder_rad": ("rudder_measured_rad", "yaw_rate_rad_s", "yaw_rad"),
+    "elevator_rad": ("elevator_measured_rad", "pitch_rate_rad_s", "pitch_rad"),
+}
+"""The fin of each plane, what was measured of it, and the rate and angle that it moves."""
+LARGEST_RAD, THRUST_RAD = 1.6, 0.4
+"""A larger angle is in degrees; what the largest difference of thrusters is taken for."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Fin:
+    """One of several fins: its name, how a mapping reads it, the rad that a count of it is worth, and its angle (n,)."""
+
+    name: str
+    item: Mapping[str, Any]
+    worth: float
+    values: FloatArray
+
+
+def with_several_fins(
+    inventory: Inventory, reader: Reader, options: ReadOptions, body: Mapping[str, Any], run: Run
+) -> tuple[dict[str, Any], list[Note]]:
+    """Return a mapping's body with the fins that move each plane, of several alike, and what speaks for them; else as it is."""
+    signals, notes = dict(body["signals"]), []
+    for signal in PLANES:
+        for family in _families(inventory):
+            if not _is_asked(signal, signals, family, run):
+                continue
+            fins = _read(inventory, reader, options, {**body, "signals": signals}, family, run)
+            found = _told(fins, run, signal) if len(fins) > 1 else None
+            if found is not None and found.explains >= EXPLAINS and not (signal in signals and _are_one(fins)):
+                signals[signal] = _item(fins, found)
+                _as_thrust(signals, fins, family)
+                notes.append(_evidence(signal, fins, found))
+                break
+    return ({**body, "signals": signals}, notes) if notes else (dict(body), [])
+
+
+def _families(inventory: Inventory) -> Iterator[dict[str, dict[str, Any]]]:
+    """Yield columns, or fields of topics, that are called alike but for a number or a side, as places in a mapping by name."""
+    families: dict[tuple[str, ...], dict[str, dict[str, Any]]] = {}
+    is_named = inventory.table is None or inventory.table.header
+    for channel in inventory.channels if is_named else ():
+        for info in channel.fields:
+            if (
+                info.kind in ("text", "numbers")
+                or info.means is not None
+                or (info.span is not None and info.span[0] == info.span[1])
+            ):
+                continue
+            name = f"{channel.name} {info.path}".strip() if inventory.by_topic else channel.name
+            words = words_of(name)
+            key = tuple("#" if w.isdigit() or (w in SIDES and i) else w for i, w in enumerate(words))
+            place = {"topic": channel.name, "field": info.path} if inventory.by_topic else {"column": channel.name}
+            if "#" in key and (CALLED | THRUSTERS) & set(key):
+                families.setdefault(key, {})[name] = place
+    yield from (family for family in families.values() if 1 < len(family) <= MOST)
+
+
+def _is_asked(signal: str, signals: Mapping[str, Any], family: Mapping[str, Any], run: Run) -> bool:
+    """Whether a plane that moves has no fin yet, or one of several alike."""
+    measured, rate, angle = PLANES[signal]
+    if not (run.has(rate) or run.has(angle)):
+        return False
+    if signal in signals:
+        return any(all(signals[signal].get(key) == value for key, value in place.items()) for place in family.values())
+    return measured not in signals
+
+
+def _read(
+    inventory: Inventory, reader: Reader, options: ReadOptions, body: Mapping[str, Any], family: Mapping[str, Any], run: Run
+) -> list[_Fin]:
+    """Return the fins of a family on the clock of the run, those that move; none where they cannot be read."""
+    signals = {"rudder_rad": {"sum": [{**place, "scale": 1.0} for place in family.values()]}}
+    lenient = ReadOptions(options.msg_path, salvage=True, joined=options.joined)
+    try:
+        raw = reader.read(inventory.path, mapping_of({**body, "signals": signals}), lenient)
+    except FieldsidError:  # what cannot be read is no fin
+        return []
+    shift = _origin_s(raw.notes) - _origin_s(run.notes)
+    fins = []
+    for (name, place), series in zip(family.items(), raw.series.values(), strict=True):
+        times = series.time + shift
+        good = np.isfinite(times) & np.isfinite(series.values)
+        values = held(Track(times[good], series.values[good]), run.time)
+        if np.isfinite(values).mean() > 0.5 and float(np.nanmax(values) - np.nanmin(values)) > 0.0:
+            fins.append(_fin(name, place, series, values))
+    return fins
+
+
+def _origin_s(notes: tuple[Note, ...]) -> float:
+    return next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
+
+
+def _fin(name: str, place: Mapping[str, Any], series: Series, values: FloatArray) -> _Fin:
+    """Return a fin with its angle in rad: by the unit in its name, as counts of a servo, or in degrees where it is too large."""
+    if series.unit is not None:
+        worth = pick_unit(series.unit).factor
+        return _Fin(name, place, 1.0, worth * values)
+    servo = servo_of(values)
+    if servo is not None:
+        worth = FULL_RAD / servo.travel
+        return _Fin(name, {**place, "unit": COUNTS, "centre": servo.centre}, worth, worth * (values - servo.centre))
+    if THRUSTERS & set(words_of(name)):
+        return _Fin(name, place, 1.0, values)
+    is_large = float(np.nanmax(np.abs(values))) > LARGEST_RAD
+    return _Fin(name, {**place, "unit": "deg" if is_large else "rad"}, 1.0, np.radians(values) if is_large else values)
+
+
+def _are_one(fins: list[_Fin]) -> bool:
+    """Whether all fins have the same numbers: one of them is all of them."""
+    return all(np.array_equal(fin.values, fins[0].values, equal_nan=True) for fin in fins)
+
+
+def _told(fins: list[_Fin], run: Run, signal: str) -> FinShares | None:
+    """Return what fins do to the rate of their plane, over the window in which they explain most; None where nothing is told."""
+    _, rate, angle = PLANES[signal]
+    moved = _rate_of(run, rate, angle)
+    step = float(np.median(np.diff(run.time)))
+    right = run[angle] if signal == "elevator_rad" and run.has(angle) else None
+    values = [fin.values for fin in fins]
+    every = [fin_shares(values, run.time, moved, right, max(2, round(window / step))) for window in WINDOWS_S[:2]]
+    return max((f for f in every if f is not None), key=lambda f: f.explains, default=None)
+
+
+def _rate_of(run: Run, rate: str, angle: str) -> FloatArray:
+    if run.has(rate):
+        return run[rate]
+    return np.gradient(run[angle], run.time)
+
+
+def _item(fins: list[_Fin], found: FinShares) -> dict[str, Any]:
+    """Return how a mapping reads the fins that do something: one of them alone, or their sum."""
+    used = [(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
+    if len(used) == 1:
+        return dict(used[0][0].item)
+    turned, worth = _sign(used), _worth_of_all(used)
+    return {"sum": [{**fin.item, "scale": _rounded(turned * share * fin.worth * worth)} for fin, share in used]}
+
+
+def _sign(used: list[tuple[_Fin, float]]) -> float:
+    """Return the sign with which the starboard one of two thrusters counts as positive, of fins the first."""
+    pushing = [share for fin, share in used if THRUSTERS & set(words_of(fin.name)) and STARBOARD & set(words_of(fin.name))]
+    return math.copysign(1.0, pushing[0] if pushing else used[0][1])
+
+
+def _worth_of_all(used: list[tuple[_Fin, float]]) -> float:
+    """Return the rad that thrusters' numbers are taken for, by the largest difference; one of fins, which are angles."""
+    if any("unit" in fin.item or not THRUSTERS & set(words_of(fin.name)) for fin, _ in used):
+        return 1.0
+    largest = float(np.nanmax(np.abs(np.sum([share * (fin.values - np.nanmedian(fin.values)) for fin, share in used], axis=0))))
+    return float(f"{THRUST_RAD / largest:.0e}") if largest > 0.0 else 1.0
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def _as_thrust(signals: dict[str, Any], fins: list[_Fin], family: Mapping[str, Any]) -> None:
+    """Take the mean of several thrusters for the thrust, where one of them was."""
+    thrust = signals.get("thrust", {})
+    if any(all(thrust.get(key) == value for key, value in place.items()) for place in family.values()):
+        share = _rounded(1.0 / len(fins))
+        signals["thrust"] = {"sum": [{**fin.item, "scale": share} for fin in fins]}
+
+
+def _evidence(signal: str, fins: list[_Fin], found: FinShares) -> Note:
+    used = [(fin.name, share, was) for fin, share, was in zip(fins, found.shares, found.fitted, strict=True) if share != 0.0]
+    turned = _sign([(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0])
+    rate = PLANES[signal][1].removesuffix("_rad_s").replace("_", " ")
+    told = " ".join(f"{'-' if turned * share < 0.0 else '+'} {_fraction(abs(share))} {name}" for name, share, _ in used)
+    was = ", ".join(f"{turned * value:.2g}" for _, _, value in used)
+    message = (
+        f"{signal} is {told.removeprefix('+ ')}: together they explain {100 * found.explains:.0f} % of what the {rate}'s change "
+        f"has beside the rate's own, the best one alone {100 * found.best_alone:.0f} %; fitted {was}"
+    )
+    if found.patterns < len(used):
+        ways = "together only" if found.patterns == 1 else f"in {found.patterns} patterns only"
+        message += f"; they moved {ways}: how much of it each of them does is not told by this log, and taken by how far it went"
+    return Note("evidence", message, {"signal": signal, "fins": {name: turned * float(share) for name, share, _ in used}})
+
+
+def _fraction(share: float) -> str:
+    simple = Fraction(share).limit_denominator(12)
+    return str(simple) if abs(float(simple) - share) < 1e-6 else f"{share:.2f}"
