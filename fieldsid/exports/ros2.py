@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fieldsid.exports._target import NAMES, Target, columns_of, decimal, notes_of
+from fieldsid.models.allocation import PlaneFins
 from fieldsid.schedule.record import Schedule
 
 
@@ -17,7 +18,15 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
     lines = [f"# {line}" for line in notes_of(schedule)]
     lines += [f"{_key(node)}:", "  ros__parameters:", f"    {name}:", f'      controller: "{schedule.kind}"']
     lines += [f"      {column}: [{', '.join(decimal(v) for v in values)}]" for column, values in columns_of(schedule).items()]
+    if schedule.fins is not None:
+        names = ", ".join(f'"{n}"' for n in schedule.fins.names)
+        lines.append(f"      fin_names: [{names}]")
+        lines += [f"      {key}: [{', '.join(map(decimal, values))}]" for key, values in _of_fins(schedule.fins)]
     return "\n".join(lines) + "\n"
+
+
+def _of_fins(fins: PlaneFins) -> list[tuple[str, tuple[float, ...]]]:
+    return [("fin_shares", fins.shares), ("fin_limits", fins.limits)]
 
 
 def _key(node: str) -> str:

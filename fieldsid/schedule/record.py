@@ -15,6 +15,7 @@ from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
+from fieldsid.models.allocation import PlaneFins, plane_fins_of
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import finite_number
 from fieldsid.schedule.controller import Gains
@@ -90,6 +91,12 @@ class Schedule(Plotted):
     def speeds(self) -> tuple[float, ...]:
         """Speeds of the rows, m/s."""
         return tuple(r.speed for r in self.rows)
+
+    @property
+    def fins(self) -> PlaneFins | None:
+        """The fins that the command is made of; None where it is one."""
+        body = self.provenance.get("fins")
+        return None if body is None else plane_fins_of(body)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -204,4 +211,6 @@ def _provenance(body: Mapping[str, Any]) -> dict[str, Any]:
     if "supported_m_s" in said:
         low, high = said["supported_m_s"]
         said["supported_m_s"] = [finite_number(low, "supported_m_s"), finite_number(high, "supported_m_s")]
+    if "fins" in said:
+        said["fins"] = plane_fins_of(said["fins"]).record()
     return {**said, "models": files, "runs": runs, "inputs": inputs}
