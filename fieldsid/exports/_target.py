@@ -60,7 +60,7 @@ def notes_of(schedule: Schedule) -> list[str]:
         f"outside the rows: {p.get('outside_rows', '')}",
         f"supported by data from {low:.2f} to {high:.2f} m/s (supported = 1.0)",
         f"least margins: {phase:.0f} deg, {'no limit' if gain == float('inf') else f'{gain:.1f} dB'}, {delay:.2f} s of delay",
-        *([] if schedule.fins is None else schedule.fins.says({Axis.YAW: "rudder", Axis.PITCH: "elevator"}[schedule.axis])),
+        *schedule.fins_said,
         f"models: {models or 'none named'}",
         f"runs: {', '.join(map(str, p.get('runs', []))) or 'none named'}",
     ]

@@ -16,7 +16,7 @@ from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.allocation import PlaneFins, plane_fins_of
-from fieldsid.models.axis import Axis
+from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import finite_number
 from fieldsid.schedule.controller import Gains
 
@@ -97,6 +97,11 @@ class Schedule(Plotted):
         """The fins that the command is made of; None where it is one."""
         body = self.provenance.get("fins")
         return None if body is None else plane_fins_of(body)
+
+    @property
+    def fins_said(self) -> list[str]:
+        """What each of them is told, in words; nothing where the command is one fin."""
+        return [] if self.fins is None else self.fins.says(NAMES[self.axis].fin.removesuffix("_rad"))
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -47,6 +47,7 @@ PLANES = {
     "elevator_rad": ("elevator_measured_rad", "pitch_rate_rad_s", "pitch_rad"),
 }
 """The fin of each plane, what was measured of it, and the rate and angle that it moves."""
+PLACE = ("column", "topic", "field")
 LARGEST_RAD, THRUST_RAD = 1.6, 0.4
 """A larger angle is in degrees; what the largest difference of thrusters is taken for."""
 
@@ -72,7 +73,7 @@ def with_several_fins(
                 continue
             fins = _read(inventory, reader, options, {**body, "signals": signals}, family, run)
             found = _told(fins, run, signal) if len(fins) > 1 else None
-            if found is not None and found.explains >= EXPLAINS and not (signal in signals and _are_one(fins)):
+            if found is not None and found.explains >= EXPLAINS and not _is_known(signals.get(signal), fins, found):
                 signals[signal] = _item(fins, found)
                 _as_thrust(signals, fins, family)
                 notes.append(_evidence(signal, fins, found))
@@ -151,9 +152,14 @@ def _fin(name: str, place: Mapping[str, Any], series: Series, values: FloatArray
     return _Fin(name, {**place, "unit": "deg" if is_large else "rad"}, 1.0, np.radians(values) if is_large else values)
 
 
-def _are_one(fins: list[_Fin]) -> bool:
-    """Whether all fins have the same numbers: one of them is all of them."""
-    return all(np.array_equal(fin.values, fins[0].values, equal_nan=True) for fin in fins)
+def _is_known(item: Mapping[str, Any] | None, fins: list[_Fin], found: FinShares) -> bool:
+    """Whether one fin that a plane has already is all that moves it: the others do nothing, or have its numbers."""
+    if item is None:
+        return False
+    used = [fin for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
+    if all(np.array_equal(fin.values, used[0].values, equal_nan=True) for fin in used):
+        return any(all(item.get(key) == fin.item[key] for key in PLACE if key in fin.item) for fin in used)
+    return False
 
 
 def _told(fins: list[_Fin], run: Run, signal: str) -> FinShares | None:
