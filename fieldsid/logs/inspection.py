@@ -15,9 +15,11 @@ from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN
+from fieldsid.logs.convert.servo_counts import FINS
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.mapping.propose import Proposal, propose
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
+from fieldsid.logs.readers._tables_of_run import tables_beside
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.way_in import WayIn, way_in
 
@@ -116,6 +118,8 @@ def inspect_log(
         notes.append(Note("not_importable", f"{said}: {hint}" if hint else said, {"found": found, "hint": hint}))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
+    if not (set(FINS) & {*proposal.body["signals"], *(() if run is None else run.signals)} or joined):
+        notes += tables_beside(path)
     chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))
     way = WayIn() if run is None else way_in(path, run, notes, Importer(chosen, msg_path=msg_path, joined=tuple(joined)))
     if way.refusal is not None:

@@ -123,4 +123,4 @@ def _are_parallel(*rows: Sequence[float]) -> bool:
 def _within(told: FloatArray, limits: Sequence[float]) -> FloatArray:
     """Return fins (m, n) made less at each instant (n) by what keeps all of them within their limits (m,)."""
     beyond = np.max(np.abs(told) / np.asarray(limits)[:, None], axis=0)
-    return np.asarray(told / np.maximum(beyond, 1.0))
+    return np.asarray(told / np.maximum(beyond, 1.0)) + 0.0

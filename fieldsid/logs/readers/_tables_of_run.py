@@ -17,6 +17,7 @@ from fieldsid.logs.mapping.canonical_names import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import check_readable
 from fieldsid.logs.readers import csv_table
+from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import common_start, name_of_run, names_apart, shared_start, stem_of
 
 FINS, TURNING = ("rudder_rad", "elevator_rad"), ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s")
@@ -50,6 +51,21 @@ def runs_in(folder: Path) -> list[list[Path]]:
     if len(kinds) > 1 and len(kinds[0]) > 1 and all(m.keys() == marks[0].keys() for m in marks):
         return [[m[mark] for m in marks] for mark in marks[0]]
     return [sorted(path for kind in kinds for path in kind)]
+
+
+def tables_beside(path: Path) -> list[Note]:
+    """Return a note on the tables in the folder of a table that may be of its run, with the command that joins them."""
+    if path.is_dir() or str(path) == "-":
+        return []
+    runs = runs_in(path.parent)
+    own = next((run for run in runs if any(table.samefile(path) for table in run)), [])
+    others = [table for table in own if not table.samefile(path)]
+    if not others:
+        return []
+    files = quote(str(path.parent)) if len(runs) == 1 else " ".join(["--join", *(quote(str(p)) for p in own)])
+    shown = ", ".join(p.name for p in others[:6]) + (", ..." if len(others) > 6 else "")
+    message = f"no fin in it; beside it lie {shown}: where they are of the same run, `sysid inspect {files}`"
+    return [Note("tables_beside", message, {"tables": [str(p) for p in others]})]
 
 
 def names_in_run(tables: Sequence[Path]) -> dict[str, Path]:

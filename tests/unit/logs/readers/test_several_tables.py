@@ -179,3 +179,22 @@ def test_what_is_no_table_is_not_joined(tmp_path):
     log = write_alog(tmp_path / "x.alog", TIME, {"A": YAW})
     with pytest.raises(LogError, match="only tables are joined"):
         load_run(motion(tmp_path / "state.csv"), mapped("state", "x"), joined=[log])
+
+
+def test_a_table_without_a_fin_says_which_lie_beside_it(tmp_path):
+    state, _ = motion(tmp_path / "state.csv"), command(tmp_path / "input.csv")
+    (note,) = [n for n in inspect_log(state).notes if n.code == "tables_beside"]
+    assert f"beside it lie input.csv: where they are of the same run, `sysid inspect {tmp_path}`" in note.message
+    for k in (1, 2):
+        motion(tmp_path / "runs" / f"run{k}_state.csv")
+        command(tmp_path / "runs" / f"run{k}_input.csv")
+    (note,) = [n for n in inspect_log(tmp_path / "runs" / "run2_state.csv").notes if n.code == "tables_beside"]
+    assert f"`sysid inspect --join {tmp_path / 'runs' / 'run2_input.csv'} {tmp_path / 'runs' / 'run2_state.csv'}`" in note.message
+
+
+def test_a_table_with_a_fin_or_alone_says_nothing_of_others(tmp_path):
+    motion(tmp_path / "state.csv")
+    whole = table(tmp_path / "whole.csv", ["time_s", "yaw_rad", "rudder_rad"], *listed(TIME, YAW, RATE))
+    assert "tables_beside" not in {n.code for n in inspect_log(whole).notes}
+    alone = motion(tmp_path / "alone" / "state.csv")
+    assert "tables_beside" not in {n.code for n in inspect_log(alone).notes}
