@@ -133,3 +133,21 @@ def test_what_cannot_be_joined_is_refused(run_cli, words, says):
     refused = run_cli(*words)
     assert refused.code == 2
     assert says in refused.err
+
+
+def test_measured_fins_stand_beside_the_commanded(run_cli, tmp_path):
+    late = [np.concatenate([np.zeros(4), fin[:-4]]) for fin in made.x_fins()]  # 0.2 s behind
+    told = {f"fin{k}_cmd_deg": made.of(np.degrees(fin)) for k, fin in enumerate(made.x_fins(), 1)}
+    seen = {f"fin{k}_feedback_deg": made.of(np.degrees(fin)) for k, fin in enumerate(late, 1)}
+    motion = made.angles(made.motion(np.concatenate([np.zeros(4), made.RUDDER[:-4]])))
+    log = made.table(tmp_path / "x.csv", {"time_s": made.of(made.TIME), **motion, **seen, **told})
+    run, _ = imported(run_cli, log, tmp_path)
+    np.testing.assert_allclose(run["rudder_rad"], made.RUDDER, atol=1e-6)
+    np.testing.assert_allclose(run["rudder_measured_rad"][4:], made.RUDDER[:-4], atol=1e-6)
+
+
+def test_the_side_may_stand_first(run_cli, tmp_path):
+    sides = {"port_rudder": made.of(np.degrees(made.RUDDER) + 3.0), "starboard_rudder": made.of(np.degrees(made.RUDDER) - 3.0)}
+    log = made.table(tmp_path / "x.csv", {"time_s": made.of(made.TIME), **made.angles(made.motion(made.RUDDER)), **sides})
+    run, _ = imported(run_cli, log, tmp_path)
+    np.testing.assert_allclose(run["rudder_rad"], made.RUDDER, atol=1e-6)

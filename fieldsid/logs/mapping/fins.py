@@ -21,7 +21,7 @@ from fieldsid.logs.convert.units import pick_unit
 from fieldsid.logs.mapping.fin_shares import FinShares, fin_shares
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.recognise import EXPLAINS, WINDOWS_S
-from fieldsid.logs.mapping.word_meaning import words_of
+from fieldsid.logs.mapping.word_meaning import COMMANDED, MEASURED, words_of
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Series
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
@@ -42,14 +42,28 @@ SIDES = STARBOARD | frozenset({
 """Words of where one of several fins is."""
 MOST = 16
 """Fins and motors alike: more are no vehicle's."""
-PLANES = {
-    "rudder_rad": ("rudder_measured_rad", "yaw_rate_rad_s", "yaw_rad"),
-    "elevator_rad": ("elevator_measured_rad", "pitch_rate_rad_s", "pitch_rad"),
-}
-"""The fin of each plane, what was measured of it, and the rate and angle that it moves."""
 PLACE = ("column", "topic", "field")
-LARGEST_RAD, THRUST_RAD = 1.6, 0.4
-"""A larger angle is in degrees; what the largest difference of thrusters is taken for."""
+LARGEST_RAD, LARGEST_DEG, THRUST_RAD = 1.6, 180.0, 0.4
+"""A larger angle is in degrees, and a larger one yet in counts; what the largest difference of thrusters is taken for."""
+SHORT = 2
+"""Letters up to which a word is a side only behind another."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Plane:
+    """The fin of a plane, what was measured of it, the rate and angle that it moves, and whether the angle rights itself."""
+
+    fin: str
+    measured: str
+    rate: str
+    angle: str
+    rights: bool
+
+
+PLANES = (
+    _Plane("rudder_rad", "rudder_measured_rad", "yaw_rate_rad_s", "yaw_rad", rights=False),
+    _Plane("elevator_rad", "elevator_measured_rad", "pitch_rate_rad_s", "pitch_rad", rights=True),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,18 +81,26 @@ def with_several_fins(
 ) -> tuple[dict[str, Any], list[Note]]:
     """Return a mapping's body with the fins that move each plane, of several alike, and what speaks for them; else as it is."""
     signals, notes = dict(body["signals"]), []
-    for signal in PLANES:
+    done: set[str] = set()
+    for plane in PLANES:
         for family in _families(inventory):
-            if not _is_asked(signal, signals, family, run):
+            signal = plane.measured if _is_measured(family) else plane.fin
+            if signal in done or not _is_asked(signal, plane, {**body, "signals": signals}, family, run):
                 continue
             fins = _read(inventory, reader, options, {**body, "signals": signals}, family, run)
-            found = _told(fins, run, signal) if len(fins) > 1 else None
+            found = _told(fins, run, plane) if len(fins) > 1 else None
             if found is not None and found.explains >= EXPLAINS and not _is_known(signals.get(signal), fins, found):
                 signals[signal] = _item(fins, found)
+                done.add(signal)
                 _as_thrust(signals, fins, family)
-                notes.append(_evidence(signal, fins, found))
-                break
+                notes.append(_evidence(signal, plane, fins, found))
     return ({**body, "signals": signals}, notes) if notes else (dict(body), [])
+
+
+def _is_measured(family: Mapping[str, Any]) -> bool:
+    """Whether fins are told as they were measured, by their names."""
+    words = {word for name in family for word in words_of(name)}
+    return bool(words & MEASURED) and not words & (COMMANDED | {"set"})
 
 
 def _families(inventory: Inventory) -> Iterator[dict[str, dict[str, Any]]]:
@@ -95,21 +117,22 @@ def _families(inventory: Inventory) -> Iterator[dict[str, dict[str, Any]]]:
                 continue
             name = f"{channel.name} {info.path}".strip() if inventory.by_topic else channel.name
             words = words_of(name)
-            key = tuple("#" if w.isdigit() or (w in SIDES and i) else w for i, w in enumerate(words))
+            key = tuple("#" if w.isdigit() or (w in SIDES and (i or len(w) > SHORT)) else w for i, w in enumerate(words))
             place = {"topic": channel.name, "field": info.path} if inventory.by_topic else {"column": channel.name}
             if "#" in key and (CALLED | THRUSTERS) & set(key):
                 families.setdefault(key, {})[name] = place
     yield from (family for family in families.values() if 1 < len(family) <= MOST)
 
 
-def _is_asked(signal: str, signals: Mapping[str, Any], family: Mapping[str, Any], run: Run) -> bool:
-    """Whether a plane that moves has no fin yet, or one of several alike."""
-    measured, rate, angle = PLANES[signal]
-    if not (run.has(rate) or run.has(angle)):
+def _is_asked(signal: str, plane: _Plane, body: Mapping[str, Any], family: Mapping[str, Any], run: Run) -> bool:
+    """Whether a plane that moves has no fin yet, one of several alike, or a sum of them beside which these were measured."""
+    signals = body["signals"]
+    if not (run.has(plane.rate) or run.has(plane.angle)):
         return False
     if signal in signals:
         return any(all(signals[signal].get(key) == value for key, value in place.items()) for place in family.values())
-    return measured not in signals
+    others = [signals[s] for s in (plane.fin, plane.measured) if s in signals]
+    return all("sum" in item for item in others)
 
 
 def _read(
@@ -148,7 +171,12 @@ def _fin(name: str, place: Mapping[str, Any], series: Series, values: FloatArray
         return _Fin(name, {**place, "unit": COUNTS, "centre": servo.centre}, worth, worth * (values - servo.centre))
     if THRUSTERS & set(words_of(name)):
         return _Fin(name, place, 1.0, values)
-    is_large = float(np.nanmax(np.abs(values))) > LARGEST_RAD
+    largest = float(np.nanmax(np.abs(values)))
+    if largest > LARGEST_DEG:
+        centre = float(round(np.nanmedian(values)))
+        worth = FULL_RAD / float(np.nanmax(np.abs(values - centre)))
+        return _Fin(name, {**place, "unit": COUNTS, "centre": centre}, worth, worth * (values - centre))
+    is_large = largest > LARGEST_RAD
     return _Fin(name, {**place, "unit": "deg" if is_large else "rad"}, 1.0, np.radians(values) if is_large else values)
 
 
@@ -162,21 +190,14 @@ def _is_known(item: Mapping[str, Any] | None, fins: list[_Fin], found: FinShares
     return False
 
 
-def _told(fins: list[_Fin], run: Run, signal: str) -> FinShares | None:
+def _told(fins: list[_Fin], run: Run, plane: _Plane) -> FinShares | None:
     """Return what fins do to the rate of their plane, over the window in which they explain most; None where nothing is told."""
-    _, rate, angle = PLANES[signal]
-    moved = _rate_of(run, rate, angle)
+    moved = run[plane.rate] if run.has(plane.rate) else np.gradient(run[plane.angle], run.time)
     step = float(np.median(np.diff(run.time)))
-    right = run[angle] if signal == "elevator_rad" and run.has(angle) else None
+    right = run[plane.angle] if plane.rights and run.has(plane.angle) else None
     values = [fin.values for fin in fins]
     every = [fin_shares(values, run.time, moved, right, max(2, round(window / step))) for window in WINDOWS_S[:2]]
     return max((f for f in every if f is not None), key=lambda f: f.explains, default=None)
-
-
-def _rate_of(run: Run, rate: str, angle: str) -> FloatArray:
-    if run.has(rate):
-        return run[rate]
-    return np.gradient(run[angle], run.time)
 
 
 def _item(fins: list[_Fin], found: FinShares) -> dict[str, Any]:
@@ -214,10 +235,10 @@ def _as_thrust(signals: dict[str, Any], fins: list[_Fin], family: Mapping[str, A
         signals["thrust"] = {"sum": [{**fin.item, "scale": share} for fin in fins]}
 
 
-def _evidence(signal: str, fins: list[_Fin], found: FinShares) -> Note:
+def _evidence(signal: str, plane: _Plane, fins: list[_Fin], found: FinShares) -> Note:
     used = [(fin.name, share, was) for fin, share, was in zip(fins, found.shares, found.fitted, strict=True) if share != 0.0]
     turned = _sign([(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0])
-    rate = PLANES[signal][1].removesuffix("_rad_s").replace("_", " ")
+    rate = plane.rate.removesuffix("_rad_s").replace("_", " ")
     told = " ".join(f"{'-' if turned * share < 0.0 else '+'} {_fraction(abs(share))} {name}" for name, share, _ in used)
     was = ", ".join(f"{turned * value:.2g}" for _, _, value in used)
     message = (
