@@ -76,4 +76,4 @@ def of_import(body: Body) -> Headline:
 
 
 def _logs(runs: Sequence[Body]) -> list[str]:
-    return list(dict.fromkeys(Path(r["log"]).name for r in runs))
+    return list(dict.fromkeys(Path(r["log"]).resolve().name for r in runs))
