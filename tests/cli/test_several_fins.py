@@ -151,3 +151,16 @@ def test_the_side_may_stand_first(run_cli, tmp_path):
     log = made.table(tmp_path / "x.csv", {"time_s": made.of(made.TIME), **made.angles(made.motion(made.RUDDER)), **sides})
     run, _ = imported(run_cli, log, tmp_path)
     np.testing.assert_allclose(run["rudder_rad"], made.RUDDER, atol=1e-6)
+
+
+@pytest.mark.parametrize(("names", "middle", "reach"), [(("left", "right"), 40, 30), (("motor_l", "motor_r"), 90, 60)])
+def test_thrusters_called_by_their_side_and_in_bytes_are_read_alike(run_cli, tmp_path, names, middle, reach):
+    apart = made.RUDDER / 0.2 * reach
+    sides = dict(zip(names, ([round(v) for v in middle + sign * apart] for sign in (-1.0, 1.0)), strict=True))
+    log = made.table(tmp_path / "x.csv", {"time_s": made.of(made.TIME), **made.angles(made.motion(made.RUDDER)), **sides})
+    run, record = imported(run_cli, log, tmp_path)
+    entries = record["mapping"]["signals"]["rudder_rad"]["sum"]
+    assert entries[0]["scale"] == -entries[1]["scale"] < 0.0
+    assert entries[0].get("unit") == entries[1].get("unit")
+    scale = run["rudder_rad"] @ made.RUDDER / (made.RUDDER @ made.RUDDER)
+    np.testing.assert_allclose(run["rudder_rad"], scale * made.RUDDER, atol=0.02)

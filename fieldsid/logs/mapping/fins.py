@@ -29,10 +29,12 @@ from fieldsid.numerics.arrays import FloatArray
 CALLED = frozenset({
     "fin", "fins", "servo", "servomotor", "rudder", "rudders", "rud", "elevator", "elevators", "elev", "plane", "planes",
     "sternplane", "sternplanes", "surface", "surfaces", "flap", "flaps", "foil", "actuator", "actuators", "output", "outputs",
-    "controls", "rcou", "delta", "pwm", "u", "input", "inputs",
+    "control", "controls", "ctrl", "rcou", "delta", "pwm", "u", "d", "input", "inputs", "act", "surf", "canard", "wing",
 })  # fmt: skip
 """Words of what may be a fin among others."""
-THRUSTERS = frozenset({"thrust", "thruster", "thrusters", "motor", "motors", "prop", "propeller", "esc", "jet", "engine", "rpm"})
+THRUSTERS = frozenset({
+    "thrust", "thruster", "thrusters", "thr", "motor", "motors", "prop", "propeller", "esc", "jet", "engine", "rpm",
+})  # fmt: skip
 """Words of what turns a vehicle by pushing more on one side."""
 STARBOARD = frozenset({"starboard", "stbd", "right", "s", "r", "sb"})
 SIDES = STARBOARD | frozenset({
@@ -68,7 +70,7 @@ PLANES = (
 
 @dataclass(frozen=True, slots=True)
 class _Fin:
-    """One of several fins: its name, how a mapping reads it, the rad that a count of it is worth, and its angle (n,)."""
+    """One of several fins: its name, how a mapping reads it, the rad that its number is worth, and its angle (n,)."""
 
     name: str
     item: Mapping[str, Any]
@@ -119,7 +121,7 @@ def _families(inventory: Inventory) -> Iterator[dict[str, dict[str, Any]]]:
             words = words_of(name)
             key = tuple("#" if w.isdigit() or (w in SIDES and (i or len(w) > SHORT)) else w for i, w in enumerate(words))
             place = {"topic": channel.name, "field": info.path} if inventory.by_topic else {"column": channel.name}
-            if "#" in key and (CALLED | THRUSTERS) & set(key):
+            if "#" in key and ((CALLED | THRUSTERS) & set(key) or set(words) <= SIDES):
                 families.setdefault(key, {})[name] = place
     yield from (family for family in families.values() if 1 < len(family) <= MOST)
 
@@ -146,38 +148,45 @@ def _read(
     except FieldsidError:  # what cannot be read is no fin
         return []
     shift = _origin_s(raw.notes) - _origin_s(run.notes)
-    fins = []
-    for (name, place), series in zip(family.items(), raw.series.values(), strict=True):
-        times = series.time + shift
-        good = np.isfinite(times) & np.isfinite(series.values)
-        values = held(Track(times[good], series.values[good]), run.time)
-        if np.isfinite(values).mean() > 0.5 and float(np.nanmax(values) - np.nanmin(values)) > 0.0:
-            fins.append(_fin(name, place, series, values))
-    return fins
+    seen = {name: _held(series, run.time - shift) for name, series in zip(family, raw.series.values(), strict=True)}
+    moving = [n for n, v in seen.items() if np.isfinite(v).mean() > 0.5 and float(np.nanmax(v) - np.nanmin(v)) > 0.0]
+    if not moving:
+        return []
+    how, worth, centre = _how(moving, next(iter(raw.series.values())).unit, np.concatenate([seen[name] for name in moving]))
+    return [_Fin(name, {**family[name], **how}, worth, (seen[name] - centre) * worth) for name in moving]
+
+
+def _held(series: Series, time: FloatArray) -> FloatArray:
+    good = np.isfinite(series.time) & np.isfinite(series.values)
+    return held(Track(series.time[good], series.values[good]), time)
 
 
 def _origin_s(notes: tuple[Note, ...]) -> float:
     return next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
 
 
-def _fin(name: str, place: Mapping[str, Any], series: Series, values: FloatArray) -> _Fin:
-    """Return a fin with its angle in rad: by the unit in its name, as counts of a servo, or in degrees where it is too large."""
-    if series.unit is not None:
-        worth = pick_unit(series.unit).factor
-        return _Fin(name, place, 1.0, worth * values)
-    servo = servo_of(values)
+def _how(names: list[str], unit: str | None, values: FloatArray) -> tuple[dict[str, Any], float, float]:
+    """Return how the numbers (n,) of fins alike are read, the rad that one is worth, and what they are at zero.
+
+    By the unit in their names, as counts of a servo, or in degrees where they are too large; those of thrusters as they are.
+    """
+    if unit is not None:
+        return {}, pick_unit(unit).factor, 0.0
+    servo, largest = servo_of(values), float(np.nanmax(np.abs(values)))
     if servo is not None:
-        worth = FULL_RAD / servo.travel
-        return _Fin(name, {**place, "unit": COUNTS, "centre": servo.centre}, worth, worth * (values - servo.centre))
-    if THRUSTERS & set(words_of(name)):
-        return _Fin(name, place, 1.0, values)
-    largest = float(np.nanmax(np.abs(values)))
+        return {"unit": COUNTS, "centre": servo.centre}, FULL_RAD / servo.travel, servo.centre
+    if all(map(_is_thruster, names)):
+        return {}, 1.0, 0.0
     if largest > LARGEST_DEG:
         centre = float(round(np.nanmedian(values)))
-        worth = FULL_RAD / float(np.nanmax(np.abs(values - centre)))
-        return _Fin(name, {**place, "unit": COUNTS, "centre": centre}, worth, worth * (values - centre))
-    is_large = largest > LARGEST_RAD
-    return _Fin(name, {**place, "unit": "deg" if is_large else "rad"}, 1.0, np.radians(values) if is_large else values)
+        return {"unit": COUNTS, "centre": centre}, FULL_RAD / float(np.nanmax(np.abs(values - centre))), centre
+    return ({"unit": "deg"}, math.radians(1.0), 0.0) if largest > LARGEST_RAD else ({"unit": "rad"}, 1.0, 0.0)
+
+
+def _is_thruster(name: str) -> bool:
+    """Whether what pushes is called so, or by nothing but its side."""
+    words = set(words_of(name))
+    return bool(THRUSTERS & words) or words <= SIDES
 
 
 def _is_known(item: Mapping[str, Any] | None, fins: list[_Fin], found: FinShares) -> bool:
@@ -203,21 +212,23 @@ def _told(fins: list[_Fin], run: Run, plane: _Plane) -> FinShares | None:
 def _item(fins: list[_Fin], found: FinShares) -> dict[str, Any]:
     """Return how a mapping reads the fins that do something: one of them alone, or their sum."""
     used = [(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
-    if len(used) == 1:
+    turned, taken = _sign(used), _taken_for(used)
+    if len(used) == 1 and taken == 1.0:
         return dict(used[0][0].item)
-    turned, worth = _sign(used), _worth_of_all(used)
-    return {"sum": [{**fin.item, "scale": _rounded(turned * share * fin.worth * worth)} for fin, share in used]}
+    # the scale of counts is the rad of one, of all others what the angle in their unit is worth
+    scales = [turned * share * taken * (fin.worth if fin.item.get("unit") == COUNTS else 1.0) for fin, share in used]
+    return {"sum": [{**fin.item, "scale": _rounded(scale)} for (fin, _), scale in zip(used, scales, strict=True)]}
 
 
 def _sign(used: list[tuple[_Fin, float]]) -> float:
     """Return the sign with which the starboard one of two thrusters counts as positive, of fins the first."""
-    pushing = [share for fin, share in used if THRUSTERS & set(words_of(fin.name)) and STARBOARD & set(words_of(fin.name))]
+    pushing = [share for fin, share in used if _is_thruster(fin.name) and STARBOARD & set(words_of(fin.name))]
     return math.copysign(1.0, pushing[0] if pushing else used[0][1])
 
 
-def _worth_of_all(used: list[tuple[_Fin, float]]) -> float:
-    """Return the rad that thrusters' numbers are taken for, by the largest difference; one of fins, which are angles."""
-    if any("unit" in fin.item or not THRUSTERS & set(words_of(fin.name)) for fin, _ in used):
+def _taken_for(used: list[tuple[_Fin, float]]) -> float:
+    """Return the rad that the numbers of thrusters are taken for, by the largest difference; one of fins, which are angles."""
+    if any("unit" in fin.item or not _is_thruster(fin.name) for fin, _ in used):
         return 1.0
     largest = float(np.nanmax(np.abs(np.sum([share * (fin.values - np.nanmedian(fin.values)) for fin, share in used], axis=0))))
     return float(f"{THRUST_RAD / largest:.0e}") if largest > 0.0 else 1.0
@@ -237,7 +248,8 @@ def _as_thrust(signals: dict[str, Any], fins: list[_Fin], family: Mapping[str, A
 
 def _evidence(signal: str, plane: _Plane, fins: list[_Fin], found: FinShares) -> Note:
     used = [(fin.name, share, was) for fin, share, was in zip(fins, found.shares, found.fitted, strict=True) if share != 0.0]
-    turned = _sign([(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0])
+    counted = [(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
+    turned = _sign(counted)
     rate = plane.rate.removesuffix("_rad_s").replace("_", " ")
     told = " ".join(f"{'-' if turned * share < 0.0 else '+'} {_fraction(abs(share))} {name}" for name, share, _ in used)
     was = ", ".join(f"{turned * value:.2g}" for _, _, value in used)
@@ -248,6 +260,8 @@ def _evidence(signal: str, plane: _Plane, fins: list[_Fin], found: FinShares) ->
     if found.patterns < len(used):
         ways = "together only" if found.patterns == 1 else f"in {found.patterns} patterns only"
         message += f"; they moved {ways}: how much of it each of them does is not told by this log, and taken by how far it went"
+    if _taken_for(counted) != 1.0:
+        message += f"; no angles: the largest difference is taken for about {THRUST_RAD:g} rad, and the authority is per that"
     return Note("evidence", message, {"signal": signal, "fins": {name: turned * float(share) for name, share, _ in used}})
 
 
