@@ -13,7 +13,7 @@ import numpy as np
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
-from fieldsid.logs.mapping.fins import with_several_fins
+from fieldsid.logs.mapping.fins.several import with_several_fins
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps
 from fieldsid.logs.mapping.mend import mended

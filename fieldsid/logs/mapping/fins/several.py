@@ -1,13 +1,13 @@
 """Which fins move a plane, where a log has several alike: the sum of them that a mapping reads, with what speaks for it.
 
 Fins of one vehicle are called alike but for a number or a side. What each does to the rate of the plane is told by the numbers,
-see fin_shares.py; of an X tail the shares are 1/4 each, of twin rudders 1/2.
+see shares.py; of an X tail the shares are 1/4 each, of twin rudders 1/2.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -18,37 +18,17 @@ from fieldsid.errors import FieldsidError
 from fieldsid.logs.convert.clock import Track, held
 from fieldsid.logs.convert.servo_counts import COUNTS, FULL_RAD, servo_of
 from fieldsid.logs.convert.units import pick_unit
-from fieldsid.logs.mapping.fin_shares import FinShares, fin_shares
+from fieldsid.logs.mapping.fins.families import Family, families, is_measured, is_on_starboard, is_thruster
+from fieldsid.logs.mapping.fins.shares import FinShares, fin_shares
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.recognise import EXPLAINS, WINDOWS_S
-from fieldsid.logs.mapping.word_meaning import COMMANDED, MEASURED, words_of
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Series
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
-CALLED = frozenset({
-    "fin", "fins", "servo", "servomotor", "rudder", "rudders", "rud", "elevator", "elevators", "elev", "plane", "planes",
-    "sternplane", "sternplanes", "surface", "surfaces", "flap", "flaps", "foil", "actuator", "actuators", "output", "outputs",
-    "control", "controls", "ctrl", "rcou", "delta", "pwm", "u", "d", "input", "inputs", "act", "surf", "canard", "wing",
-})  # fmt: skip
-"""Words of what may be a fin among others."""
-THRUSTERS = frozenset({
-    "thrust", "thruster", "thrusters", "thr", "motor", "motors", "prop", "propeller", "esc", "jet", "engine", "rpm",
-})  # fmt: skip
-"""Words of what turns a vehicle by pushing more on one side."""
-STARBOARD = frozenset({"starboard", "stbd", "right", "s", "r", "sb"})
-SIDES = STARBOARD | frozenset({
-    "port", "left", "p", "l", "upper", "lower", "top", "bottom", "up", "down", "t", "b", "a", "c", "d", "ul", "ur", "ll", "lr",
-    "tl", "tr", "bl", "br", "pu", "pl", "su", "sl", "ne", "nw", "se", "sw", "i", "ii", "iii", "iv",
-})  # fmt: skip
-"""Words of where one of several fins is."""
-MOST = 16
-"""Fins and motors alike: more are no vehicle's."""
 PLACE = ("column", "topic", "field")
 LARGEST_RAD, LARGEST_DEG, THRUST_RAD = 1.6, 180.0, 0.4
 """A larger angle is in degrees, and a larger one yet in counts; what the largest difference of thrusters is taken for."""
-SHORT = 2
-"""Letters up to which a word is a side only behind another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +65,8 @@ def with_several_fins(
     signals, notes = dict(body["signals"]), []
     done: set[str] = set()
     for plane in PLANES:
-        for family in _families(inventory):
-            signal = plane.measured if _is_measured(family) else plane.fin
+        for family in families(inventory):
+            signal = plane.measured if is_measured(family) else plane.fin
             if signal in done or not _is_asked(signal, plane, {**body, "signals": signals}, family, run):
                 continue
             fins = _read(inventory, reader, options, {**body, "signals": signals}, family, run)
@@ -99,34 +79,7 @@ def with_several_fins(
     return ({**body, "signals": signals}, notes) if notes else (dict(body), [])
 
 
-def _is_measured(family: Mapping[str, Any]) -> bool:
-    """Whether fins are told as they were measured, by their names."""
-    words = {word for name in family for word in words_of(name)}
-    return bool(words & MEASURED) and not words & (COMMANDED | {"set"})
-
-
-def _families(inventory: Inventory) -> Iterator[dict[str, dict[str, Any]]]:
-    """Yield columns, or fields of topics, that are called alike but for a number or a side, as places in a mapping by name."""
-    families: dict[tuple[str, ...], dict[str, dict[str, Any]]] = {}
-    is_named = inventory.table is None or inventory.table.header
-    for channel in inventory.channels if is_named else ():
-        for info in channel.fields:
-            if (
-                info.kind in ("text", "numbers")
-                or info.means is not None
-                or (info.span is not None and info.span[0] == info.span[1])
-            ):
-                continue
-            name = f"{channel.name} {info.path}".strip() if inventory.by_topic else channel.name
-            words = words_of(name)
-            key = tuple("#" if w.isdigit() or (w in SIDES and (i or len(w) > SHORT)) else w for i, w in enumerate(words))
-            place = {"topic": channel.name, "field": info.path} if inventory.by_topic else {"column": channel.name}
-            if "#" in key and ((CALLED | THRUSTERS) & set(key) or set(words) <= SIDES):
-                families.setdefault(key, {})[name] = place
-    yield from (family for family in families.values() if 1 < len(family) <= MOST)
-
-
-def _is_asked(signal: str, plane: _Plane, body: Mapping[str, Any], family: Mapping[str, Any], run: Run) -> bool:
+def _is_asked(signal: str, plane: _Plane, body: Mapping[str, Any], family: Family, run: Run) -> bool:
     """Whether a plane that moves has no fin yet, one of several alike, or a sum of them beside which these were measured."""
     signals = body["signals"]
     if not (run.has(plane.rate) or run.has(plane.angle)):
@@ -138,7 +91,7 @@ def _is_asked(signal: str, plane: _Plane, body: Mapping[str, Any], family: Mappi
 
 
 def _read(
-    inventory: Inventory, reader: Reader, options: ReadOptions, body: Mapping[str, Any], family: Mapping[str, Any], run: Run
+    inventory: Inventory, reader: Reader, options: ReadOptions, body: Mapping[str, Any], family: Family, run: Run
 ) -> list[_Fin]:
     """Return the fins of a family on the clock of the run, those that move; none where they cannot be read."""
     signals = {"rudder_rad": {"sum": [{**place, "scale": 1.0} for place in family.values()]}}
@@ -175,18 +128,12 @@ def _how(names: list[str], unit: str | None, values: FloatArray) -> tuple[dict[s
     servo, largest = servo_of(values), float(np.nanmax(np.abs(values)))
     if servo is not None:
         return {"unit": COUNTS, "centre": servo.centre}, FULL_RAD / servo.travel, servo.centre
-    if all(map(_is_thruster, names)):
+    if all(map(is_thruster, names)):
         return {}, 1.0, 0.0
     if largest > LARGEST_DEG:
         centre = float(round(np.nanmedian(values)))
         return {"unit": COUNTS, "centre": centre}, FULL_RAD / float(np.nanmax(np.abs(values - centre))), centre
     return ({"unit": "deg"}, math.radians(1.0), 0.0) if largest > LARGEST_RAD else ({"unit": "rad"}, 1.0, 0.0)
-
-
-def _is_thruster(name: str) -> bool:
-    """Whether what pushes is called so, or by nothing but its side."""
-    words = set(words_of(name))
-    return bool(THRUSTERS & words) or words <= SIDES
 
 
 def _is_known(item: Mapping[str, Any] | None, fins: list[_Fin], found: FinShares) -> bool:
@@ -222,13 +169,13 @@ def _item(fins: list[_Fin], found: FinShares) -> dict[str, Any]:
 
 def _sign(used: list[tuple[_Fin, float]]) -> float:
     """Return the sign with which the starboard one of two thrusters counts as positive, of fins the first."""
-    pushing = [share for fin, share in used if _is_thruster(fin.name) and STARBOARD & set(words_of(fin.name))]
+    pushing = [share for fin, share in used if is_on_starboard(fin.name)]
     return math.copysign(1.0, pushing[0] if pushing else used[0][1])
 
 
 def _taken_for(used: list[tuple[_Fin, float]]) -> float:
     """Return the rad that the numbers of thrusters are taken for, by the largest difference; one of fins, which are angles."""
-    if any("unit" in fin.item or not _is_thruster(fin.name) for fin, _ in used):
+    if any("unit" in fin.item or not is_thruster(fin.name) for fin, _ in used):
         return 1.0
     largest = float(np.nanmax(np.abs(np.sum([share * (fin.values - np.nanmedian(fin.values)) for fin, share in used], axis=0))))
     return float(f"{THRUST_RAD / largest:.0e}") if largest > 0.0 else 1.0
@@ -238,7 +185,7 @@ def _rounded(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _as_thrust(signals: dict[str, Any], fins: list[_Fin], family: Mapping[str, Any]) -> None:
+def _as_thrust(signals: dict[str, Any], fins: list[_Fin], family: Family) -> None:
     """Take the mean of several thrusters for the thrust, where one of them was."""
     thrust = signals.get("thrust", {})
     if any(all(thrust.get(key) == value for key, value in place.items()) for place in family.values()):
