@@ -164,3 +164,15 @@ def test_thrusters_called_by_their_side_and_in_bytes_are_read_alike(run_cli, tmp
     assert entries[0].get("unit") == entries[1].get("unit")
     scale = run["rudder_rad"] @ made.RUDDER / (made.RUDDER @ made.RUDDER)
     np.testing.assert_allclose(run["rudder_rad"], scale * made.RUDDER, atol=0.02)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.4])
+def test_an_x_tail_is_told_apart_by_noisy_angles_alone(run_cli, tmp_path, late_s):
+    late, rng = round(late_s / made.STEP), np.random.default_rng(12)
+    found = made.motion(*(np.roll(command, late) for command in (made.RUDDER, made.ELEVATOR)), noise=False)
+    seen = {f"{n}_deg": made.of(found[n] + 1.0 * rng.standard_normal(made.TIME.size)) for n in ("heading", "pitch")}
+    fins = {f"fin{k}": made.of(np.degrees(fin)) for k, fin in enumerate(made.x_fins(), 1)}
+    signals = run_cli("inspect", str(made.table(tmp_path / "x.csv", {"time_s": made.of(made.TIME), **seen, **fins})), "--json")
+    signals = signals.json["mapping"]["signals"]
+    assert signs(signals["rudder_rad"]) == [1, 1, -1, -1]
+    assert signs(signals["elevator_rad"]) == [1, -1, 1, -1]

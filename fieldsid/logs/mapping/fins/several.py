@@ -19,7 +19,7 @@ from fieldsid.logs.convert.clock import Track, held
 from fieldsid.logs.convert.servo_counts import COUNTS, FULL_RAD, servo_of
 from fieldsid.logs.convert.units import pick_unit
 from fieldsid.logs.mapping.fins.families import Family, families, is_measured, is_on_starboard, is_thruster
-from fieldsid.logs.mapping.fins.shares import FinShares, fin_shares
+from fieldsid.logs.mapping.fins.shares import FinShares, fin_shares, window_mean
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.recognise import EXPLAINS, WINDOWS_S
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Series
@@ -148,12 +148,19 @@ def _is_known(item: Mapping[str, Any] | None, fins: list[_Fin], found: FinShares
 
 def _told(fins: list[_Fin], run: Run, plane: _Plane) -> FinShares | None:
     """Return what fins do to the rate of their plane, over the window in which they explain most; None where nothing is told."""
-    moved = run[plane.rate] if run.has(plane.rate) else np.gradient(run[plane.angle], run.time)
     step = float(np.median(np.diff(run.time)))
-    right = run[plane.angle] if plane.rights and run.has(plane.angle) else None
-    values = [fin.values for fin in fins]
-    every = [fin_shares(values, run.time, moved, right, max(2, round(window / step))) for window in WINDOWS_S[:2]]
+    every = [_over([fin.values for fin in fins], run, plane, max(2, round(window / step))) for window in WINDOWS_S[:2]]
     return max((f for f in every if f is not None), key=lambda f: f.explains, default=None)
+
+
+def _over(fins: list[FloatArray], run: Run, plane: _Plane, width: int) -> FinShares | None:
+    """Return the shares of fins (n,) over windows of some samples; where the angle alone was logged, all by their means."""
+    time, righting = run.time, run[plane.angle] if plane.rights and run.has(plane.angle) else None
+    if run.has(plane.rate):
+        return fin_shares(fins, time, run[plane.rate], righting, width)
+    turned = (run[plane.angle][width:] - run[plane.angle][:-width]) / (time[width:] - time[:-width])
+    means = [window_mean(time, fin, width) for fin in fins]
+    return fin_shares(means, time[:-width], turned, None if righting is None else window_mean(time, righting, width), width)
 
 
 def _item(fins: list[_Fin], found: FinShares) -> dict[str, Any]:

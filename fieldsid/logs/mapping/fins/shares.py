@@ -49,8 +49,12 @@ def fin_shares(
         return None
     passed = time[width:] - time[:-width]
     grows = (rate[width:] - rate[:-width]) / passed
-    beside = [np.ones(grows.size), _mean(time, rate, width), *([_mean(time, righting, width)] if righting is not None else [])]
-    means = np.stack([_mean(time, fin, width) for fin in fins], axis=1)
+    beside = [
+        np.ones(grows.size),
+        window_mean(time, rate, width),
+        *([window_mean(time, righting, width)] if righting is not None else []),
+    ]
+    means = np.stack([window_mean(time, fin, width) for fin in fins], axis=1)
     seen = np.isfinite(grows) & np.isfinite(means).all(axis=1) & np.isfinite(np.stack(beside)).all(axis=0)
     rows = np.flatnonzero(seen)[:: max(1, grows.size // MOST_ROWS)]
     if rows.size < FEWEST:
@@ -72,7 +76,7 @@ def fin_shares(
     )
 
 
-def _mean(time: FloatArray, values: FloatArray, width: int) -> FloatArray:
+def window_mean(time: FloatArray, values: FloatArray, width: int) -> FloatArray:
     """Return the mean (n - width,) of values that stand from one sample to the next, over each window."""
     swept = np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(values[:-1]), values[:-1], 0.0) * np.diff(time))])
     gone = np.concatenate([[0], np.cumsum(~np.isfinite(values))])
