@@ -1,7 +1,9 @@
-"""The vehicle as its vehicle.yaml describes it: fin limits and rate, sign conventions, signals, length, speeds."""
+"""The vehicle as its vehicle.yaml describes it: fins, their limits and rate, sign conventions, signals, length, speeds."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,6 +12,7 @@ from pydantic import Field, model_validator
 
 from fieldsid.errors import VehicleError
 from fieldsid.logs.run import SIGNALS
+from fieldsid.models.allocation import Fins
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 
@@ -17,6 +20,8 @@ SCHEMA = "fieldsid/vehicle/1"
 
 Angle = Annotated[float, Field(gt=0.0, le=1.5708)]
 Positive = Annotated[float, Field(gt=0.0)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +29,8 @@ class Vehicle:
     """One vehicle: fin limits in rad, fin rate in rad/s, length in m, speeds in m/s; None where not stated.
 
     `positive_rudder` is the side a positive rudder turns to, `positive_elevator` where the nose goes under a
-    positive elevator; None when not known. `signals` are the canonical names its logs hold.
+    positive elevator; None when not known. `signals` are the canonical names its logs hold. `fins` are those of a vehicle whose
+    rudder or elevator is made of several: the limits of the two are then what these reach, where no less is stated.
     """
 
     name: str
@@ -38,6 +44,7 @@ class Vehicle:
     speed_min_m_s: float | None = None
     speed_max_m_s: float | None = None
     source: Path | None = None
+    fins: Fins | None = None
 
     def fin_max_rad(self, axis: str) -> float | None:
         """Return the fin limit of an axis (`yaw` or `pitch`) in rad."""
@@ -48,6 +55,28 @@ class Vehicle:
         """The fin limits in rad by signal, without those that are not stated."""
         limits = {"rudder_rad": self.rudder_max_rad, "elevator_rad": self.elevator_max_rad}
         return {signal: limit for signal, limit in limits.items() if limit is not None}
+
+
+class _Fins(StrictModel):
+    """The key `fins` of vehicle.yaml."""
+
+    names: Annotated[list[Annotated[str, Field(pattern=r"^[A-Za-z]\w*$")]], Field(min_length=1, max_length=64)]
+    to_rudder: list[Finite] | None = None
+    to_elevator: list[Finite] | None = None
+    limits: Limit | list[Limit]
+    unit: Annotated[str, Field(min_length=1)] = "rad"
+
+    def fins(self) -> Fins:
+        """Return the fins, one limit for all taken for each."""
+        limits = self.limits if isinstance(self.limits, list) else [self.limits] * len(self.names)
+        return Fins(tuple(self.names), tuple(self.to_rudder or ()), tuple(self.to_elevator or ()), tuple(limits), self.unit)
+
+    @model_validator(mode="after")
+    def _are_fins(self) -> _Fins:
+        wrong = self.fins().wrong()
+        if wrong is not None:
+            raise ValueError(wrong)
+        return self
 
 
 class _Fields(StrictModel):
@@ -64,6 +93,7 @@ class _Fields(StrictModel):
     length_m: Positive | None = None
     speed_min_m_s: Annotated[float, Field(ge=0.0)] | None = None
     speed_max_m_s: Positive | None = None
+    fins: _Fins | None = None
 
     @model_validator(mode="after")
     def _speeds_are_ordered(self) -> _Fields:
@@ -99,5 +129,23 @@ def _vehicle(fields: _Fields, place: str, source: Path | None) -> Vehicle:
         raise VehicleError(
             f"{place}: `signals` names an unknown signal `{unknown[0]}`", found=unknown[0], hint=near(unknown[0], SIGNALS)
         )
-    body = fields.model_dump(exclude={"schema_", "signals"})
-    return Vehicle(**body, signals=tuple(fields.signals), source=source)
+    body = fields.model_dump(exclude={"schema_", "signals", "fins"})
+    fins = None if fields.fins is None else fields.fins.fins()
+    limits = {} if fins is None else _limits_of(fins, body, place)
+    return Vehicle(**{**body, **limits}, signals=tuple(fields.signals), source=source, fins=fins)
+
+
+def _limits_of(fins: Fins, body: Mapping[str, Any], place: str) -> dict[str, float]:
+    """Return the limits of rudder and elevator that fins reach, where no less is stated; raises VehicleError where more is."""
+    limits = {}
+    for key, axis in (("rudder_max_rad", "yaw"), ("elevator_max_rad", "pitch")):
+        plane, stated = fins.of(axis), body[key]
+        if plane is not None and stated is not None and not plane.follows(stated):
+            raise VehicleError(
+                f"{place}: `{key}` is more than the fins reach",
+                found=f"{stated:g} rad, and {plane.reach:.4g} rad by `limits` of `fins`",
+                hint=f"write `{key}: {math.floor(1e4 * plane.reach) / 1e4:g}`, or leave it out",
+            )
+        if plane is not None and stated is None:
+            limits[key] = plane.reach
+    return limits

@@ -18,7 +18,7 @@ PACKAGE = ROOT / "fieldsid"
 ORDER = (
     "_version", "text", "errors", "numerics", "runtime", "registry", "page", "display", "records",
     "artifacts", "rounding", "angles", "strict",
-    "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
+    "templates", "guide", "logs", "maneuvers", "models", "vehicle", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
     "trial_folder", "change", "reporting", "figures", "views", "face",
     "demo", "cli", "__main__",

@@ -107,6 +107,21 @@ def mapping_of(path: Path | None) -> ChannelMap | None:
     return load_mapping(path)
 
 
+def one_run(command: str, logs: Sequence[Path], *, join: bool) -> list[Path]:
+    """Return the log, and the other tables of its run where they are to be joined; raises UsageError for several logs or none."""
+    files = shlex.join(map(str, logs))
+    if join and len(logs) == 1 and not logs[0].is_dir():
+        raise UsageError("one table is nothing to join", found=f"`{logs[0]}`", hint="name the other tables of its run too")
+    if join and STDIN in logs:
+        raise UsageError("standard input is not joined with other tables", found="`-`", hint="save it to a file")
+    if len(logs) > 1 and not join:
+        hint = f"one at a time; or, where they are the tables of one run, `sysid {command} --join {files}`"
+        raise UsageError(f"`{command}` takes one log", found=f"{len(logs)} logs", hint=hint)
+    if join and any(log.is_dir() for log in logs[1:] if len(logs) > 1):
+        raise UsageError("a folder is joined by itself", found=files, hint="name the tables in it")
+    return list(logs)
+
+
 def refuse_swapped(command: str, model: Path, runs: Sequence[Path]) -> None:
     """Raise UsageError where a model stands among the runs and something else in its place."""
     from fieldsid.logs.unknown_file import own_kind

@@ -20,7 +20,13 @@ RunFiles = Annotated[
     ),
 ]
 RunFile = Annotated[Path, typer.Argument(metavar="RUN", help="A run or a log file; `-` reads CSV from standard input.")]
-LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="A log: CSV, Parquet, ROS 1 or ROS 2 bag.")]
+LogAndTables = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG",
+        help="A log: CSV, Parquet, ROS 1 or ROS 2 bag, a folder of the tables of one run; with `--join` its tables.",
+    ),
+]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file written by `sysid identify` or `sysid extend`.")]
 ModelFiles = Annotated[list[Path], typer.Argument(metavar="MODEL...", help="Model files, or one table of parameters over speed.")]
 ValidateRuns = Annotated[
@@ -33,6 +39,10 @@ AxisOption = Annotated[Axis, typer.Option("--axis", help="The plane to identify.
 ExcitedAxis = Annotated[
     Axis | None,
     typer.Option("--axis", help="The plane to identify; may be left out where the runs excite one alone.", show_default=False),
+]
+Join = Annotated[
+    bool,
+    typer.Option("--join", help="The logs are the tables of one run, each on stamps of its own.", rich_help_panel=READ),
 ]
 MappingFile = Annotated[
     Path | None,

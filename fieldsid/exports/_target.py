@@ -67,6 +67,7 @@ def notes_of(schedule: Schedule) -> list[str]:
         f"outside the rows: {p.get('outside_rows', '')}",
         f"supported by data from {low:.2f} to {high:.2f} m/s (supported = 1.0)",
         f"least margins: {phase:.0f} deg, {'no limit' if gain == float('inf') else f'{gain:.1f} dB'}, {delay:.2f} s of delay",
+        *schedule.fins_said,
         f"models: {models or 'none named'}",
         f"runs: {', '.join(map(str, p.get('runs', []))) or 'none named'}",
     )
@@ -92,6 +93,15 @@ def from_template(shipped: str, schedule: Schedule, node: str, own: Path | None)
         ) from error
 
 
+def _fins(schedule: Schedule) -> list[dict[str, str]]:
+    """Return each of several fins as text: its name, what it is told for a command of one rad, and its limit."""
+    known = schedule.fins
+    if known is None:
+        return []
+    told = zip(known.names, known.shares, known.limits, strict=True)
+    return [{"name": name, "share": decimal(share), "limit": decimal(limit)} for name, share, limit in told]
+
+
 def _context(schedule: Schedule, node: str) -> dict[str, Any]:
     columns = columns_of(schedule)
     texts = {name: [decimal(v) for v in values] for name, values in columns.items()}
@@ -106,4 +116,5 @@ def _context(schedule: Schedule, node: str) -> dict[str, Any]:
         "count": count,
         "notes": notes_of(schedule),
         "depth": schedule.depth,
+        "fins": _fins(schedule),
     }

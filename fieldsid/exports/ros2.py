@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 
 from fieldsid.exports._target import NAMES, Target, columns_of, decimal, notes_of
+from fieldsid.models.allocation import PlaneFins
 from fieldsid.schedule.record import Schedule
 
 
@@ -19,7 +20,14 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
     lines = [f"# {line}" for line in notes_of(schedule)]
     lines += [f"{_key(node)}:", "  ros__parameters:", f"    {name}:", f'      controller: "{schedule.kind}"']
     lines += [f"      {column}: [{', '.join(decimal(v) for v in values)}]" for column, values in columns_of(schedule).items()]
+    lines += [] if schedule.fins is None else _of_fins(NAMES[schedule.axis], schedule.fins)
     return "\n".join(lines) + "\n"
+
+
+def _of_fins(plane: str, fins: PlaneFins) -> list[str]:
+    """Return the block of the fins that make the command: what each is told for one rad, and its limit."""
+    numbers = [f"      {key}: [{', '.join(map(decimal, v))}]" for key, v in (("shares", fins.shares), ("limits", fins.limits))]
+    return [f"    {plane}_fins:", "      names: [" + ", ".join(f'"{name}"' for name in fins.names) + "]", *numbers]
 
 
 def _key(node: str) -> str:

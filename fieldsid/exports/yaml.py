@@ -21,6 +21,7 @@ def render(schedule: Schedule, node: str, template: Path | None) -> str:
         "axis": body["axis"],
         "angle": NAMES[schedule.axis],
         "controller": body["controller"],
+        **({} if schedule.fins is None else {"fins": schedule.fins.record()}),
         "rows": rows,
         "provenance": _in_lines(plain(body["provenance"])),
     }

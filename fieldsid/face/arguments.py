@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from fieldsid.effects._user_folder import add_user_effects
 from fieldsid.errors import ArtifactError, FieldsidError, UsageError
+from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import Axis
 from fieldsid.records.named_inputs import where_now
 from fieldsid.registry import near
@@ -63,6 +64,12 @@ def length_of(vehicle: Vehicle | File | None) -> float | None:
     """Return the length in m of a vehicle as `vehicle_of` finds it, None where it is not stated; raises VehicleError."""
     known = vehicle_of(vehicle)
     return None if known is None else known.length_m
+
+
+def fins_of(vehicle: Vehicle | File | None, axis: Axis) -> PlaneFins | None:
+    """Return the fins that an axis' command is made of, of a vehicle as `vehicle_of` finds it; None where it is one."""
+    known = vehicle_of(vehicle)
+    return None if known is None or known.fins is None else known.fins.of(axis.value)
 
 
 def signal_limits(vehicle: Vehicle | None) -> dict[str, float]:

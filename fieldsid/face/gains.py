@@ -11,6 +11,7 @@ from fieldsid.face.arguments import (
     File,
     designed_from,
     fin_limits_of,
+    fins_of,
     length_of,
     own_effects,
     rudder_of,
@@ -119,6 +120,7 @@ def design_schedule(
         depth=depth,
         runs=runs_behind(source, _say),
         length=length_of(known),
+        fins=fins_of(known, source.axis),
     )
 
 

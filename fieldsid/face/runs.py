@@ -31,7 +31,10 @@ Logs: TypeAlias = "Log | Iterable[Log] | Mapping[str, DataFrame]"
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How logs are read: mapping, single channels, message definitions, what is allowed, and the part that is taken in s."""
+    """How logs are read: mapping, single channels, message definitions, what is allowed, and the part that is taken in s.
+
+    `joined` are the other tables of a run of which the one file that is read is one.
+    """
 
     mapping: ChannelMap | Path | None = None
     channels: Mapping[str, Source] = field(default_factory=dict)
@@ -42,14 +45,15 @@ class Reading:
     start: float | None = None
     end: float | None = None
     whole: bool = True
+    joined: tuple[Path, ...] = ()
 
     def of_file(self, path: Path) -> list[Run]:
         """Return the run of a file, or where not all of it is wanted its stretches under way."""
 
         def load_part(part: tuple[float, float], max_gap_s: float) -> Run:
             return load_run(
-                path, self.mapping, channels=self.channels, msg_path=self.msg_path, salvage=self.salvage, max_gap_s=max_gap_s,
-                part=part, fin_max_rad=self.fin_max_rad,
+                path, self.mapping, channels=self.channels, msg_path=self.msg_path, joined=self.joined, salvage=self.salvage,
+                max_gap_s=max_gap_s, part=part, fin_max_rad=self.fin_max_rad,
             )  # fmt: skip
 
         if self.whole or not (self.start is None and self.end is None):
@@ -85,17 +89,20 @@ def load(
     max_gap: float = MAX_GAP_S,
     salvage: bool = False,
     whole: bool = False,
+    join: bool = False,
 ) -> Several[Run]:
     """Return the runs of logs, as `sysid import` reads them: files, patterns as `runs/*.parquet`, pandas tables.
 
     A table has a row per sample; a dictionary of tables names their runs. channel: `SIGNAL=COLUMN:UNIT`, as the option. vehicle:
     its fin limits are for the finding of saturation. start, end: the part of every run, in s. max_gap: the longest gap, in s.
     salvage: take what is left of a damaged log. whole: keep what of a file is not under way, as one run; without it the stretches
-    under way are runs of their own. Raises LogError for a file that is missing or cannot be read and for a pattern without a
-    file, MappingError where no column is known, DataError where the part is empty, UsageError for what is no log.
+    under way are runs of their own. join: the files are the tables of one run, as with `--join`. Raises LogError for a file that
+    is missing or cannot be read and for a pattern without a file, MappingError where no column is known, DataError where the
+    part is empty, UsageError for what is no log.
     """
     from fieldsid.logs.mapping.mapping_file import channel_of
 
+    files = _tables_of_one_run(logs) if join else []
     reading = Reading(
         mapping=_mapping(mapping),
         channels=dict(channel_of(text) for text in channel),
@@ -106,8 +113,21 @@ def load(
         start=start,
         end=end,
         whole=whole,
+        joined=tuple(files[1:]),
     )
-    return runs_of(logs, reading)
+    return runs_of(files[0] if files else logs, reading)
+
+
+def _tables_of_one_run(logs: Logs) -> list[Path]:
+    """Return the files of one run, in their order; raises UsageError for anything else, LogError for a pattern without one."""
+    named = [logs] if isinstance(logs, (str, PathLike)) else list(cast("Iterable[Log]", logs))
+    other = next((item for item in named if not isinstance(item, (str, PathLike))), None)
+    if other is not None:
+        raise UsageError("only files are joined", found=type(other).__name__, hint="give the tables of one run, or their folder")
+    files = [path for name in cast("list[File]", named) for path in files_of(name)]
+    if len(files) == 1 and not files[0].is_dir():
+        raise UsageError("one table is nothing to join", found=f"`{files[0]}`", hint="name the other tables of its run too")
+    return files
 
 
 def runs_of(logs: Logs, reading: Reading | None = None) -> Several[Run]:

@@ -25,9 +25,10 @@ class Source:
 
     value = sign x (number in its unit, as SI), turned into our frames, + offset in SI. `stamp` None means the header's where
     the message has one. `unit` None means what the column's name or the message type says, else SI. Where the unit is
-    `counts`, `centre` is their number at zero, and `scale` the rad that one is worth. A time may be the sum of several columns,
-    whose parts the unit names. `date` and `week` are the columns of a time's days, where the time is a clock, and of its GPS
-    weeks; the `scale` of a time that counts samples is the s of one.
+    `counts`, `centre` is their number at zero, and `scale` the rad that one is worth; for an entry of a sum `scale` is what its
+    number is worth in the sum, of either sign. A time may be put together from several columns, whose parts the unit names.
+    `date` and `week` are the columns of a time's days, where the time is a clock, and of its GPS weeks; the `scale` of a time
+    that counts samples is the s of one.
     """
 
     column: str | int | None = None
@@ -79,7 +80,10 @@ class Pressure:
 
 @dataclass(frozen=True, slots=True)
 class ChannelMap:
-    """The whole mapping of a log: sources by canonical signal, the time column of a table, frames, clocks, depth."""
+    """The whole mapping of a log: sources by canonical signal, the time column of a table, frames, clocks, depth.
+
+    A signal that is the sum of several sources has one for each, as `rudder_rad[0]` and `rudder_rad[1]`: see `signal_of`.
+    """
 
     sources: Mapping[str, Source]
     time: Source | None = None

@@ -18,7 +18,7 @@ from fieldsid.logs.convert.conditioning import MAIN, ROUNDING, gap_limit, gaps_i
 from fieldsid.logs.load import load_run
 from fieldsid.logs.run import EXPLAINING, Note, Run
 from fieldsid.logs.save import SUFFIXES, save_run
-from fieldsid.logs.several.run_names import names_apart, stem_of
+from fieldsid.logs.several.run_names import name_of_run, names_apart, stem_of
 from fieldsid.logs.several.stretches import stretches_of
 from fieldsid.registry import near
 
@@ -66,7 +66,7 @@ def runs_under_way(load: Callable[[tuple[float, float], float], Run], max_gap_s:
 
 @dataclass(frozen=True, slots=True)
 class Importer:
-    """The choices of one import, the same for all its logs."""
+    """The choices of one import, the same for all its logs; `joined` are the other tables of a run of which the log is one."""
 
     mapping: ChannelMap | None = None
     channels: tuple[str, ...] = ()
@@ -75,6 +75,7 @@ class Importer:
     max_gap_s: float = 2.0
     salvage: bool = False
     whole: bool = False
+    joined: tuple[Path, ...] = ()
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
         """Return the file each log becomes; raises before anything is read what would be the same for all logs.
@@ -93,7 +94,8 @@ class Importer:
                 )
             found = [output]
         else:
-            found = [output / f"{name}{FORMATS[form]}" for name in names_apart([stem_of(log) for log in logs], logs)]
+            names = [name_of_run([*logs, *self.joined])] if self.joined else names_apart([stem_of(log) for log in logs], logs)
+            found = [output / f"{name}{FORMATS[form]}" for name in names]
         _check_free(logs, found, force=force)
         return found
 
@@ -124,6 +126,7 @@ class Importer:
             self.mapping,
             channels=self._sources(),
             msg_path=self.msg_path,
+            joined=self.joined,
             salvage=self.salvage,
             max_gap_s=max_gap_s,
             part=part,

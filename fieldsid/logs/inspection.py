@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,11 @@ from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN
+from fieldsid.logs.convert.servo_counts import FINS
+from fieldsid.logs.importing import Importer
 from fieldsid.logs.mapping.propose import Proposal, propose
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
+from fieldsid.logs.readers._tables_of_run import tables_beside
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.way_in import WayIn, way_in
 from fieldsid.text.one_line import one_line
@@ -48,10 +51,11 @@ class Inspection(Brief):
     notes: tuple[Note, ...]
     needs_none: bool
     way_in: WayIn
+    joined: tuple[Path, ...] = ()
 
     def yaml(self) -> str:
         """Return the proposed mapping as the text of a mapping.yaml."""
-        head = f"# Proposed for {one_line(self.inventory.path.name)} by its names, types and numbers.\n"
+        head = f"# Proposed for {one_line(self.inventory.path.resolve().name)} by its names, types and numbers.\n"
         head += "# Check units, signs and frame before you trust it.\n"
         body = dict(self.proposal.body)
         signals = body.pop("signals")
@@ -76,6 +80,7 @@ class Inspection(Brief):
             "mapping_needed": not self.needs_none,
             "mapping": plain(self.proposal.body),
             "mapping_file": None if written is None else str(written),
+            "joined": [str(p) for p in self.joined],
             "import_options": list(self.way_in.options),
             "signals": [] if run is None else [s for s in run.signals if run.has(s)],
             "problem": None if self.proposal.problem is None else str(self.proposal.problem),
@@ -84,9 +89,14 @@ class Inspection(Brief):
 
 
 def inspect_log(
-    path: Path, *, mapping: Path | None = None, msg_path: Path | None = None, progress: Callable[[float], None] | None = None
+    path: Path,
+    *,
+    mapping: Path | None = None,
+    msg_path: Path | None = None,
+    joined: Sequence[Path] = (),
+    progress: Callable[[float], None] | None = None,
 ) -> Inspection:
-    """Return what is in a log; `progress` is given the share of it that has been looked through.
+    """Return what is in a log, or in a run of several tables; `progress` is given the share that has been looked through.
 
     Raises LogError when it cannot be read at all, MappingError for a mapping that does not fit.
     """
@@ -94,7 +104,8 @@ def inspect_log(
     from fieldsid.logs.mapping.mapping_file import load_mapping, mapping_of
 
     given = None if mapping is None else load_mapping(mapping)
-    reader, options = reader_of(path), ReadOptions(msg_path, salvage=True, clock=None if given is None else given.time)
+    clock = None if given is None else given.time
+    reader, options = reader_of(path, joined), ReadOptions(msg_path, salvage=True, clock=clock, joined=tuple(joined))
     options = replace(options, progress=progress or options.progress)
     inventory = reader.inventory(path, options, TableForm() if given is None else given.table)
     proposal = propose(inventory, reader, options)
@@ -103,7 +114,7 @@ def inspect_log(
     needs_none = own is not None and not {s for s in proposal.body["signals"] if s in MAIN} - own.sources.keys()
     run = proposal.run
     if mapping is not None or needs_none:
-        run = load_run(path, mapping, msg_path=msg_path, salvage=True, max_gap_s=math.inf)
+        run = load_run(path, mapping, msg_path=msg_path, joined=joined, salvage=True, max_gap_s=math.inf)
     proposed = [] if needs_none or mapping is not None else list(proposal.notes)
     notes = [*notes_of_size, *inventory.notes, *proposed, *(() if run is None else run.notes)]
     if proposal.problem is not None and run is None:
@@ -112,14 +123,16 @@ def inspect_log(
         notes.append(Note("not_importable", f"{said}: {hint}" if hint else said, {"found": found, "hint": hint}))
     if not proposal.body["signals"] and run is None:
         notes.append(Note("nothing_recognised", "no name says what its numbers are: fill in `signals` in the mapping", {}))
+    if not (set(FINS) & {*proposal.body["signals"], *(() if run is None else run.signals)} or joined):
+        notes += tables_beside(path)
     chosen = given or (None if needs_none or run is None else mapping_of(proposal.body))
-    way = WayIn() if run is None else way_in(path, run, notes, chosen, msg_path)
+    way = WayIn() if run is None else way_in(path, run, notes, Importer(chosen, msg_path=msg_path, joined=tuple(joined)))
     if way.refusal is not None:
         what, found, hint = way.refusal.what, way.refusal.found, way.refusal.hint
         advice = f"import it with `{' '.join(way.options)}`" if way.options else hint
         notes.append(Note("refused", f"refused as it is: {what} ({found}); {advice}", {"found": found, "hint": hint}))
     distinct = {(n.code, n.message): n for n in notes if n.code != "ignored_columns"}
-    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none, way)
+    return Inspection(inventory, proposal, run, tuple(distinct.values()), needs_none, way, tuple(joined))
 
 
 def write_proposal(found: Inspection, path: Path, *, force: bool = False) -> Path:
@@ -146,6 +159,8 @@ def _line(item: dict[str, Any]) -> str:
 def _scalar(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_scalar(part) for part in value) + "]"
+    if isinstance(value, dict):
+        return _line(value)
     text = str(value)
     return (
         text

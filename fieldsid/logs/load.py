@@ -16,8 +16,8 @@ from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
-from fieldsid.logs.reader import Reader, ReadOptions, reader_of
-from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run
+from fieldsid.logs.reader import JOINED, Reader, ReadOptions, reader_of
+from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run, signal_of
 
 MAPPING_FILE = "mapping.yaml"
 
@@ -28,6 +28,7 @@ def load_run(
     *,
     channels: Mapping[str, Source] | None = None,
     msg_path: Path | None = None,
+    joined: Sequence[Path] = (),
     salvage: bool = False,
     max_gap_s: float = MAX_GAP_S,
     part: tuple[float, float] = WHOLE,
@@ -37,15 +38,16 @@ def load_run(
     """Read a log file or bag folder as a Run, with the doctor's findings as notes; `-` reads standard input.
 
     mapping: a ChannelMap or a mapping.yaml. Without one: the canonical column names, else `mapping.yaml` in the
-    working folder, else in the log's. channels: sources that count more than the mapping's. salvage: take what is
-    left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the times in s between which the log is taken
-    and judged. fin_max_rad: fin limits by signal, for the finding of saturation. progress: given the share of the log that has
-    been read, now and then. Raises LogError or MappingError, and DataError where the part is empty.
+    working folder, else in the log's. channels: sources that count more than the mapping's. joined: the other tables of a run of
+    which the log is one. salvage: take what is left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the
+    times in s between which the log is taken and judged. fin_max_rad: fin limits by signal, for the finding of saturation.
+    progress: given the share of the log that has been read, now and then. Raises LogError or MappingError, and DataError where
+    the part is empty.
     """
     if str(path) == "-":
         return _from_stdin(mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s, part=part, fin_max_rad=fin_max_rad)
     path = Path(path)
-    reader, options = reader_of(path), ReadOptions(msg_path, salvage)
+    reader, options = reader_of(path, joined), ReadOptions(msg_path, salvage, joined=tuple(joined))
     chosen, notes = map_for(path, reader, options, mapping, channels or {})
     command = _command(path, chosen, channels or {}, options)
     options = replace(options, command=command, progress=progress or options.progress)
@@ -73,7 +75,7 @@ def _judged_anew(run: Run, fin_max_rad: Mapping[str, float]) -> Run:
 
 def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], options: ReadOptions) -> str:
     """Return the command that imports a log as it is read here."""
-    words = ["sysid", "import", str(path)]
+    words = ["sysid", "import", *(["--join"] if options.joined else []), str(path), *map(str, options.joined)]
     words += ["--mapping", str(mapping.origin)] if mapping.origin else []
     for signal, source in channels.items():
         words += ["--channel", f"{signal}={source.column}" + (f":{source.unit}" if source.unit else "")]
@@ -105,7 +107,8 @@ def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channe
         return None
     base = base or ChannelMap({})
     sources = {s: c for s, c in channels.items() if s != TIME}
-    return replace(base, sources={**base.sources, **sources}, time=channels.get(TIME, base.time))
+    kept = {s: c for s, c in base.sources.items() if signal_of(s) not in sources}
+    return replace(base, sources={**kept, **sources}, time=channels.get(TIME, base.time))
 
 
 def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
@@ -120,9 +123,10 @@ def _unmapped(path: Path, reader: Reader, options: ReadOptions) -> MappingError:
     found = reader.inventory(path, options, TableForm())
     names = [c.name for c in found.channels]
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    hint = f"write a mapping: `sysid inspect {shlex.quote(str(path))} --write-mapping {MAPPING_FILE}`"
+    files = shlex.join([*(["--join"] if options.joined else []), str(path), *map(str, options.joined)])
+    hint = f"write a mapping: `sysid inspect {files} --write-mapping {MAPPING_FILE}`"
     if found.by_topic:
-        what = "bag" if found.form.endswith("bag") else "log of topics"
+        what = "bag" if found.form.endswith("bag") else "run in several tables" if reader.name == JOINED else "log of topics"
         return MappingError(f"`{path}` is a {what} and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
     close = _near_names(names)
     hint += f"; {close}" if close else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -24,6 +24,10 @@ DEFINED = "message"
 """The kind of a topic whose fields the format defines: its names are not guessed at."""
 MOST_CHANNELS = 5000
 """Channels of a log that are looked into, twice those of a glider, which has the most; of others, how many there are is said."""
+TABLE = "table"
+"""The kind of a topic that is a file of its own, whose fields are its columns."""
+JOINED = "several_tables"
+"""The reader of a run in several tables."""
 WORTH_SALVAGING = 0.5
 """Share of a log from which its readable part is offered."""
 
@@ -125,13 +129,15 @@ class ReadOptions:
     """What a caller may ask of any reader: a folder of .msg files, and to take what is left of a damaged log.
 
     `command` is the one that imports the log as it is read here, for hints; `clock` the time column of a table that is listed,
-    where a mapping names it. `progress` is given which share of the log has been read, now and then.
+    where a mapping names it. `joined` are the other tables of a run of which the log is one. `progress` is given which share of
+    the log has been read, now and then.
     """
 
     msg_path: Path | None = None
     salvage: bool = False
     command: str = "sysid import LOG"
     clock: Source | None = None
+    joined: tuple[Path, ...] = ()
     progress: Callable[[float], None] = _unseen
 
     def with_option(self, option: str) -> str:
@@ -161,10 +167,16 @@ class Reader:
     own_map: Callable[[Path, ReadOptions], ChannelMap | None] = never_canonical
 
 
-def reader_of(path: Path) -> Reader:
-    """Return the reader that recognises a file by its content; raises LogError when it is missing, empty or unknown."""
-    check_readable(path)
+def reader_of(path: Path, joined: Sequence[Path] = ()) -> Reader:
+    """Return the reader that recognises a file, alone or with the other tables of its run, by its content.
+
+    Raises LogError when one is missing, empty or unknown.
+    """
+    for file in (path, *joined):
+        check_readable(file)
     known: dict[str, Reader] = dict(members(PACKAGE, "READER"))
+    if joined:
+        return known[JOINED]
     # Text is what is left when no signature of a binary format is there, so the table is asked last.
     for name in sorted(known, key=lambda n: (n == "csv_table", n)):
         if known[name].sniff(path):

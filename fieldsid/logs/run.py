@@ -49,8 +49,15 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Canonical signal names and their units; `thrust` may be in any unit."""
+PART = "["
+"""What stands behind a signal in the name of an entry of its sum: `rudder_rad[0]`."""
 GOALS = frozenset({"yaw_goal_rad", "pitch_goal_rad"})
 """The angles that an autopilot was told to hold."""
+
+
+def signal_of(name: str) -> str:
+    """Return the signal that a source is for: the entries of a sum are named `rudder_rad[0]`, `rudder_rad[1]` and so on."""
+    return name.partition(PART)[0]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -66,7 +73,7 @@ SIMULATED = "simulated"
 """Code of the note of a run that a model made."""
 READ_WITH = "mapping"
 """Code of the note that names the mapping file which a log was read with, under `path`."""
-EXPLAINING = frozenset({"time_origin", "clock", READ_WITH, "ignored_columns"})
+EXPLAINING = frozenset({"time_origin", "clock", READ_WITH, "ignored_columns", "joined"})
 """Codes of the notes that explain rather than warn."""
 OF_LIMITS = ("saturated", "fin_limit")
 """Codes of the notes that hang on the fin limits: a run keeps those of its import, and is judged by the limits of the day."""

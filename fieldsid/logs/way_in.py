@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fieldsid.errors import FieldsidError
-from fieldsid.logs.channels import ChannelMap
 from fieldsid.logs.convert.conditioning import MAIN, MAX_GAP_S, gaps_in
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.reader import WORTH_SALVAGING
@@ -25,7 +24,7 @@ class WayIn:
     refusal: FieldsidError | None = None
 
 
-def way_in(path: Path, run: Run, notes: Iterable[Note], mapping: ChannelMap | None, msg_path: Path | None = None) -> WayIn:
+def way_in(path: Path, run: Run, notes: Iterable[Note], plain: Importer) -> WayIn:
     """Return how a log is imported of which `run` is all that could be read, with `notes` on it: the first way it is not refused.
 
     A log of which nothing was left out, and that has no long gap, is not read again: nothing of it is refused.
@@ -36,7 +35,7 @@ def way_in(path: Path, run: Run, notes: Iterable[Note], mapping: ChannelMap | No
         return WayIn()
     refusal: FieldsidError | None = None
     is_worth = _left(notes) >= WORTH_SALVAGING
-    for options, importer in _ways(mapping, msg_path, round(longest + 0.1, 1), salvaging=is_worth):
+    for options, importer in _ways(plain, round(longest + 0.1, 1), salvaging=is_worth):
         try:
             importer.read(path)
         except FieldsidError as error:
@@ -51,10 +50,8 @@ def _left(notes: Iterable[Note]) -> float:
     return min((1.0 - n.data["dropped"] / n.data["of"] for n in notes if n.code == "time_order"), default=1.0)
 
 
-def _ways(
-    mapping: ChannelMap | None, msg_path: Path | None, gap_s: float, *, salvaging: bool
-) -> Iterator[tuple[tuple[str, ...], Importer]]:
+def _ways(plain: Importer, gap_s: float, *, salvaging: bool) -> Iterator[tuple[tuple[str, ...], Importer]]:
     for salvage in (False, True) if salvaging else (False,):
         asked = ("--salvage",) if salvage else ()
-        yield asked, Importer(mapping, msg_path=msg_path, salvage=salvage)
-        yield (*asked, "--max-gap", f"{gap_s:g}"), Importer(mapping, msg_path=msg_path, salvage=salvage, max_gap_s=gap_s)
+        yield asked, replace(plain, salvage=salvage)
+        yield (*asked, "--max-gap", f"{gap_s:g}"), replace(plain, salvage=salvage, max_gap_s=gap_s)

@@ -121,6 +121,7 @@ def _request(asked: PlanRequest, model: Model, vehicle: Vehicle | None, axis: Ax
         open_loop=asked.open_loop,
         seed=asked.seed,
         vehicle=vehicle.name if vehicle else "vehicle",
+        fins=vehicle.fins.of(axis.value) if vehicle and vehicle.fins else None,
         slowest=vehicle.speed_min_m_s if vehicle else None,
         fastest=vehicle.speed_max_m_s if vehicle else None,
         course=_course(asked.course),

@@ -36,7 +36,10 @@ ROW: Shape = {
     "draws_held": number(0.0, 1.0),
     "settling_s": _SECONDS,
 }
+FINS: Shape = {"names": [text], "shares": [number()], "limits": [above_zero()], "unit": text}
+"""The fins of the plane that its gains steer."""
 PROVENANCE: Shape = {
+    "fins?": FINS,
     "models?": [SOURCE],
     "runs?": [text],
     "supported_m_s?": (number(0.0), number(0.0)),

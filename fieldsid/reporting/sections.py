@@ -293,7 +293,9 @@ def _vehicle(material: Material) -> list[tuple[str, str]]:
         ("length", v.length_m, "m"), ("rudder limit", v.rudder_max_rad, "rad"), ("elevator limit", v.elevator_max_rad, "rad"),
         ("fin rate", v.fin_rate_rad_s, "rad/s"), ("slowest", v.speed_min_m_s, "m/s"), ("fastest", v.speed_max_m_s, "m/s"),
     )  # fmt: skip
-    return [(name, f"{number(value, 3)} {unit}") for name, value, unit in pairs if value is not None]
+    told = [(name, f"{number(value, 3)} {unit}") for name, value, unit in pairs if value is not None]
+    planes = () if v.fins is None else ((v.fins.of("yaw"), "rudder"), (v.fins.of("pitch"), "elevator"))
+    return [*told, *(("fins", ", ".join(fins.says(plane))) for fins, plane in planes if fins is not None)]
 
 
 def _commands(state: FolderState) -> list[dict[str, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid._version import __version__
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.logs.run import Note, Run
+from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
@@ -43,11 +44,12 @@ def design_schedule(
     depth: bool = False,
     runs: Sequence[Run] = (),
     length: float | None = None,
+    fins: PlaneFins | None = None,
 ) -> Schedule:
     """Return the schedule of a source's axis at its speeds (or those given, m/s), fin limited to +/-fin_limit rad.
 
     runs are those the models came from: the vehicle in surge, sway and yaw, `length` m long where that is known, is identified
-    from them. Raises UsageError for what
+    from them. fins: those that the axis' command is made of, for who writes the gains to the vehicle. Raises UsageError for what
     cannot be meant and ModelError where no gain holds the loop.
     """
     wish, limits = wish or Wish(), limits or FinLimits()
@@ -59,6 +61,12 @@ def design_schedule(
     if not 0.0 < fin_limit <= 1.5708:
         hint = in_radians("--fin-limit", fin_limit)
         raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-limit {fin_limit:g}", hint=hint)
+    if fins is not None and not fins.follows(fin_limit):
+        raise UsageError(
+            "the fin's limit is more than the fins reach",
+            found=f"--fin-limit {fin_limit:g}, {fins.reach:.4g} rad by `fins` of vehicle.yaml",
+            hint=f"write `--fin-limit {fins.reach:.4g}`, or leave it out",
+        )
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
     plants, refused = plants_of(source, limits, runs, length), False
@@ -78,10 +86,14 @@ def design_schedule(
         depth=depth,
         rows=rows,
         actuator=plants.actuator,
-        provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length},
+        provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length} | _told(fins),
         stated=limits.record(),
         notes=() if plants.note is None else (plants.note,),
     )
+
+
+def _told(fins: PlaneFins | None) -> dict[str, Any]:
+    return {} if fins is None else {"fins": fins.record()}
 
 
 def _took_no_gains(error: ModelError) -> Note:

@@ -15,7 +15,8 @@ from fieldsid.display import Displayed, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
-from fieldsid.models.axis import Axis
+from fieldsid.models.allocation import PlaneFins, plane_fins_of
+from fieldsid.models.axis import NAMES, Axis
 from fieldsid.records.check import ShapeError
 from fieldsid.records.reading import load_record
 from fieldsid.schedule.controller import Gains
@@ -93,6 +94,17 @@ class Schedule(Plotted):
         return tuple(r.speed for r in self.rows)
 
     @property
+    def fins(self) -> PlaneFins | None:
+        """The fins that the command is made of; None where it is one."""
+        body = self.provenance.get("fins")
+        return None if body is None else plane_fins_of(body)
+
+    @property
+    def fins_said(self) -> list[str]:
+        """What each of them is told, in words; nothing where the command is one fin."""
+        return [] if self.fins is None else self.fins.says(NAMES[self.axis].fin.removesuffix("_rad"))
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Columns an export writes for this axis."""
         return tuple(c for c in COLUMNS if c != "depth_gain" or self.depth)
@@ -149,7 +161,8 @@ def load_schedule(path: Path) -> Schedule:
     try:
         rows = tuple(_row(r) for r in body["rows"])
         _check_rows(rows)
-    except ShapeError as error:
+        fins = {name: plane_fins_of(value).record() for name, value in body["provenance"].items() if name == "fins"}
+    except ValueError as error:  # a wrong shape too
         raise ArtifactError(
             f"`{path}` is not a complete schedule", found=str(error), hint="design it again, with `--force`"
         ) from error
@@ -161,7 +174,7 @@ def load_schedule(path: Path) -> Schedule:
         depth=body["depth"],
         rows=rows,
         actuator=dict(body["actuator"]),
-        provenance={**body["provenance"], "inputs": body.get("inputs", [])},
+        provenance={**body["provenance"], **fins, "inputs": body.get("inputs", [])},
         stated=dict(body["stated"]),
         notes=tuple(Note(n["code"], n["message"]) for n in body.get("warnings", ())),
     )

@@ -47,6 +47,7 @@ def page(schedule: Schedule) -> Page:
             ("effects", listed(schedule.provenance.get("effects", ()))),
             ("signs", str(schedule.provenance.get("sign_convention", ""))),
             ("law", str(schedule.provenance.get("law", ""))),
+            ("fins", "; ".join(schedule.fins_said)),
         ),
     )
     blocks = (known, Block("Gains", rows, heads, left=0))

@@ -86,6 +86,14 @@ def dune():
     Path("IMC.xml").rename(there("defs") / "IMC.xml")
 
 
+def two_runs():
+    place = there("logs")
+    for k in (1, 2):
+        motion = "".join(f"{t:.1f},{40 + 5 * np.sin(0.1 * k * t):.3f}\n" for t in TIME)
+        (place / f"run{k}_state.csv").write_text("time_s,heading_deg\n" + motion)
+        (place / f"run{k}_input.csv").write_text("time_s,rudder_deg\n" + "".join(f"{t:.1f},{5 * np.sin(t):.3f}\n" for t in TIME))
+
+
 def there(name):
     Path(name).mkdir()
     return Path(name)
@@ -135,6 +143,7 @@ CASES = {
     "a mapped type without a definition": (own_bag, "import log.db3 --mapping m.yaml -o runs"),
     "two definitions": (lambda: own_bag("ws1", "ws2"), "import log.db3 --mapping m.yaml -o runs"),
     "a dune log alone": (dune, "inspect Data.lsf"),
+    "several runs of two tables": (two_runs, "inspect logs"),
 }  # fmt: skip
 
 

@@ -96,6 +96,54 @@ def test_the_columns_come_back_from_the_text(name, schedule):
         assert found[column] == pytest.approx(values, abs=1e-6), column
 
 
+FINS = {"names": ["fin1", "fin2"], "shares": [1.0, -1.0], "limits": [0.3, 0.26], "unit": "rad"}
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_the_fins_that_make_the_command_come_back_with_their_limits(name):
+    target, schedule = all_targets()[name], schedule_of()
+    schedule = replace(schedule, provenance={**schedule.provenance, "fins": FINS})
+    text = target.render(schedule, target.node, None)
+    assert "fin2 = -1 rudder, within +/-0.26 rad" in text
+    assert FINS_OF[name](text, target.node) == [("fin1", 1.0, 0.3), ("fin2", -1.0, 0.26)]
+
+
+def fins_of_yaml(text, node):
+    found = YAML(typ="safe").load(text)[node]["fins"]
+    return list(zip(found["names"], found["shares"], found["limits"], strict=True))
+
+
+def fins_of_ros2(text, node):
+    found = YAML(typ="safe").load(text)[node]["ros__parameters"]["heading_fins"]
+    assert all(type(x) is float for key in ("shares", "limits") for x in found[key])
+    return list(zip(found["names"], found["shares"], found["limits"], strict=True))
+
+
+def fins_of_dune(text, node):
+    parser = configparser.ConfigParser()
+    parser.read_string(text)
+    names, shares, limits = (parser[node][key].split(", ") for key in ("fins", "fin shares", "fin limits"))
+    return list(zip(names, map(float, shares), map(float, limits), strict=True))
+
+
+def fins_of_ardupilot(text, node):
+    lines = dict(line.split(",") for line in text.splitlines() if line and not line.startswith("#"))
+    assert all(len(name) <= 16 for name in lines)
+    return [(f"fin{k}", float(lines[f"{node}_FIN{k}"]), float(lines[f"{node}_FIN{k}_MAX"])) for k in (1, 2)]
+
+
+def fins_of_moos(text, node):
+    rows = [
+        dict(p.strip().split("=") for p in line.split("FIN = ")[1].split(",")) for line in text.splitlines() if "FIN = " in line
+    ]
+    return [(r["name"], float(r["share"]), float(r["limit"])) for r in rows]
+
+
+FINS_OF = {
+    "yaml": fins_of_yaml, "ros2": fins_of_ros2, "dune": fins_of_dune, "ardupilot": fins_of_ardupilot, "moos": fins_of_moos,
+}  # fmt: skip
+
+
 def read_yaml(text, node):
     rows = YAML(typ="safe").load(text)[node]["rows"]
     return {k: [float(r[k]) for r in rows] for k in rows[0] if isinstance(rows[0][k], (int, float))}

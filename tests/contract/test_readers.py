@@ -74,6 +74,15 @@ def as_lsf(folder):
     )
 
 
+def as_tables(folder):
+    """The motion in one table, the command in another."""
+    place = folder / "log"
+    place.mkdir()
+    for name, kept in (("fins", ["rudder_rad"]), ("motion", [s for s in SIGNALS if s != "rudder_rad"])):
+        save_run(Run(name, TIME, {s: SIGNALS[s] for s in kept}), place / f"{name}.csv")
+    return place, by_topic({n: ("fins" if n == "rudder_rad" else "motion", n) for n in SIGNALS})
+
+
 MADE = {
     "csv_table": as_csv,
     "parquet": as_parquet,
@@ -84,6 +93,7 @@ MADE = {
     "ardupilot": as_ardupilot,
     "slocum": as_slocum,
     "lsf": as_lsf,
+    "several_tables": as_tables,
 }
 
 
@@ -94,6 +104,7 @@ MISSPELT = {
     "ardupilot": Source(topic="TRI", path="S33"),
     "slocum": Source(topic="rudder_rd", path="data"),
     "lsf": Source(topic="EstimatedState", path="rudder_rd"),
+    "several_tables": Source(topic="fins", path="rudder_rd"),
 }
 """Sources of logs of topics that are not there; all others are tables."""
 
@@ -185,10 +196,10 @@ def test_a_mapping_of_the_other_kind_is_an_error(reader, log):
 def test_a_log_cut_in_half_is_an_error_or_what_is_left_with_a_note(reader, log):
     path, mapping = log
     if path.is_dir():
-        path = next(p for p in path.iterdir() if p.suffix == ".mcap")
+        path = next(p for p in path.iterdir() if p.suffix in (".mcap", ".csv"))
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     try:
-        run = load_run(path, mapping)
+        run = load_run(log[0], mapping)
     except LogError as error:
         parts = (error.what, error.found, error.hint)
     else:
@@ -198,9 +209,10 @@ def test_a_log_cut_in_half_is_an_error_or_what_is_left_with_a_note(reader, log):
 
 
 def test_an_empty_file_a_folder_and_a_missing_file_are_errors(reader, tmp_path):
-    empty = tmp_path / f"a{reader.suffixes[0]}"
+    suffix = next(iter(reader.suffixes), "")  # a folder has none
+    empty = tmp_path / f"a{suffix}"
     empty.write_bytes(b"")
-    for path in (empty, tmp_path / f"missing{reader.suffixes[0]}", tmp_path):
+    for path in (empty, tmp_path / f"missing{suffix}", tmp_path):
         with pytest.raises(LogError) as error:
             load_run(path)
         assert error.value.found
@@ -212,7 +224,7 @@ def test_a_file_that_cannot_be_opened_is_an_error(reader, log, monkeypatch):
 
     path, mapping = log
     if path.is_dir():
-        path = next(p for p in path.iterdir() if p.suffix == ".mcap")
+        path = next(p for p in path.iterdir() if p.suffix in (".mcap", ".csv"))
     opened = Path.open
 
     def refuse(self, *args, **kwargs):

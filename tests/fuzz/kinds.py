@@ -202,6 +202,21 @@ def lsf_inspected(folder):
     inspected(folder / "Data.lsf")
 
 
+def as_tables(folder):
+    """A run in two tables, the motion and four fins row by row; either of them may be spoilt."""
+    place = folder / "tables"
+    place.mkdir()
+    motion = [
+        f"{1.7e9 + t:.2f},{y:.5f},{r:.5f}" for t, y, r in zip(TIME, SIGNALS["yaw_rad"], SIGNALS["yaw_rate_rad_s"], strict=True)
+    ]
+    (place / "State.csv").write_text("timestamp,psi (rad),r (rad/s)\n" + "\n".join(motion) + "\n")
+    fins = [
+        f"{1.7e9 + t:.2f},{k},{(-1) ** k * d:.4f}" for t, d in zip(TIME, SIGNALS["rudder_rad"], strict=True) for k in range(4)
+    ]
+    (place / "Servo.csv").write_text("timestamp,id,value (rad)\n" + "\n".join(fins) + "\n")
+    return place
+
+
 def as_mapping(folder):
     path = folder / "mapping.yaml"
     signals = {
@@ -209,6 +224,7 @@ def as_mapping(folder):
         "surge_m_s": "surge_m_s",
         "rudder_rad": {"column": 4, "unit": "counts", "centre": 0.0, "scale": 2.0},
         "position": {"columns": [1, 2]},
+        "elevator_rad": {"sum": [{"column": 3, "unit": "deg", "scale": 0.5}, {"column": "surge_m_s", "scale": -0.5}]},
     }
     table = {"separator": ",", "header": True, "skip": 0, "encoding": "utf-8", "decimal": "."}
     body = {"schema": "fieldsid/mapping/1", "frame": "NED/FRD", "stamp": "header", "clock": "yaw_rad", "gap_factor": 2.5,
@@ -220,7 +236,8 @@ def as_mapping(folder):
 
 def as_vehicle(folder):
     path = folder / "vehicle.yaml"
-    path.write_text(template_path("vehicle/torpedo.yaml").read_text())
+    fins = "fins: {names: [a, b], to_rudder: [0.5, 0.5], to_elevator: [0.5, -0.5], limits: 0.5}\n"
+    path.write_text(template_path("vehicle/torpedo.yaml").read_text() + fins)
     return path
 
 
@@ -500,6 +517,7 @@ KINDS = (
     Kind("alog", written(write_alog, "log.alog"), (spoil_text, spoil_bytes), (inspected,)),
     Kind("lsf", as_lsf, (spoil_bytes,), (lsf_inspected,), part="Data.lsf"),
     Kind("imc_definition", as_lsf, (spoil_text, spoil_bytes), (lsf_inspected,), part="IMC.xml"),
+    Kind("several_tables", as_tables, TABLE, (inspected,), part="S*.csv"),
     Kind("mapping", as_mapping, NODES, (mapping_read,)),
     Kind("vehicle", as_vehicle, NODES, (vehicle_read,)),
     Kind("model", good("m1.0.yaml"), NODES, (model_read,)),

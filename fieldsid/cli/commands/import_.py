@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.options import Force, FromS, JsonFlag, MappingFile, ToS, VehicleFile
+from fieldsid.cli.options import Force, FromS, Join, JsonFlag, MappingFile, ToS, VehicleFile
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,6 +23,7 @@ def command(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR|FILE", help="Folder for the runs, or the file of a single one.")
     ],
+    join: Join = False,
     mapping: MappingFile = None,
     channel: Annotated[
         list[str] | None,
@@ -58,14 +59,17 @@ def command(
     """
     from fieldsid.artifacts import check_output
     from fieldsid.cli.console import alike, emit, tracked, warn
-    from fieldsid.cli.inputs import between, mapping_of
+    from fieldsid.cli.inputs import between, mapping_of, one_run
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.logs.importing import Importer
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
 
+    joined: list[Path] = []
+    if join:
+        logs, joined = logs[:1], one_run("import", logs, join=True)[1:]
     importer = Importer(
-        mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage=salvage, whole=whole
+        mapping_of(mapping), tuple(channel or ()), msg_path, between(from_s, to_s), max_gap, salvage, whole, tuple(joined)
     )
     limits = _fin_limits(vehicle)
     targets = dict(zip(logs, importer.targets(logs, output, format_, force=force), strict=True))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.options import Force, JsonFlag, LogFile, MappingFile
+from fieldsid.cli.options import Force, Join, JsonFlag, LogAndTables, MappingFile
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 def command(
-    log: LogFile,
+    logs: LogAndTables,
+    join: Join = False,
     mapping: MappingFile = None,
     msg_path: Annotated[
         Path | None, typer.Option("--msg-path", metavar="DIR", help="Folder of .msg files for types the bag does not define.")
@@ -33,10 +34,12 @@ def command(
     """
     from fieldsid.cli.console import emit, tracked
     from fieldsid.cli.headlines.logs import of_inspection
+    from fieldsid.cli.inputs import one_run
     from fieldsid.logs.inspection import inspect_log, write_proposal
 
+    log, *joined = one_run("inspect", logs, join=join)
     for path, on_share in tracked([log], "reading"):
-        found = inspect_log(path, mapping=mapping, msg_path=msg_path, progress=on_share)
+        found = inspect_log(path, mapping=mapping, msg_path=msg_path, joined=joined, progress=on_share)
     written = write_proposal(found, write_mapping, force=force) if write_mapping is not None else None
     body = found.record(written)
     emit(body, as_json=as_json, render=lambda console: _render(found, console), headline=of_inspection(body, mapping))

@@ -125,7 +125,7 @@ def design(
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
-    from fieldsid.face.arguments import length_of, runs_behind
+    from fieldsid.face.arguments import fins_of, length_of, runs_behind
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.schedule.design import Wish
@@ -150,6 +150,7 @@ def design(
         depth=depth,
         runs=runs_behind(source, say),
         length=length_of(vehicle),
+        fins=fins_of(vehicle, source.axis),
     )
     body: dict[str, Any] = {"schema": "fieldsid/schedule/1", **body_of(schedule), "file": None}
     if output is not None:

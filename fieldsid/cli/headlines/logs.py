@@ -19,7 +19,11 @@ PROOF = "evidence"
 
 def of_inspection(body: Body, mapping: Path | None) -> Headline:
     """Return what a log holds, and how it becomes a run."""
-    log, signals, findings = body["path"], body["signals"], [f for f in body["findings"] if f["code"] != PROOF]
+    log, signals, findings = (
+        " + ".join([body["path"], *body["joined"]]),
+        body["signals"],
+        [f for f in body["findings"] if f["code"] != PROOF],
+    )
     said = counted(len(findings), "finding") if findings else "nothing found that would spoil an identification"
     if not signals:
         says = (
@@ -43,9 +47,10 @@ def _after(body: Body, mapping: Path | None) -> str:
         return typed_with("--write-mapping", MAPPING, *(("--force",) if Path(MAPPING).exists() else ()))
     if not body["signals"]:  # an import is refused until somebody has said what the columns are
         return pasted("guide", "trial")
-    if _is_taken(Path(body["path"]), known) and not body["import_options"]:
+    if _is_taken(Path(body["path"]), known) and not body["import_options"] and not body["joined"]:
         return pasted("import")
-    return pasted("import", body["path"], *(("--mapping", known) if known else ()), *body["import_options"], "-o", "runs/")
+    files = [*(["--join"] if body["joined"] else []), body["path"], *body["joined"]]
+    return pasted("import", *files, *(("--mapping", known) if known else ()), *body["import_options"], "-o", "runs/")
 
 
 def _is_taken(log: Path, mapping: str | Path | None) -> bool:
@@ -71,4 +76,4 @@ def of_import(body: Body) -> Headline:
 
 
 def _logs(runs: Sequence[Body]) -> list[str]:
-    return list(dict.fromkeys(Path(r["log"]).name for r in runs))
+    return list(dict.fromkeys(Path(r["log"]).resolve().name for r in runs))

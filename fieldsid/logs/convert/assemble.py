@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
-from fieldsid.logs.convert.clock import Track, one_clock
+from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
@@ -19,7 +19,7 @@ from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
 from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import PART, SIGNALS, Note, Run, signal_of
 from fieldsid.numerics.arrays import FloatArray
 
 WHOLE = (-np.inf, np.inf)
@@ -53,6 +53,7 @@ def assemble(
                     f"two sources give `{name}`", found=f"{tracks[name].label} and {track.label}", hint=f"map `{name}` once"
                 )
             tracks[name] = track
+    tracks = summed(tracks, mapping.gap_factor)
     if not tracks:
         raise MappingError(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
@@ -103,9 +104,9 @@ def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note],
     refuse_impossible_steps(picked.time, label)
     with np.errstate(over="ignore", invalid="ignore"):
         given = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
-        if signal in COUNTED and source.unit == COUNTS:
+        if signal_of(signal) in COUNTED and source.unit == COUNTS:
             angles, found = turned_from_counts(signal, picked.values, source.centre, source.scale)
-            picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None)
+            picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None, scale=None)
             notes += found
         values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}
     notes += [note for _, found in values.values() for note in found]
@@ -119,6 +120,8 @@ def _scalar(signal: str, series: Series, source: Source, mapping: ChannelMap) ->
     frame = source.frame or mapping.frame
     _check_swap(signal, source, mapping)
     name, values = to_ned_frd(signal, values, frame, is_height=series.is_height)
+    if PART in signal and source.scale is not None:
+        values = scaled(values, source.scale)
     return {name: values + source.offset if source.offset else values}
 
 
@@ -129,7 +132,9 @@ def _in_si(signal: str, series: Series, source: Source, mapping: ChannelMap) -> 
     if signal == "depth_m" and pick_unit(unit).dimension == "pressure":
         pascal = scaled(series.values, pick_unit(unit).factor)
         return depth_of_pressure(pascal, density=mapping.pressure.density, surface_pa=mapping.pressure.surface_pa)
-    return scaled(series.values, factor_to(signal, unit))
+    # The scale of an entry of a sum turns whatever its number is in to the unit of the sum.
+    factor = pick_unit(unit).factor if PART in signal and source.scale is not None else factor_to(signal_of(signal), unit)
+    return scaled(series.values, factor)
 
 
 def _check_swap(signal: str, source: Source, mapping: ChannelMap) -> None:

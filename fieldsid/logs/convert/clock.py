@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.run import GOALS, Note
+from fieldsid.logs.run import GOALS, PART, Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -61,6 +61,23 @@ def one_clock(
     if others:
         message += f"; brought to it: {', '.join(others)}"
     return time, signals, [Note("clock", message, {"signal": base, "rate_hz": rate})]
+
+
+def summed(tracks: Mapping[str, Track], gap_factor: float) -> dict[str, Track]:
+    """Return the tracks with the entries of each sum as one, which changes whenever one of them does.
+
+    Between its own stamps an entry is what it is on any other clock: a command stands, a measurement is straight. Where none of
+    them has a number the sum has none.
+    """
+    whole = {s: t for s, t in tracks.items() if PART not in s}
+    for signal in dict.fromkeys(signal_of(s) for s in tracks if PART in s):
+        entries = [t for s, t in tracks.items() if PART in s and signal_of(s) == signal]
+        time = np.unique(np.concatenate([t.time for t in entries]))
+        seen = np.concatenate([t.time[np.isfinite(t.values)] for t in entries])
+        on_it = [held(t, time) if signal in COMMANDS else straight(t, time, gap_factor) for t in entries]
+        values = np.where(np.isin(time, seen), np.sum(on_it, axis=0), np.nan)
+        whole[signal] = Track(time, values, " + ".join(t.label for t in entries))
+    return whole
 
 
 def held(track: Track, time: FloatArray) -> FloatArray:

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 
 COUNTS = "counts"
 FINS = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad")
 COUNTED = (*FINS, "thrust", "thrust_ratio")
+SUMMED = (*COUNTED, "propeller_rpm")
+"""What several fins or motors may make up together."""
 FULL_RAD = math.radians(30.0)
 """What the full travel of a servo is taken for where its range is not said."""
 
@@ -58,7 +60,7 @@ def turned_from_counts(
     """Return the angle (n,) in rad of a fin's counts, or a motor's counts from its centre, and a note on what was taken."""
     servo = next((s for s in SERVOS if s.centre == centre), None) or servo_of(values)
     middle = centre if centre is not None else servo.centre if servo is not None else 0.0
-    if signal not in FINS:
+    if signal_of(signal) not in FINS:
         return (values - middle) * (scale or 1.0), []
     if scale is not None:
         return (values - middle) * scale, []

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.run import SIGNALS
+from fieldsid.logs.run import SIGNALS, signal_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -95,8 +95,8 @@ def find_unit(name: str) -> Unit | None:
 
 
 def dimension_of(signal: str) -> str | None:
-    """Return the dimension of a canonical signal; None for `thrust`, which may be in any unit."""
-    return _DIMENSION_OF.get(SIGNALS[signal])
+    """Return the dimension of a canonical signal, or an entry of its sum; None for `thrust`, which may be in any unit."""
+    return _DIMENSION_OF.get(SIGNALS[signal_of(signal)])
 
 
 def factor_to(signal: str, unit: str) -> float:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from fieldsid.logs.channels import ChannelMap
 from fieldsid.logs.convert.units import factor_to
 from fieldsid.logs.reader import RawLog
-from fieldsid.logs.run import SIGNALS
+from fieldsid.logs.run import SIGNALS, signal_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def stated_by(mapping: ChannelMap, raw: RawLog) -> Stated:
     """Return what a mapping, and the log itself, state of the signals of a log."""
     units = {s: v.unit for s, v in raw.series.items() if v.unit} | {s: c.unit for s, c in mapping.sources.items() if c.unit}
     return Stated(
-        MappingProxyType({s: u for s, u in units.items() if s in SIGNALS}),
+        MappingProxyType({signal_of(s): u for s, u in units.items() if signal_of(s) in SIGNALS}),
         frozenset(s for s, c in mapping.sources.items() if c.sign < 0),
-        frozenset(s for s, c in mapping.sources.items() if (c.stamp or mapping.stamp) == "receive"),
+        frozenset(signal_of(s) for s, c in mapping.sources.items() if (c.stamp or mapping.stamp) == "receive"),
     )

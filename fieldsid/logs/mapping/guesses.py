@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fieldsid.logs.channels import ATTITUDE
+from fieldsid.logs.convert.units import dimension_of
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, stated_unit, unit_in_name
-from fieldsid.logs.mapping.word_meaning import COMMANDED, LATITUDE, LONGITUDE, meaning_of, words_of
-from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo
+from fieldsid.logs.mapping.word_meaning import COMMANDED, LATITUDE, LETTERS, LONGITUDE, meaning_of, words_of
+from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
 
 _VECTORS = {
@@ -24,6 +25,9 @@ _VECTORS = {
 _EULER = {"rpy", "euler", "attitude", "orientation", "angles"}
 _TILTS = {"pitch_rad", "roll_rad", "pitch_goal_rad"}
 _COUNTERS = {"seq", "sec", "nanosec", "secs", "nsecs"}
+NAMELESS = frozenset({"field", "data", "value", "val"})
+"""Words of a column that is called by its table's name."""
+_IN_BRACKETS = re.compile(r"[\[(](?!\d+[\])])[^\])]+[\])]")
 _PLANAR = {
     "theta": "yaw_rad", "angular_velocity": "yaw_rate_rad_s", "linear_velocity": "surge_m_s", "x": "x_m", "y": "y_m",
 }  # fmt: skip
@@ -113,6 +117,9 @@ def _weighed(sure: float, span: tuple[float, float] | None) -> float:
 
 def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
     """Yield what the fields of a topic may be."""
+    if channel.kind == TABLE:
+        yield from _of_table(channel)
+        return
     commanded = bool(COMMANDED & set(words_of(channel.name)))
     preferred = 1.0 if channel.kind.endswith("Imu") else 0.0
     paths = {info.path for info in channel.fields}
@@ -133,6 +140,28 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
         elif not (signal == ATTITUDE and _is_nothing(channel, parent)):
             path = parent if signal == ATTITUDE else info.path
             yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count)
+
+
+def _of_table(channel: ChannelInfo) -> Iterator[Guess]:
+    """Yield what the columns may be of one of the tables of a run: each by its name, or by the table's where it has none."""
+    bare = channel.name.partition("[")[0]
+    for info in channel.fields:
+        if info.means is not None:
+            yield _of_format(channel, info, *info.means)
+            continue
+        words = words_of(info.path)
+        of_both = f"{info.path} {bare}" if set(words) <= NAMELESS or (len(words) == 1 and words[0] in LETTERS) else ""
+        name = of_both if of_both and (found := meaning_of(of_both)) is not None and found[1] > 1 else info.path
+        column = ChannelInfo(name, info.kind, channel.count, channel.rate_hz, (replace(info, path=""),))
+        for guess in of_column(column, info.path):
+            if guess.signal not in (LATITUDE, LONGITUDE) and not _is_of_another_unit(name, guess.signal):
+                item = {k: v for k, v in guess.item.items() if k != "column"}
+                yield replace(guess, item={"topic": channel.name, "field": info.path, **item})
+
+
+def _is_of_another_unit(name: str, signal: str) -> bool:
+    """Whether a name states a unit in brackets in which the signal it seems to be cannot be."""
+    return _IN_BRACKETS.search(name) is not None and unit_in_name(name, signal) is None and dimension_of(signal) is not None
 
 
 def _of_plane(channel: ChannelInfo, path: str, *, commanded: bool) -> Iterator[Guess]:

@@ -11,12 +11,12 @@ from pydantic import Field
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
 from fieldsid.logs.convert.frames import Body, Frame, World
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, SUMMED
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
 from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
 from fieldsid.logs.mapping.canonical_names import TIME
-from fieldsid.logs.run import SIGNALS
+from fieldsid.logs.run import PART, SIGNALS, signal_of
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 
@@ -25,7 +25,9 @@ Column = Annotated[int, Field(ge=0)] | str
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class _Source(StrictModel):
+class _Place(StrictModel):
+    """Where numbers are and how they are read: what a signal and an entry of a sum have both."""
+
     column: Column | None = None
     columns: list[Column] | None = None
     order: Literal["xyzw", "wxyz"] = "xyzw"
@@ -37,7 +39,15 @@ class _Source(StrictModel):
     frame: str | None = None
     stamp: Literal["header", "receive"] | None = None
     centre: Finite | None = None
+
+
+class _Entry(_Place):
+    scale: Finite | None = None
+
+
+class _Source(_Place):
     scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    sum: Annotated[list[_Entry], Field(min_length=1)] | None = None
 
 
 class _Time(StrictModel):
@@ -135,16 +145,16 @@ def channel_of(text: str) -> tuple[str, Source]:
 
 def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
     frame = frame_of(file.frame, place)
-    sources = {signal: _source(signal, item, place) for signal, item in file.signals.items()}
+    sources = {name: source for signal, item in file.signals.items() for name, source in _sources(signal, item, place)}
     if not sources:
         raise MappingError(
             f"{place} maps no signal",
             found="an empty `signals`",
             hint="write a line for each under `signals`, as `yaw_rad: {column: NAME, unit: deg}`",
         )
-    if file.clock is not None and file.clock not in sources:
+    if file.clock is not None and file.clock not in file.signals:
         raise MappingError(
-            f"{place}: `clock` names a signal that is not mapped", found=file.clock, hint=near(file.clock, list(sources))
+            f"{place}: `clock` names a signal that is not mapped", found=file.clock, hint=near(file.clock, list(file.signals))
         )
     return ChannelMap(
         sources,
@@ -193,14 +203,46 @@ def _time(time: _Time, place: str) -> Source:
     )
 
 
-def _source(signal: str, item: _Source | str | int, place: str) -> Source:
+def _sources(signal: str, item: _Source | str | int, place: str) -> list[tuple[str, Source]]:
+    """Return where a signal is with its own name, or each entry of its sum with a name that has a number."""
     known = (*COMBINED, *SIGNALS)
     if signal not in known:
         raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
     if not isinstance(item, _Source):
         item = validated(_Source, {"column": item}, place=f"{place}, `{signal}`", error=MappingError)
+    if item.sum is None:
+        return [(signal, _source(signal, item, place))]
+    _check_sum(signal, item, place)
+    named = [(f"{signal}{PART}{i}]", entry) for i, entry in enumerate(item.sum)]
+    return [(name, _source(name, entry, place)) for name, entry in named]
+
+
+def _check_sum(signal: str, item: _Source, place: str) -> None:
+    """A sum is of fins or motors, and all that is said of it is said of its entries."""
+    if signal not in SUMMED:
+        raise MappingError(
+            f"{place}: `{signal}` cannot be a sum",
+            found=f"{len(item.sum or ())} entries",
+            hint=f"a sum is for {', '.join(SUMMED)}",
+        )
+    beside = sorted(item.model_fields_set - {"sum"})
+    if beside:
+        raise MappingError(
+            f"{place}: `{signal}` has `{beside[0]}` beside its `sum`",
+            found=", ".join(beside),
+            hint="write it at each entry of the sum",
+        )
+    flat = next((i for i, entry in enumerate(item.sum or ()) if entry.scale == 0.0), None)
+    if flat is not None:
+        hint = "leave the entry out, or write what its number is worth"
+        raise MappingError(f"{place}: entry {flat} of the sum `{signal}` has a scale of zero", found="scale: 0", hint=hint)
+
+
+def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
     _check_place(signal, item, place)
-    if item.unit is not None:
+    # The scale of an entry turns its unit, as the N of a thruster, to that of the sum.
+    is_turned = isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit or "") is not None
+    if item.unit is not None and not is_turned:
         _check_unit(signal, item.unit, place)
     if (signal in COMBINED or item.columns) and (item.sign != 1 or item.unit):
         raise MappingError(
@@ -224,12 +266,12 @@ def _source(signal: str, item: _Source | str | int, place: str) -> Source:
     )
 
 
-def _check_place(signal: str, item: _Source, place: str) -> None:
+def _check_place(signal: str, item: _Source | _Entry, place: str) -> None:
     """Exactly one of column, columns, topic says where a signal is."""
     named = [n for n, v in (("column", item.column), ("columns", item.columns or None), ("topic", item.topic)) if v is not None]
     if len(named) != 1:
         raise MappingError(
-            f"{place}: `{signal}` needs one of `column`, `columns`, `topic`",
+            f"{place}: `{signal}` needs one of `column`, `columns`, `topic`, `sum`",
             found=" and ".join(named) or "none of them",
             hint="write `column: NAME`, or `topic: NAME` where the log is a bag",
         )
@@ -241,7 +283,7 @@ def _check_place(signal: str, item: _Source, place: str) -> None:
     _check_counts(signal, item, place)
 
 
-def _check_columns(signal: str, item: _Source, place: str) -> None:
+def _check_columns(signal: str, item: _Place, place: str) -> None:
     if signal == POSITION:
         if item.topic is None and len(item.columns or ()) != 2:
             raise MappingError(
@@ -257,13 +299,14 @@ def _check_columns(signal: str, item: _Source, place: str) -> None:
         )
 
 
-def _check_counts(signal: str, item: _Source, place: str) -> None:
+def _check_counts(signal: str, item: _Source | _Entry, place: str) -> None:
     """A centre and a scale are those of counts, and counts those of a servo or a motor."""
-    extra = [n for n, v in (("centre", item.centre), ("scale", item.scale)) if v is not None]
+    of_counts = (("centre", item.centre), ("scale", item.scale if isinstance(item, _Source) else None))
+    extra = [n for n, v in of_counts if v is not None]
     if extra and item.unit != COUNTS:
         hint = f"write `unit: {COUNTS}` beside it"
         raise MappingError(f"{place}: `{signal}` has a `{extra[0]}` without counts", found=f"unit: {item.unit}", hint=hint)
-    if item.unit == COUNTS and signal not in COUNTED:
+    if item.unit == COUNTS and signal_of(signal) not in COUNTED:
         raise MappingError(
             f"{place}: `{signal}` cannot be in {COUNTS!r}", found=f"{COUNTS} are those of a servo or a motor", hint="set its unit"
         )
@@ -283,5 +326,5 @@ def _check_unit(signal: str, unit: str, place: str) -> None:
         raise MappingError(
             f"{place}: `{signal}` cannot be in {unit!r}",
             found=f"a unit of {picked.dimension}",
-            hint=f"use a unit of {dimension}, such as `{SIGNALS[signal]}`",
+            hint=f"use a unit of {dimension}, such as `{SIGNALS[signal_of(signal)]}`",
         )

@@ -13,13 +13,14 @@ import numpy as np
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
+from fieldsid.logs.mapping.fins.several import with_several_fins
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.true_north import true_north
 from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
+from fieldsid.logs.reader import TABLE, Inventory, RawLog, Reader, ReadOptions, Samples, Series
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -78,8 +79,20 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
             left = body["signals"].pop(signal)
             notes.append(Note("left_out", f"{signal} is not proposed from {_label(left)}: {error.what}", {"signal": signal}))
         else:
+            done = _with_several_fins(inventory, reader, options, done)
             return replace(done, notes=(*notes, *done.notes))
     return Proposal(body, notes=tuple(notes))
+
+
+def _with_several_fins(inventory: Inventory, reader: Reader, options: ReadOptions, done: Proposal) -> Proposal:
+    """Return a proposal with the fins that move each plane, where a log has several alike."""
+    if done.run is None:
+        return done
+    body, why = with_several_fins(inventory, reader, options, done.body, done.run)
+    if not why:
+        return done
+    again = _tried(inventory, reader, options, body)
+    return replace(again, notes=(*done.notes, *why, *again.notes))
 
 
 def _in_degrees_by_span(signals: dict[str, Any], inventory: Inventory) -> None:
@@ -172,7 +185,10 @@ def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         for angle in ANGLES:
             best.pop(angle, None)
     named = " ".join(c.name + c.kind for c in inventory.channels).lower()
-    frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
+    if any(c.kind == TABLE and _MESSAGE_PATH.search(f.path) for c in inventory.channels for f in c.fields):
+        frame = REP103
+    else:
+        frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
     signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
     notes += [] if set(FINS) & signals.keys() else _which_output(inventory)
     return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes
@@ -273,7 +289,7 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
     from fieldsid.logs.doctor.stated import stated_by
     from fieldsid.logs.mapping.mapping_file import mapping_of
 
-    lenient = ReadOptions(options.msg_path, salvage=True)
+    lenient = ReadOptions(options.msg_path, salvage=True, joined=options.joined)
     raw = reader.read(inventory.path, mapping_of(body), lenient)
     by_size = frozenset(s for s, v in raw.series.items() if _is_in_degrees(s, v, body["signals"].get(s, {})))
     for signal in by_size:

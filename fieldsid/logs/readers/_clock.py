@@ -38,11 +38,15 @@ WEEKS = frozenset({"week", "wn", "wk", "gwk", "gpsweek"})
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The time of a table's rows (n,) in s, NaN where they have none, the column it is from and how it is read, and notes."""
+    """The time of a table's rows (n,) in s, NaN where they have none, the column it is from and how it is read, and notes.
+
+    `origin_s` is what its zero is on the clock that wrote it, where that counts from an epoch or from midnight.
+    """
 
     time: FloatArray
     source: Source
     notes: tuple[Note, ...] = ()
+    origin_s: float = 0.0
 
     @property
     def duration_s(self) -> float:
@@ -127,12 +131,13 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
         return None
     unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or _unit_by_size(cells)
     try:
-        time, _ = time_of(columns, source, unit, ReadOptions(salvage=True))
+        time, notes = time_of(columns, source, unit, ReadOptions(salvage=True))
     except FieldsidError:  # what is no time is not taken for one
         return None
+    origin = next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
     time = time if source.scale is None else time * source.scale
     steps = np.diff(time[np.isfinite(time)])
-    return Clock(time, source) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
+    return Clock(time, source, origin_s=origin) if steps.size and bool((steps > 0.0).mean() > MOSTLY) else None
 
 
 def _by_numbers(columns: Columns) -> Clock | None:

@@ -161,7 +161,9 @@ def series_of(path: Path, columns: Columns, mapping: ChannelMap, notes: tuple[No
 def _check_source(path: Path, signal: str, source: Source) -> None:
     if source.topic is not None:
         raise MappingError(
-            f"`{signal}` is mapped to topic `{source.topic}`, but `{path}` is a table", found=source.label, hint="name a `column`"
+            f"`{signal}` is mapped to topic `{source.topic}`, but `{path}` is a table",
+            found=source.label,
+            hint="name a `column`; or, of a run in several tables, give their folder, or all of them with --join",
         )
     if signal == ATTITUDE and len(source.columns) != 4:
         raise MappingError(

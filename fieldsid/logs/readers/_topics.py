@@ -85,13 +85,18 @@ def inventory_of(
 def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
     bare = name.partition("[")[0]
     several = {p: m for key, m in means.items() if (p := key.removeprefix(f"{bare}.")) != key and ", " in p}
-    fields = [FieldInfo(p, "number", tuple(v[:3].tolist()), None, means.get(f"{bare}.{p}")) for p, v in topic.fields.items()]
+    fields = [FieldInfo(p, "number", tuple(v[:3].tolist()), _span(v), means.get(f"{bare}.{p}")) for p, v in topic.fields.items()]
     fields += [
         FieldInfo(p, "numbers", (), None, m) for p, m in several.items() if all(part in topic.fields for part in p.split(", "))
     ]
     steps = np.diff(topic.time)
     rate = 1.0 / float(np.median(steps)) if steps.size and float(np.median(steps)) > 0.0 else float("nan")
     return ChannelInfo(name, kind, int(topic.time.size), rate, tuple(fields), topic.unit)
+
+
+def _span(values: FloatArray) -> tuple[float, float] | None:
+    seen = values[np.isfinite(values)]
+    return (float(seen.min()), float(seen.max())) if seen.size else None
 
 
 def _check_not_empty(path: Path, topics: Mapping[str, Topic]) -> None:

@@ -65,6 +65,18 @@ def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
         return series_of(path, columns, mapping, tuple(table.notes), options)
 
 
+def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
+    """Return all columns of a table, and notes on it; raises LogError where it is none."""
+    with _opened(path, form, options) as table:
+        return table.columns(range(table.form.width)), tuple(table.notes)
+
+
+def names_of(path: Path, form: TableForm) -> tuple[str, ...]:
+    """Return the names of a table's columns; raises LogError where it is none."""
+    with plain_text(path, form.encoding, limit=HEAD) as text:
+        return form_of(_head_of(path, text), form, path).names
+
+
 def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
     """Return the mapping of a table with canonical names, or None."""
     with plain_text(path, limit=HEAD) as text:

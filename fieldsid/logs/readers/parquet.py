@@ -77,6 +77,11 @@ def own_map(path: Path, options: ReadOptions) -> ChannelMap | None:
         raise _unreadable(path, error) from error
 
 
+def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
+    """Return all columns of a table, and no notes; raises LogError where it cannot be read."""
+    return _columns(path, _table(path)), ()
+
+
 def _columns(path: Path, table: Any) -> Columns:
     names = tuple(table.column_names)
     return Columns(path, names, len(names), lambda i: _cells(table.column(i)))

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
+from itertools import takewhile
 from pathlib import Path
 
 from fieldsid.errors import UsageError
 from fieldsid.logs.run import Run
+
+_BOUNDARY = re.compile(r"[-_. ]+")
+"""What stands between the words of a file's name."""
 
 
 def stem_of(path: Path) -> str:
@@ -45,6 +50,24 @@ def names_apart(names: Sequence[str], paths: Sequence[Path]) -> list[str]:
             for i, own in zip(places, _told_apart(name, [_real(paths[i]) for i in places]), strict=True):
                 out[i] = own
     return _numbered(out)
+
+
+def name_of_run(tables: Sequence[Path]) -> str:
+    """Return what a run in several tables is called: what their names begin with, else their folder."""
+    shared = shared_start([stem_of(path) for path in tables]).rstrip("-_. ")
+    return shared or tables[0].resolve().parent.name
+
+
+def shared_start(stems: Sequence[str]) -> str:
+    """Return what names begin with, up to the end of a word in all of them."""
+    same = common_start(stems)
+    ends = [m.end() for m in _BOUNDARY.finditer(same)]
+    return same[: ends[-1]] if ends else ""
+
+
+def common_start(names: Sequence[str]) -> str:
+    """Return the letters that all names begin with."""
+    return "".join(letters[0] for letters in takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False)))
 
 
 def _told_apart(name: str, paths: Sequence[Path]) -> list[str]:

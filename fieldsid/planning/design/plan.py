@@ -10,6 +10,7 @@ import numpy as np
 from fieldsid.display import Brief
 from fieldsid.errors import UsageError
 from fieldsid.maneuvers import parse_spec
+from fieldsid.models.allocation import PlaneFins
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.planning.belief.prior_model import checked_prior
@@ -41,6 +42,7 @@ class Request:
     open_loop: bool = False
     seed: int = 1
     vehicle: str = "vehicle"
+    fins: PlaneFins | None = None
     slowest: float | None = None
     fastest: float | None = None
     course: float | None = None
@@ -59,6 +61,8 @@ class Plan(Brief):
     seed: int = 1
     course: float | None = None
     """Compass course of the first pass of every leg in rad, None where nobody has said."""
+    fins: PlaneFins | None = None
+    """The fins that the axis' command is made of; None where it is one."""
 
     @property
     def minutes(self) -> float:
@@ -93,7 +97,15 @@ def make_plan(model: Model, request: Request, step: Callable[[], None] = lambda:
     check_minutes(legs, request)
     name = str(model.info.get("name", "")) or model.method or "model"
     return Plan(
-        request.axis, request.vehicle, name, request.envelope, tuple(legs), dict(request.want), request.seed, request.course
+        request.axis,
+        request.vehicle,
+        name,
+        request.envelope,
+        tuple(legs),
+        dict(request.want),
+        request.seed,
+        request.course,
+        request.fins,
     )
 
 

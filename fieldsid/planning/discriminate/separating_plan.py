@@ -46,7 +46,8 @@ def separating_plan(
         legs += circle_legs(setting_at(rivals[0], request, max(request.speeds)), request.speeds)
     check_minutes(legs, request)
     plan = Plan(
-        rivals[0].axis, request.vehicle, rivals[0].method, request.envelope, tuple(legs), {}, request.seed, request.course
+        rivals[0].axis, request.vehicle, rivals[0].method, request.envelope, tuple(legs), {}, request.seed, request.course,
+        request.fins,
     )  # fmt: skip
     return plan, tuple(found)
 

@@ -64,10 +64,12 @@ def check_formats(wanted: Sequence[str]) -> None:
 
 
 def table_text(plan: Plan, leg: Leg) -> str:
-    """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), and 1 while it does."""
+    """Return a leg's commands as CSV: time, fin about trim (0 while the autopilot steers), 1 while it does; several fins each."""
     time, fin, steered = commands_of(leg, plan.envelope)
-    head = f"time_s,{NAMES[plan.axis].fin},autopilot"
-    rows = [f"{t:.6g},{f:.6g},{s:.0f}" for t, f, s in zip(time.tolist(), fin.tolist(), steered.tolist(), strict=True)]
+    each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.told(fin).tolist(), strict=True))
+    head = ",".join(["time_s", NAMES[plan.axis].fin, "autopilot", *each])
+    told = zip(time.tolist(), fin.tolist(), steered.tolist(), *each.values(), strict=True)
+    rows = [",".join([f"{t:.6g}", f"{f:.6g}", f"{s:.0f}", *(f"{v:.6g}" for v in fins)]) for t, f, s, *fins in told]
     return "\n".join([head, *rows]) + "\n"
 
 
@@ -79,7 +81,10 @@ def _leg_files(plan: Plan, leg: Leg, stem: Path, chosen: Sequence[str], *, force
         topic = f"/{NAMES[plan.axis].fin.removesuffix('_rad')}_command"
         bag = stem.with_name(f"{stem.name}_bag")
         text = conditions_text(plan, leg)
-        made.append(write_commands(bag, *commands_of(leg, plan.envelope), topic=topic, conditions=text, force=force))
+        time, fin, steered = commands_of(leg, plan.envelope)
+        each = {} if plan.fins is None else dict(zip(plan.fins.names, plan.fins.told(fin), strict=True))
+        commands = {topic: fin, **{f"/{name}_command": values for name, values in each.items()}}
+        made.append(write_commands(bag, time, commands, steered, conditions=text, force=force))
     missions = [s for s in styles() if _family(s) in chosen]
     made += [write_text(stem.with_name(f"{stem.name}_{s}"), render(plan, leg, s), force=force) for s in missions]
     return made
@@ -92,6 +97,7 @@ def conditions_text(plan: Plan, leg: Leg) -> str:
         "schema": "fieldsid/abort/1",
         "fin_max_rad": limits.fin,
         "fin_rate_max_rad_s": limits.fin_rate,
+        "fins": None if plan.fins is None else plan.fins.record(),
         "abort": [asdict(a) for a in aborts_of(leg, plan.envelope)],
         "not_limited": [name for name, words in limits_said(limits).items() if words == NOT_LIMITED],
     }

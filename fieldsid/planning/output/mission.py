@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from fieldsid.planning.design.abort_conditions import aborts_of
 from fieldsid.planning.design.leg import CIRCLE, Leg, commands_of
 from fieldsid.planning.design.plan import Plan
 from fieldsid.planning.output import helm
-from fieldsid.planning.safety.envelope import NOT_LIMITED, limits_said
+from fieldsid.planning.safety.envelope import NOT_LIMITED, Envelope, limits_said
 from fieldsid.registry import near
 from fieldsid.templates import template_names, template_path
 from fieldsid.text.one_line import one_line
@@ -29,11 +29,12 @@ SUFFIX = ".j2"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """From `time` s on: the fin about trim in rad, or the autopilot."""
+    """From `time` s on: the fin about trim in rad, or the autopilot; and what each of several fins is told, in its own unit."""
 
     time: float
     fin: float
     autopilot: bool
+    fins: tuple[float, ...] = ()
 
     @property
     def degrees(self) -> float:
@@ -51,9 +52,10 @@ def steps_of(plan: Plan, leg: Leg) -> tuple[Step, ...]:
     time, fin, steered = commands_of(leg, plan.envelope)
     fin = np.where(steered > 0, 0.0, fin)
     changed = (np.diff(fin, prepend=np.nan) != 0) | (np.diff(steered, prepend=np.nan) != 0)
+    each = np.zeros((0, int(changed.sum()))) if plan.fins is None else plan.fins.told(fin[changed])
     return tuple(
-        Step(round(float(t), 4), round(float(f), 6), bool(s))
-        for t, f, s in zip(time[changed], fin[changed], steered[changed], strict=True)
+        Step(round(float(t), 4), round(float(f), 6), bool(s), tuple(np.round(told, 6).tolist()))
+        for t, f, s, told in zip(time[changed], fin[changed], steered[changed], each.T, strict=True)
     )
 
 
@@ -111,9 +113,10 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "rule": None if leg.open_loop else _blind(leg),
         "spec": leg.candidate.spec,
         "steps": steps_of(plan, leg),
+        "fins": _fins(plan),
         "turns": _turns(plan, leg),
         "aborts": aborts,
-        "limits": leg.envelope_in(plan.envelope),
+        "limits": _limits(plan, leg),
         "unlimited": [n for n, words in limits_said(leg.envelope_in(plan.envelope)).items() if words == NOT_LIMITED],
         "degrees": math.degrees,
         "limit_of": {f"{a.signal}.{a.kind}": a.limit for a in aborts},
@@ -121,6 +124,20 @@ def _context(plan: Plan, leg: Leg) -> dict[str, Any]:
         "needed": helm.needed(leg, aborts, plan.course),
         "polygon": helm.polygon(leg, aborts, plan.course),
     }
+
+
+def _limits(plan: Plan, leg: Leg) -> Envelope:
+    """Return the limits of a leg, the fin's no more than what several fins follow."""
+    limits = leg.envelope_in(plan.envelope)
+    return limits if plan.fins is None else replace(limits, fin=min(limits.fin, plan.fins.reach))
+
+
+def _fins(plan: Plan) -> list[dict[str, Any]]:
+    """Return each of several fins: its name, its share of the command, its limit and the unit of both; none where it is one."""
+    if plan.fins is None:
+        return []
+    told = zip(plan.fins.names, plan.fins.shares, plan.fins.limits, strict=True)
+    return [{"name": name, "share": share, "limit": limit, "unit": plan.fins.unit} for name, share, limit in told]
 
 
 def _turns(plan: Plan, leg: Leg) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from fieldsid.artifacts import plain, save_record
 from fieldsid.errors import ArtifactError, FieldsidError, shortened
 from fieldsid.maneuvers import Autopilot, pick_maneuver
+from fieldsid.models.allocation import plane_fins_of
 from fieldsid.models.axis import Axis
 from fieldsid.planning.design.abort_conditions import aborts_of
 from fieldsid.planning.design.leg import Expected, Leg
@@ -39,6 +40,7 @@ def plan_body(plan: Plan) -> dict[str, Any]:
         "prior": plan.prior,
         "seed": plan.seed,
         "course_rad": plan.course,
+        "fins": None if plan.fins is None else plan.fins.record(),
         "want": dict(plan.want),
         "minutes": plan.minutes,
         "metres": plan.metres,
@@ -109,6 +111,7 @@ def _plan_of(body: Mapping[str, Any]) -> Plan:
         want={str(k): _within(v, f"want {k}", 0.0, 1.0) for k, v in body["want"].items()},
         seed=int(body["seed"]),
         course=None if body.get("course_rad") is None else _within(body["course_rad"], "course_rad", 0.0, 2.0 * math.pi),
+        fins=None if body.get("fins") is None else plane_fins_of(body["fins"]),
     )
 
 

@@ -189,6 +189,8 @@ class Inspection(Result):
     """The signals that the mapping gives."""
     problem: str | None
     """Why no run can be made of it, where none can."""
+    joined: list[str]
+    """The other tables of its run, where they were named with `--join`."""
     import_options: list[str]
     """What an import must be asked for, where it refuses the log as it is."""
     findings: list[RemarkWithData]

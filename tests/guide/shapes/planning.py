@@ -172,6 +172,19 @@ class Separation(Shape):
     """Other maneuvers, with what they are expected to give."""
 
 
+class PlaneFins(Shape):
+    """The fins that make the command of a plane."""
+
+    names: list[str]
+    """What each is called."""
+    shares: list[float]
+    """What each is told for a command of one rad, in its unit."""
+    limits: list[float]
+    """How far each goes, in its unit."""
+    unit: str
+    """Their unit."""
+
+
 class Plan(Result):
     """What to fly."""
 
@@ -194,6 +207,8 @@ class Plan(Result):
     """Largest probability of leaving the envelope."""
     course_rad: Number
     """Course of the legs; null where none was given."""
+    fins: PlaneFins | None
+    """The fins that the command is made of; null where it is one."""
     envelope: Envelope
     """The limits it keeps."""
     limits: dict[str, str]

@@ -9,6 +9,7 @@ import pytest
 import fieldsid as fs
 from fieldsid.errors import DataError, LogError, MappingError, UsageError
 from fieldsid.logs import load_run, save_run
+from fieldsid.logs.mapping.mapping_file import mapping_of
 
 
 @pytest.fixture
@@ -40,6 +41,23 @@ def test_a_file_is_read_as_the_commands_read_it(folder, name):
     (run,) = fs.load(name)
     same(run, load_run(folder / "runs" / "zigzag.parquet"))
     assert run.source is not None
+
+
+def test_the_tables_of_one_run_are_joined(tmp_path):
+    time = 0.1 * np.arange(100)
+    for name, column, values in (("state", "yaw_rad", 0.1 * time), ("input", "rudder_rad", np.sin(time))):
+        pd.DataFrame({"time_s": time, column: values}).to_csv(tmp_path / f"run4_{name}.csv", index=False)
+    signals = {"yaw_rad": {"topic": "state", "field": "yaw_rad"}, "rudder_rad": {"topic": "input", "field": "rudder_rad"}}
+    (run,) = fs.load(
+        [tmp_path / "run4_state.csv", tmp_path / "run4_input.csv"], join=True, mapping=mapping_of({"signals": signals})
+    )
+    assert run.name == "run4"
+    np.testing.assert_allclose(run["rudder_rad"], np.sin(time))
+    (same_run,) = fs.load(tmp_path, join=True, mapping=mapping_of({"signals": signals}))
+    same(run, same_run)
+    for wrong, says in (([run], "only files"), (tmp_path / "run4_state.csv", "nothing to join")):
+        with pytest.raises(UsageError, match=says):
+            fs.load(wrong, join=True)
 
 
 def test_logs_of_several_kinds_are_loaded_together(folder, made):

@@ -8,7 +8,8 @@ import pytest
 
 from fieldsid.comparison.compare import Channel
 from fieldsid.comparison.metrics import Metrics
-from fieldsid.reporting.sections import _followed, _without_noise
+from fieldsid.reporting.sections import _followed, _vehicle, _without_noise
+from fieldsid.vehicle import vehicle_of
 
 
 def channel(name, over, fit):
@@ -33,3 +34,11 @@ def test_an_error_is_told_over_the_noise_where_there_is_some_and_else_as_the_fit
 def test_of_runs_without_noise_the_worst_is_that_of_the_least_fit_whatever_their_digits():
     runs = [SimpleNamespace(leading=channel("rate", 25000.0, 93.3)), SimpleNamespace(leading=channel("angle", 5600.0, 65.4))]
     assert _without_noise(runs, "2 runs") == "angle fit 65.4 % on 2 runs, the worst; the log has next to no noise"
+
+
+def test_a_report_tells_the_fins_that_make_rudder_and_elevator():
+    fins = {"names": ["a", "b"], "to_rudder": [0.5, 0.5], "to_elevator": [0.5, -0.5], "limits": 0.3}
+    told = _vehicle(SimpleNamespace(vehicle=vehicle_of({"name": "v", "fins": fins})))
+    assert ("rudder limit", "0.300 rad") in told
+    assert ("fins", "a = 1 rudder, within +/-0.3 rad, b = 1 rudder, within +/-0.3 rad") in told
+    assert ("fins", "a = 1 elevator, within +/-0.3 rad, b = -1 elevator, within +/-0.3 rad") in told

@@ -203,7 +203,7 @@ def _scaled(values: FloatArray, factor: float) -> FloatArray:
 
 def _of_text(cells: npt.NDArray[Any], unit: str | None, name: str, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
     values, wrong = as_numbers(cells)
-    if wrong.size < cells.size // 2:
+    if not wrong.size or wrong.size < cells.size // 2:
         if wrong.size and not options.salvage:
             raise _refused(f"column `{name}` holds cells that are no times", wrong, cells, options)
         return _of_floats(values, _factor(unit), name, options)

@@ -1,4 +1,4 @@
-"""Write fin commands as a ROS 2 bag: the fin as std_msgs/Float64, whether the autopilot has it as std_msgs/Bool.
+"""Write fin commands as a ROS 2 bag: each fin as std_msgs/Float64, whether the autopilot has it as std_msgs/Bool.
 
 What must be watched while it is played comes first, as std_msgs/String.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -21,14 +22,13 @@ NANOSECONDS = 1_000_000_000
 def write_commands(
     path: Path,
     time: FloatArray,
-    fin: FloatArray,
+    commands: Mapping[str, FloatArray],
     autopilot: FloatArray,
     *,
-    topic: str,
     conditions: str,
     force: bool = False,
 ) -> Path:
-    """Write a bag folder (MCAP): fin (n,) rad about trim on `topic`, autopilot (n,) 0 or 1 on `/autopilot`, times (n,) s.
+    """Write a bag folder (MCAP): commands (n,) about trim by topic, autopilot (n,) 0 or 1 on `/autopilot`, times (n,) s.
 
     conditions stand on `/abort_conditions` before the first of them.
 
@@ -44,7 +44,7 @@ def write_commands(
             f"`{path}` cannot be written: {error.strerror}", hint="choose a folder that can be written"
         ) from error
     try:
-        _fill(work / path.name, time, fin, autopilot, (topic, conditions))
+        _fill(work / path.name, time, commands, autopilot, conditions)
         if path.exists():
             shutil.rmtree(path)
         (work / path.name).replace(path)
@@ -53,16 +53,17 @@ def write_commands(
     return path
 
 
-def _fill(path: Path, time: FloatArray, fin: FloatArray, autopilot: FloatArray, named: tuple[str, str]) -> None:
+def _fill(path: Path, time: FloatArray, commands: Mapping[str, FloatArray], autopilot: FloatArray, conditions: str) -> None:
     store = get_typestore(Stores.ROS2_HUMBLE)
     float64, boolean, string = (store.types[f"std_msgs/msg/{name}"] for name in ("Float64", "Bool", "String"))
-    topic, conditions = named
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        command = writer.add_connection(topic, float64.__msgtype__, typestore=store)
+        told = [writer.add_connection(topic, float64.__msgtype__, typestore=store) for topic in commands]
         pilot = writer.add_connection("/autopilot", boolean.__msgtype__, typestore=store)
         watched = writer.add_connection("/abort_conditions", string.__msgtype__, typestore=store)
         writer.write(watched, 0, bytes(store.serialize_cdr(string(data=conditions), string.__msgtype__)))
-        for t, angle, steered in zip(time.tolist(), fin.tolist(), autopilot.tolist(), strict=True):
+        values = [v.tolist() for v in commands.values()]
+        for t, steered, *angles in zip(time.tolist(), autopilot.tolist(), *values, strict=True):
             stamp = round(t * NANOSECONDS)
-            writer.write(command, stamp, bytes(store.serialize_cdr(float64(data=angle), float64.__msgtype__)))
+            for command, angle in zip(told, angles, strict=True):
+                writer.write(command, stamp, bytes(store.serialize_cdr(float64(data=angle), float64.__msgtype__)))
             writer.write(pilot, stamp, bytes(store.serialize_cdr(boolean(data=bool(steered)), boolean.__msgtype__)))

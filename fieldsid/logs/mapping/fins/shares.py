@@ -1,0 +1,108 @@
+"""How much each of several fins does to a rate, by least squares on its changes.
+
+Over a short time a rate changes by what it was, by the fins, and in pitch by the angle that rights the hull:
+dr/dt = a r + sum b_i fin_i + c. Fins that only ever moved together are not told apart: of all that explain the rate alike the
+shortest is taken (Golub and Van Loan 2013, section 5.5), which shares what they do by how far they went.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from fieldsid.numerics.arrays import FloatArray
+
+TOGETHER = 0.05
+"""Length of a pattern in which fins moved, against the longest, below which they did not."""
+NOTHING = 0.15
+"""Share of the strongest fin's effect below which one has none."""
+ALIKE = 0.25
+"""How far shares may be apart and be taken for equal."""
+NEAR = 0.08
+"""How far the share of a fin of the strongest may be from a simple fraction and be taken for it."""
+FEWEST = 50
+MOST_ROWS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class FinShares:
+    """The shares (m,) of fins, the fit of them, how much of the rate's change they explain, alone the best one, and the rank."""
+
+    shares: FloatArray
+    fitted: FloatArray
+    explains: float
+    best_alone: float
+    patterns: int
+
+
+def fin_shares(
+    fins: Sequence[FloatArray], time: FloatArray, rate: FloatArray, righting: FloatArray | None, width: int
+) -> FinShares | None:
+    """Return the shares of fins (n,) in a rate (n,) over windows of some samples; None where there is too little to tell.
+
+    righting: the angle (n,) whose moment goes with it; None where the plane has none.
+    """
+    if time.size < width + FEWEST:
+        return None
+    passed = time[width:] - time[:-width]
+    grows = (rate[width:] - rate[:-width]) / passed
+    beside = [
+        np.ones(grows.size),
+        window_mean(time, rate, width),
+        *([window_mean(time, righting, width)] if righting is not None else []),
+    ]
+    means = np.stack([window_mean(time, fin, width) for fin in fins], axis=1)
+    seen = np.isfinite(grows) & np.isfinite(means).all(axis=1) & np.isfinite(np.stack(beside)).all(axis=0)
+    rows = np.flatnonzero(seen)[:: max(1, grows.size // MOST_ROWS)]
+    if rows.size < FEWEST:
+        return None
+    base = np.stack(beside, axis=1)[rows]
+    left, moved = (_beyond(base, v[rows]) for v in (grows[:, None], means))
+    power = float(left[:, 0] @ left[:, 0])
+    if not power > 0.0:
+        return None
+    answer, _, _, length = np.linalg.lstsq(moved, left[:, 0], rcond=TOGETHER)
+    fitted = answer.astype(np.float64)
+    shares = _shares(fitted)
+    return FinShares(
+        shares,
+        fitted / float(np.sum(np.abs(fitted))),
+        _explained(left[:, 0], moved @ shares),
+        max(_explained(left[:, 0], moved[:, i]) for i in range(len(fins))),
+        int((length > TOGETHER * length[0]).sum()),
+    )
+
+
+def window_mean(time: FloatArray, values: FloatArray, width: int) -> FloatArray:
+    """Return the mean (n - width,) of values that stand from one sample to the next, over each window."""
+    swept = np.concatenate([[0.0], np.cumsum(np.where(np.isfinite(values[:-1]), values[:-1], 0.0) * np.diff(time))])
+    gone = np.concatenate([[0], np.cumsum(~np.isfinite(values))])
+    mean = (swept[width:] - swept[:-width]) / (time[width:] - time[:-width])
+    return np.asarray(np.where(gone[width + 1 :] - gone[: -width - 1] == 0, mean, np.nan))
+
+
+def _beyond(base: FloatArray, values: FloatArray) -> FloatArray:
+    """Return what columns (n, k) leave of values (n, m)."""
+    size = np.linalg.norm(base, axis=0)
+    base = base / np.where(size > 0.0, size, 1.0)
+    return np.asarray(values - base @ np.linalg.lstsq(base, values, rcond=None)[0])
+
+
+def _explained(left: FloatArray, along: FloatArray) -> float:
+    power = float(along @ along) * float(left @ left)
+    return float(left @ along) ** 2 / power if power > 0.0 else 0.0
+
+
+def _shares(fitted: FloatArray) -> FloatArray:
+    """Return the simple fractions (m,) that fitted effects (m,) are of all of them together, as numbers where they are none."""
+    ratio = fitted / float(np.max(np.abs(fitted)))
+    ratio = np.where(np.abs(ratio) < NOTHING, 0.0, ratio)
+    held_back = np.abs(ratio[ratio != 0.0])
+    if float(np.ptp(held_back)) <= ALIKE * float(np.max(held_back)):
+        return np.asarray(np.sign(ratio) / held_back.size)
+    simple = np.array([float(Fraction(float(r)).limit_denominator(4)) for r in ratio])
+    ratio = np.where(np.abs(simple - ratio) <= NEAR, simple, ratio)
+    return np.asarray(ratio / float(np.sum(np.abs(ratio))))

@@ -1,0 +1,121 @@
+"""Which tables of a folder are one run, and what each of them is called in it.
+
+Loggers that write a file for each kind of message name them by it: `EstimatedState.csv`, `run7_state.csv`, `LOG_attitude_0.csv`.
+Tables with the same columns are several runs where each of their names goes with one of every other kind, and where each of them
+is a run by itself or there is no other kind; else they are several devices of one run, as are those whose columns have no name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from shlex import quote
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import TableForm
+from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.reader import check_readable
+from fieldsid.logs.readers import csv_table
+from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import common_start, name_of_run, names_apart, shared_start, stem_of
+
+FINS, TURNING = ("rudder_rad", "elevator_rad"), ("yaw_rad", "yaw_rate_rad_s", "pitch_rad", "pitch_rate_rad_s")
+
+
+def run_of(path: Path, joined: Sequence[Path]) -> list[Path]:
+    """Return the tables of one run: those of a folder, or a table and those that were named with it.
+
+    Raises LogError where a folder holds several runs.
+    """
+    if joined or not path.is_dir():
+        return [path, *joined]
+    runs = runs_in(path)
+    if len(runs) > 1:
+        raise _several(path, runs)
+    return runs[0] if runs else []
+
+
+def runs_in(folder: Path) -> list[list[Path]]:
+    """Return the runs of several tables that a folder holds; none where each of its tables is a run by itself."""
+    by_header: dict[tuple[str, ...], list[Path]] = {}
+    for path in sorted(folder.iterdir()):
+        names = _names(path)
+        if len(names) > 1:
+            by_header.setdefault(names, []).append(path)
+    kinds = list(by_header.values())
+    signals = {names: _signals(names) for names, kind in by_header.items() if len(kind) > 1}
+    if sum(map(len, kinds)) < 2 or any(map(_is_whole, signals.values())) or (len(kinds) == 1 and any(signals.values())):
+        return []
+    marks = [_marks(kind) for kind in kinds]
+    if len(kinds) > 1 and len(kinds[0]) > 1 and all(m.keys() == marks[0].keys() for m in marks):
+        return [[m[mark] for m in marks] for mark in marks[0]]
+    return [sorted(path for kind in kinds for path in kind)]
+
+
+def tables_beside(path: Path) -> list[Note]:
+    """Return a note on the tables in the folder of a table that may be of its run, with the command that joins them."""
+    if path.is_dir() or str(path) == "-":
+        return []
+    runs = runs_in(path.parent)
+    own = next((run for run in runs if any(table.samefile(path) for table in run)), [])
+    others = [table for table in own if not table.samefile(path)]
+    if not others:
+        return []
+    files = quote(str(path.parent)) if len(runs) == 1 else " ".join(["--join", *(quote(str(p)) for p in own)])
+    shown = ", ".join(p.name for p in others[:6]) + (", ..." if len(others) > 6 else "")
+    message = f"no fin in it; beside it lie {shown}: where they are of the same run, `sysid inspect {files}`"
+    return [Note("tables_beside", message, {"tables": [str(p) for p in others]})]
+
+
+def names_in_run(tables: Sequence[Path]) -> dict[str, Path]:
+    """Return the tables by what each is called in its run: its own name without what all of them begin with.
+
+    A mapping that goes by these names is that of every run of the logger.
+    """
+    stems = [stem_of(path) for path in tables]
+    start = len(shared_start(stems)) if len(tables) > 1 else 0
+    short = [stem[start:] for stem in stems]
+    return dict(zip(names_apart(short if all(short) else stems, tables), tables, strict=True))
+
+
+def _marks(kind: Sequence[Path]) -> dict[str, Path]:
+    """Return tables of one kind by what tells their names apart."""
+    stems = [stem_of(path) for path in kind]
+    start = len(common_start(stems))
+    rest = [stem[start:] for stem in stems]
+    end = len(common_start([r[::-1] for r in rest]))
+    return {r[: len(r) - end]: path for r, path in zip(rest, kind, strict=True)}
+
+
+def _names(path: Path) -> tuple[str, ...]:
+    """Return the names of a table's columns; none of what is no table."""
+    if path.name.startswith(".") or not path.name.endswith(csv_table.READER.suffixes) or not path.is_file():
+        return ()
+    try:
+        check_readable(path)
+        return csv_table.names_of(path, TableForm()) if csv_table.sniff(path) else ()
+    except LogError as error:
+        if isinstance(error.__cause__, OSError):  # what is in it is not known
+            raise
+        return ()
+
+
+def _signals(names: Sequence[str]) -> set[str]:
+    """Return what the columns of a table are by their names."""
+    return {found[0] for name in names if (found := meaning_of(name)) is not None and found[0] != TIME}
+
+
+def _is_whole(signals: set[str]) -> bool:
+    """Whether a table of some signals is a run by itself: it has a fin and what it turns."""
+    return bool(signals & set(FINS)) and bool(signals & set(TURNING))
+
+
+def _several(folder: Path, runs: Sequence[Sequence[Path]]) -> LogError:
+    shown = "; ".join(f"{name_of_run(run)}: {', '.join(p.name for p in run)}" for run in runs[:4])
+    first = " ".join(quote(str(p)) for p in runs[0])
+    return LogError(
+        f"`{folder}` holds {len(runs)} runs of {len(runs[0])} tables each",
+        found=shown + ("; ..." if len(runs) > 4 else ""),
+        hint=f"one at a time, all with one mapping: `sysid inspect --join {first} --write-mapping mapping.yaml`",
+    )

@@ -1,0 +1,195 @@
+"""A run in several tables of one clock, each on stamps of its own: a table is a topic, and its columns are the fields.
+
+Exports of a message log (Neptus, ulog2csv, `rostopic echo -p`) and simulators that keep the inputs apart write such. What
+follows is the joining of any log of topics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import ATTITUDE, ChannelMap, TableForm
+from fieldsid.logs.convert.times.time_column import EPOCH_FROM_S
+from fieldsid.logs.mapping.guesses import quaternion_of
+from fieldsid.logs.reader import JOINED, TABLE, Inventory, RawLog, Reader, ReadOptions, reader_of
+from fieldsid.logs.readers import csv_table, parquet
+from fieldsid.logs.readers._clock import Clock, clock_of
+from fieldsid.logs.readers._columns import Columns, numbers_mostly
+from fieldsid.logs.readers._devices import devices_of
+from fieldsid.logs.readers._tables_of_run import names_in_run, run_of, runs_in
+from fieldsid.logs.readers._topics import Means, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.run import Note
+from fieldsid.logs.several.run_names import name_of_run
+from fieldsid.numerics.arrays import FloatArray
+
+TABLES: Mapping[str, Callable[[Path, TableForm, ReadOptions], tuple[Columns, tuple[Note, ...]]]] = MappingProxyType(
+    {csv_table.READER.name: csv_table.columns_of, parquet.READER.name: parquet.columns_of}
+)
+"""The readers of one table, and what gives its columns and notes."""
+ALIKE_STEPS = 5.0
+"""Steps by which two tables that count from a start of their own may begin and end apart, and be taken for one run unsaid."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One table of a run, or one device of it: its file, its numbers on the clock that wrote them, and what that counts from."""
+
+    file: Path
+    topic: Topic
+    counts_from: str
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Its first and last time in s."""
+        return float(self.topic.time[0]), float(self.topic.time[-1])
+
+
+def sniff(path: Path) -> bool:
+    """Whether a folder holds tables that are one run, or several runs, together."""
+    return path.is_dir() and bool(runs_in(path))
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the tables and their columns; raises LogError where a folder holds several runs."""
+    parts, notes = _parts(path, options, form, ChannelMap({}, time=options.clock))
+    topics = {name: part.topic for name, part in parts.items()}
+    apart = _apart(parts)
+    notes = (*notes, *([Note("clocks_apart", f"{apart.what} ({apart.found})", {})] if apart else _joined(parts)))
+    return inventory_of(path, "tables of one run", topics, _attitudes(topics), notes, kind=TABLE)
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped columns; raises MappingError for one that is not there, LogError where their clocks are not one."""
+    wanted = {source.topic for source in mapping.sources.values() if source.topic is not None}
+    parts, notes = _parts(path, options, mapping.table, mapping, wanted)
+    used = {name: part for name, part in parts.items() if name in wanted}
+    apart = _apart(used)
+    if apart is not None:
+        raise apart
+    topics = {name: part.topic for name, part in parts.items()}
+    raw = raw_log_of(path, topics, mapping, (*notes, *_joined(used)))
+    return replace(raw, name=name_of_run(run_of(path, options.joined)) if options.joined else raw.name)
+
+
+def _parts(
+    path: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap, wanted: Collection[str] = ()
+) -> tuple[dict[str, Part], tuple[Note, ...]]:
+    """Return the parts of a run by name, those of tables that a mapping may want, and notes on the tables."""
+    tables = names_in_run(run_of(path, options.joined))
+    bare = {name.partition("[")[0] for name in wanted}
+    chosen = {n: p for n, p in tables.items() if n in wanted or n.partition("[")[0] in bare} or tables
+    parts: dict[str, Part] = {}
+    notes: list[Note] = []
+    without: list[str] = []
+    for i, (name, file) in enumerate(chosen.items()):
+        found, said = _of_table(name, file, options, form, mapping)
+        parts |= found
+        notes += said
+        without += [] if found else [file.name]
+        options.progress((i + 1) / len(chosen))
+    message = f"tables without a clock that is known, left out: {', '.join(without[:6])}{', ...' if len(without) > 6 else ''}"
+    return parts, (*notes, *([Note("no_clock", message, {"tables": without})] if without else []))
+
+
+def _of_table(
+    name: str, file: Path, options: ReadOptions, form: TableForm, mapping: ChannelMap
+) -> tuple[dict[str, Part], list[Note]]:
+    """Return the parts of one table, and notes that name it; raises LogError for a file that is none."""
+    reader = reader_of(file)
+    if reader.name not in TABLES:
+        raise LogError(
+            f"`{file}` is no table, and only tables are joined", found=reader.says, hint="import it by itself, as it is"
+        )
+    columns, notes = TABLES[reader.name](file, form, replace(options, progress=lambda _: None))
+    found = {}
+    for device, rows in devices_of(columns).items():
+        known = mapping.time if mapping.time is not None and set(mapping.time.places) <= {*rows.names} else None
+        clock = clock_of(rows, known)
+        topic = None if clock is None else topic_of(clock.time + clock.origin_s, _numbers(rows, clock))
+        if clock is not None and topic is not None and topic.time.size > 1 and topic.fields:
+            found[name + device] = Part(file, topic, _counts_from(clock))
+    return found, [replace(note, message=f"{file.name}: {note.message}") for note in notes]
+
+
+def _numbers(columns: Columns, clock: Clock) -> dict[str, FloatArray]:
+    """Return the numbers (n,) of a table's columns by name, with the unit of a row below it; those of the clock left out."""
+    taken: dict[str, FloatArray] = {}
+    for i in range(columns.width):
+        cells: Any = numbers_mostly(columns.take(i))
+        name = columns.name(i).strip() or str(i)
+        if columns.place(i) in clock.source.places or (columns.names and not columns.names[i]) or cells.dtype.kind not in "fiub":
+            continue
+        unit = columns.units[i].strip() if columns.units else ""
+        taken[f"{name} ({unit})" if unit else name] = cells.astype(np.float64)
+    return taken
+
+
+def _counts_from(clock: Clock) -> str:
+    if clock.origin_s > EPOCH_FROM_S:
+        return "an epoch"
+    return "midnight" if clock.origin_s else "a start of its own"
+
+
+def _attitudes(topics: Mapping[str, Topic]) -> Means:
+    """Return the four columns of each table that are a quaternion."""
+    columns: dict[str, dict[str | int, FloatArray]] = {name: dict(topic.fields.items()) for name, topic in topics.items()}
+    found = {name: quaternion_of(list(topics[name].fields), fields) for name, fields in columns.items()}
+    return {f"{name.partition('[')[0]}.{', '.join(four)}": (ATTITUDE, {}) for name, four in found.items() if four}
+
+
+def _apart(parts: Mapping[str, Part]) -> LogError | None:
+    """Return why tables cannot be joined: their clocks count from different times, or never run together; None where they can."""
+    kinds = {part.counts_from: part for part in parts.values()}
+    if len(kinds) > 1:
+        said = "; ".join(f"`{part.file.name}` from {start}" for start, part in kinds.items())
+        return LogError(
+            "the tables are on different clocks, and are not joined",
+            found=f"they count: {said}",
+            hint="export them with one clock, or write the start of the one into the other's times",
+        )
+    if not parts:
+        return None
+    latest = max(parts.values(), key=lambda part: part.span[0])
+    first = min(parts.values(), key=lambda part: part.span[1])
+    if latest.span[0] < first.span[1]:
+        return None
+    return LogError(
+        "the tables were never logged at the same time, and are not joined",
+        found=f"`{first.file.name}` ends at {first.span[1]:.3f} s, `{latest.file.name}` starts at {latest.span[0]:.3f} s",
+        hint="they are several runs: name those that belong together, with --join",
+    )
+
+
+def _joined(parts: Mapping[str, Part]) -> list[Note]:
+    """Say which tables were joined, and where nothing but their own start says that they may be."""
+    files = list(dict.fromkeys(part.file.name for part in parts.values()))
+    if len(files) < 2:
+        return []
+    low, high = max(p.span[0] for p in parts.values()), min(p.span[1] for p in parts.values())
+    start = next(iter(parts.values())).counts_from
+    message = f"tables of one run, joined by time: {', '.join(files)}; all count from {start}, and share {high - low:.2f} s"
+    notes = [Note("joined", message, {"tables": files})]
+    step = max(float(np.median(np.diff(p.topic.time))) for p in parts.values())
+    ends = [p.span for p in parts.values()]
+    off = max(float(np.ptp([e[k] for e in ends])) for k in (0, 1))
+    if start == "a start of its own" and off > ALIKE_STEPS * step:
+        message = f"the tables begin or end {off:.2f} s apart, and count from a start of their own: check that it is one clock"
+        notes.append(Note("clock_assumed", message, {"seconds": off}))
+    return notes
+
+
+READER = Reader(
+    name=JOINED,
+    says="a run in several tables of one clock: a folder of them, or `--join`",
+    suffixes=(),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+)
