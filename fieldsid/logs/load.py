@@ -17,7 +17,7 @@ from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
 from fieldsid.logs.reader import Reader, ReadOptions, reader_of
-from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run
+from fieldsid.logs.run import OF_LIMITS, READ_WITH, STEP_LINES, Note, Run
 
 MAPPING_FILE = "mapping.yaml"
 
@@ -105,7 +105,9 @@ def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channe
         return None
     base = base or ChannelMap({})
     sources = {s: c for s, c in channels.items() if s != TIME}
-    return replace(base, sources={**base.sources, **sources}, time=channels.get(TIME, base.time))
+    lines = {line for fin in sources for line in STEP_LINES.get(fin, ())}  # those of the column that another one stands for now
+    kept = {s: c for s, c in base.sources.items() if s not in lines}
+    return replace(base, sources={**kept, **sources}, time=channels.get(TIME, base.time))
 
 
 def _loaded(mapping: ChannelMap | Path) -> ChannelMap:

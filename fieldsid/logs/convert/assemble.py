@@ -19,7 +19,7 @@ from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
 from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
-from fieldsid.logs.run import SIGNALS, Note, Run
+from fieldsid.logs.run import COLUMNS, Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 WHOLE = (-np.inf, np.inf)
@@ -64,7 +64,7 @@ def assemble(
     if time.size < 2:
         counted = _counted(time, [*notes, *clock_notes])
         raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
-    signals = {s: signals[s] for s in SIGNALS if s in signals}
+    signals = {s: signals[s] for s in COLUMNS if s in signals}
     run = Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
     run = run if part == WHOLE else run.between(*part)
     refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)
