@@ -29,7 +29,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, definitions_of, effect_named
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import members, near, pick
 
@@ -154,6 +154,9 @@ def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Ef
 def fitted(problem: Problem, solution: Solution) -> Fit:
     """Return the fit record of a solution."""
     floor = white_noise_floor(problem.records)
+    if not all(r.is_whole for r in problem.records):  # samples further apart than those of the clock differ by the motion too
+        left = [problem.residual(solution.x, run)[0] for run in range(len(problem.records))]
+        floor = lowered_noise_floor(floor, problem.records, left)
     names = problem.layout.names
     notes = (
         *parameter_checks(problem, solution, floor),

@@ -144,7 +144,7 @@ class SampleFilter:
         Inside a usual step by the moves' own line, on straight lines of the signals where samples are missing.
         """
         memory, moves = self.memory, self._moves
-        if memory[SAMPLES] and moves and time - memory[TIME] <= USUAL * memory[H]:
+        if memory[SAMPLES] and moves and line is None and time - memory[TIME] <= USUAL * memory[H]:
             line = self._line_of_moves(time, fin, is_held=is_held)
             self.counts["missing"] -= len(moves)
         elif memory[SAMPLES] and moves:

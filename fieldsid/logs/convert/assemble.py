@@ -16,6 +16,7 @@ from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, re
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
+from fieldsid.logs.convert.readings import by_reading
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
 from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
@@ -44,6 +45,7 @@ def assemble(
         time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
         run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
         return run if part == WHOLE else run.between(*part)
+    raw = by_reading(raw)
     notes = list(raw.notes)
     tracks: dict[str, Track] = {}
     for signal, series in raw.series.items():
