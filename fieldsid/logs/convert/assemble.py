@@ -15,6 +15,7 @@ from fieldsid.logs.convert.clock import Track, one_clock
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
+from fieldsid.logs.convert.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.readings import by_reading
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
@@ -60,8 +61,9 @@ def assemble(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
         )
     if "yaw_rad" in tracks:
-        tracks["yaw_rad"], found = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
-        notes += found
+        tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
+        tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
+        notes += fills + lines
     time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
     if time.size < 2:
         counted = _counted(time, [*notes, *clock_notes])
