@@ -50,6 +50,11 @@ class SlopeAtRest:
         """Whether it is so clearly."""
         return self.value < -CLEAR_STD_ERRORS * self.std_error
 
+    @property
+    def is_positive(self) -> bool:
+        """Whether it is so clearly."""
+        return self.value > CLEAR_STD_ERRORS * self.std_error
+
 
 def slope_at_rest(problem: Problem, x: FloatArray) -> SlopeAtRest | None:
     """Return the slope at rest that refits of a fit x give with damping of a free power; None where they do not converge."""

@@ -120,13 +120,19 @@ def _instability(problem: Problem, solution: Solution) -> Iterator[Note]:
     if not value > CLEAR_STD_ERRORS * error:
         return
     found = slope_at_rest(problem, solution.x)
-    if found is None or not found.is_negative or found.gained <= MIN_DRAG_LIKELIHOOD_GAIN:
+    if found is None or found.is_positive or found.gained <= MIN_DRAG_LIKELIHOOD_GAIN:
         return
-    yield Note(
-        "hidden_instability",
-        f"UNSTABLE: with damping that goes with the power {found.power:.1f} of the rate the fit is far better (log likelihood "
+    says = (
+        f"with damping that goes with the power {found.power:.1f} of the rate the fit is far better (log likelihood "
         f"{found.gained:+.0f}) and {problem.layout.shown(NAMES[problem.layout.axis].damping)} = {found.value:.3g} "
-        f"+/- {found.std_error:.2g} 1/s, the slope at rest of that curve fitted to turns, is negative: the vehicle turns by "
-        "itself, the linear fit hides it; use `--effects quadratic_damping`",
-        {"value": found.value, "std_error": found.std_error, "limit": 0.0, "gained": found.gained, "power": found.power},
+        f"+/- {found.std_error:.2g} 1/s, the slope at rest of that curve fitted to turns,"
     )
+    data = {"value": found.value, "std_error": found.std_error, "limit": 0.0, "gained": found.gained, "power": found.power}
+    if found.is_negative:
+        hides = "is negative: the vehicle turns by itself, the linear fit hides it; use `--effects quadratic_damping`"
+        yield Note("hidden_instability", f"UNSTABLE: {says} {hides}", data)
+    else:
+        leaves = (
+            "cannot be told from zero: whether the vehicle turns by itself is open; fly gentler turns, or hold each for longer"
+        )
+        yield Note("slope_at_rest", f"{says} {leaves}", data)
