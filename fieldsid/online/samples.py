@@ -12,6 +12,7 @@ import numpy as np
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.units import UNITS, factor_to
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
+from fieldsid.logs.doctor.fin_findings import refuse_no_angle
 from fieldsid.logs.mapping.canonical_names import TIME, canonical
 from fieldsid.logs.run import STEP_LINES, Run
 from fieldsid.logs.segments import no_fin
@@ -36,11 +37,12 @@ class Sample(NamedTuple):
 
 
 def fin_column(run: Run, axis: Axis) -> str:
-    """Return the fin of a run's axis, the measured one where there is one; raises DataError where there is neither."""
+    """Return the fin of a run's axis, the measured one where there is one; raises DataError where none is there, or no angle."""
     names = NAMES[axis]
     column = names.fin_measured if run.has(names.fin_measured) else names.fin
     if not run.has(column):
         raise no_fin(run, axis.value, column)
+    refuse_no_angle(run, column)
     return column
 
 

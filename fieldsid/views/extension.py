@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
-from fieldsid.rounding import number
+from fieldsid.rounding import MANY, number, times_noise
 from fieldsid.views._words import parameter_block, parameter_rows, table, times, warned
 
 if TYPE_CHECKING:
@@ -61,7 +61,9 @@ def figures(found: Extension) -> Mapping[str, Callable[[], Any]]:
 def _fall(found: Extension) -> str:
     before, after = found.gain.over_floor
     where = "unseen data" if found.gain.unseen else "the runs fitted to"
-    return f"the error on {where} goes from {times(before)} to {times(after)} x the noise floor"
+    floor = "the noise floor"
+    begun = times(before) if before < MANY else f"{times_noise(before, floor)},"
+    return f"the error on {where} goes from {begun} to {times_noise(after, floor)}"
 
 
 def _verdict(found: Extension) -> str:

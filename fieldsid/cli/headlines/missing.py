@@ -12,7 +12,7 @@ from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import Body, counted, named, times, used
 from fieldsid.cli.voice import shown_in
 from fieldsid.comparison.sufficient import is_noise
-from fieldsid.rounding import MANY, number, probability
+from fieldsid.rounding import MANY, number, probability, times_noise
 
 MODELS = "models"
 LEAST_TO_SPARE_ONE = 3
@@ -191,6 +191,6 @@ def of_new_effect(body: Body, look: str) -> Headline:
 def left_says(body: Body) -> str:
     """Return what the model as it now is leaves."""
     sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
-    said = ", ".join(f"{times(error)} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    said = ", ".join(f"{times_noise(error, f'the noise floor on {name}')}" for name, error in sides if isfinite(error))
     quiet = all(is_noise(error) for _, error in sides if isfinite(error))
     return f"left: {said}: " + ("that is the noise" if quiet else "more is missing than the sensors' noise explains")
