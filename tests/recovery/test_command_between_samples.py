@@ -109,6 +109,33 @@ def test_a_measured_fin_faster_than_the_angle_counts_whole():
     assert damping_of(run) == pytest.approx(DAMPING, rel=WITHIN)
 
 
+def lagged(times, angles, lag):
+    """The fin behind a first-order lag of the commands: its mean over each hundredth of a second, as commands of their own."""
+    fine = np.arange(0.0, 82.0, 0.01)
+    told = angles[np.searchsorted(times, fine + 1e-9, side="right") - 1]
+    fin, mean, kept = 0.0, np.empty(fine.size), np.exp(-0.01 / lag)
+    for k, wanted in enumerate(told):
+        mean[k] = wanted + (fin - wanted) * lag / 0.01 * (1.0 - kept)
+        fin = wanted + (fin - wanted) * kept
+    return fine, mean
+
+
+@pytest.mark.parametrize("phase", [0.15, 0.55, 0.95])
+@pytest.mark.parametrize("effect", ["delay", "servo_lag"])
+def test_the_gear_behind_a_command_between_samples_comes_back(effect, phase):
+    """At 5 Hz, commands on whole hundredths of a second: the gear sees the jump where it was made."""
+    (times, angles), time, _ = flown(5, phase)
+    times, late = np.round(times, 2), 0.3
+    moved = (np.append(0.0, times[1:] + late), angles) if effect == "delay" else lagged(times, angles, late)
+    motion = Commanded(*moved, DAMPING, AUTHORITY, TRIM).motion(time) + np.random.default_rng(2).normal(
+        0.0, NOISE, (2, time.size)
+    )
+    run = joined((times, angles), time, motion)
+    values = fit([record_of(run, Axis.YAW)], Axis.YAW, method="output_error", effects=(effect,)).model.values
+    assert values["a22"] == pytest.approx(DAMPING, rel=WITHIN)
+    assert values["delay" if effect == "delay" else "lag"] == pytest.approx(late, rel=0.02)
+
+
 def as_alog(folder, commands, time, signals):
     return write_alog(folder / "log.alog", time, signals, commands), {n: (n, "data") for n in TOPICS}
 
