@@ -52,7 +52,7 @@ def _range(run: Run, fin: str) -> list[Note]:
 def refuse_no_angle(run: Run, fin: str) -> None:
     """Raise DataError where a fin's numbers (rad) are none of an angle: a fit would go through, its authority in no unit."""
     values = run[fin][np.isfinite(run[fin])]
-    if not float(np.percentile(np.abs(values), 99)) > BEYOND:
+    if not float(np.abs(values).max(initial=0.0)) > BEYOND or not float(np.percentile(np.abs(values), 99)) > BEYOND:
         return
     servo = servo_of(values)
     unit = "its unit, probably `unit: deg`" if servo is None else f"`unit: counts` and `centre: {servo.centre:g}`"
