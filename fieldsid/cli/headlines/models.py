@@ -11,7 +11,7 @@ from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, named, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
 from fieldsid.comparison.sufficient import is_noise, over_noise
-from fieldsid.rounding import MANY, number, times_noise
+from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 NO_NOISE, WHOLE_FIT = "filtered_sensor", 99.0
 """Code of the warning that a log shows no white noise, and the fit in per cent from which on nothing is missing of such a one."""
@@ -147,7 +147,7 @@ def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: S
     """Return which of several models follows the runs best, if any; inputs: what that one was fitted to."""
     scores = sorted(zip((float(m["over_floor"]) for m in body["models"]), names, strict=True))
     (least, best), (second, _) = scores[:2]
-    others = ", ".join(f"{n} at {times_noise(s)}" for s, n in scores[1:])
+    others = ", ".join(f"{n} at {f'{s:.2f} x' if s < MANY else times_noise(s)}" for s, n in scores[1:])
     word = "follows no better than the next" if second <= close * least else "follows best"
     over = body["models"][0]["runs"]
     fitted = [(n, named(m["fitted_to"])) for n, m in zip(names, body["models"], strict=True) if m["fitted_to"]]
@@ -194,8 +194,7 @@ def of_history(body: Body, inputs: Sequence[Path]) -> Headline:
         return Headline("nothing was added yet", f"{model}, whose line begins with itself", next_)
     first, last = steps[0]["over_floor"]["before"], steps[-1]["over_floor"]["after"]
     added = ", then ".join("+".join(g["added"]) for g in steps)
-    floor = "the noise floor"
-    says = f"with {added} the error fell from {times_noise(first, floor)} to {times_noise(last, floor)}"
+    says = f"with {added} the error fell from {noise_fall(first, last)}"
     state = "every file is as it was" if body["intact"] else "not every file is as it was"
     more = not is_noise(last) and logs
     next_ = pasted("diagnose", logs, "--axis", axis, "--model", model) if more else used(axis, model)
