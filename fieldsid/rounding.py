@@ -22,6 +22,16 @@ def digits_of_error(error: float) -> int:
     return 1 - exponent if leading <= 354 else -exponent
 
 
+def times_noise(error: float, of: str = "the noise") -> str:
+    """Return an error over the noise in words; of a log with none to speak of no factor, which would say nothing."""
+    return f"{error:.2f} x {of}" if error < MANY else f"far more than {of}, of which the log has next to none"
+
+
+def noise_fall(before: float, after: float, of: str = "the noise floor") -> str:
+    """Return in words from where to where an error over the noise went."""
+    return f"{f'{before:.2f}' if before < MANY else f'{times_noise(before, of)},'} to {times_noise(after, of)}"
+
+
 def nine_digits(value: float) -> float:
     """Return a number to nine digits: those beyond hang on the order in which a sum was added up."""
     return float(f"{value:.8e}")

@@ -12,19 +12,20 @@ def write_mat(path, time, signals):
     return path
 
 
-def write_alog(path, time, signals):
-    """A MOOS logger's file; angles in rad under names of our own."""
+def write_alog(path, time, signals, commands=((), ())):
+    """A MOOS logger's file; angles in rad under names of our own. `commands` are times and angles of a rudder told by itself."""
     head = ["%" * 40, "%% LOG FILE:  ./pandan.alog", "%% FILE OPENED ON  Fri Mar  1 2024", "%% LOGSTART   1709287200.5"]
     lines = [
         f"{t!r:<16} {name:<20} pNav   {float(v[i])!r}" for i, t in enumerate(map(float, time)) for name, v in signals.items()
     ]
+    lines += [f"{float(t)!r:<16} rudder_rad           pHelm  {float(v)!r}" for t, v in zip(*commands, strict=True)]
     lines.insert(5, f"{float(time[0])!r} DB_CLIENTS  MOOSDB pNav,pHelm")
     path.write_text("\n".join([*head, "%" * 40, *lines]) + "\n")
     return path
 
 
-def write_ulog(path, time, signals):
-    """A PX4 file: one topic `trial` with a double for each signal."""
+def write_ulog(path, time, signals, commands=((), ())):
+    """A PX4 file: one topic `trial` with a double for each signal, and one of the rudder where it is told by itself."""
 
     def message(kind, body):
         return struct.pack("<HB", len(body), ord(kind)) + body
@@ -33,15 +34,20 @@ def write_ulog(path, time, signals):
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 10))
     out += message("B", bytes(40))
     out += message("F", f"trial:uint64_t timestamp;{fields}".encode())
+    if len(commands[0]):
+        out += message("F", b"command:uint64_t timestamp;double rudder_rad;")
+        out += message("A", struct.pack("<BH", 0, 8) + b"command")
     out += message("A", struct.pack("<BH", 0, 7) + b"trial")
+    for t, value in zip(*commands, strict=True):
+        out += message("D", struct.pack("<HQd", 8, round(t * 1e6) + 5_000_000, value))
     for i, t in enumerate(time):
         out += message("D", struct.pack(f"<HQ{len(signals)}d", 7, round(t * 1e6) + 5_000_000, *(v[i] for v in signals.values())))
     path.write_bytes(bytes(out))
     return path
 
 
-def write_dataflash(path, time, signals):
-    """An ArduPilot file: its formats, then one message `TRI` with a double for each signal."""
+def write_dataflash(path, time, signals, commands=((), ())):
+    """An ArduPilot file: its formats, then a message `TRI` with a double for each signal; `CMD` of a rudder told by itself."""
     names = [f"S{k}" for k in range(len(signals))]
 
     def fmt(number, length, name, types, columns):
@@ -49,6 +55,10 @@ def write_dataflash(path, time, signals):
 
     out = bytearray(fmt(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns"))
     out += fmt(129, 11 + 8 * len(names), b"TRI", b"Q" + b"d" * len(names), ",".join(["TimeUS", *names]).encode())
+    if len(commands[0]):
+        out += fmt(130, 19, b"CMD", b"Qd", b"TimeUS,Rud")
+    for t, value in zip(*commands, strict=True):
+        out += b"\xa3\x95\x82" + struct.pack("<Qd", round(t * 1e6) + 5_000_000, value)
     for i, t in enumerate(time):
         out += b"\xa3\x95\x81" + struct.pack(f"<Q{len(names)}d", round(t * 1e6) + 5_000_000, *(v[i] for v in signals.values()))
     path.write_bytes(bytes(out))
@@ -79,10 +89,15 @@ def imc_message(kind, time, body, *, order="<", source=0x0015, entity=40):
     return out + struct.pack(f"{order}H", crc)
 
 
-def write_lsf(path, time, signals, *, servo="rudder_rad", order="<", start=1.7e9):
-    """A DUNE log: the signals as doubles of the estimated state, a servo of number 2, and what the entities say."""
+def write_lsf(path, time, signals, commands=((), ()), *, servo="rudder_rad", order="<", start=1.7e9):
+    """A DUNE log: the signals as doubles of the estimated state, a servo of number 2, and what the entities say.
+
+    `commands` are times and angles of that servo where it is told by itself.
+    """
     names = [n for n in signals if n != servo]
     out = bytearray(imc_message(1, start, bytes(9), order=order))
+    for t, value in zip(*commands, strict=True):
+        out += imc_message(281, start + t, struct.pack(f"{order}Bd", 2, value), order=order)
     for i, t in enumerate(start + time):
         out += imc_message(1, t, b"\x01" + struct.pack(f"{order}H", 4) + b"idle\x07", order=order)
         if servo in signals:

@@ -24,12 +24,12 @@ from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solu
 from fieldsid.fitting.problem.parameters import layout_of
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
-from fieldsid.logs.segments import excursions
+from fieldsid.logs.segments import Answer, excursions
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.effect import Effect, definitions_of, effect_named
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
-from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import members, near, pick
 
@@ -126,8 +126,10 @@ def check(records: Sequence[Record], axis: Axis) -> None:
                 hint="take a longer run or part of one, two pulses of 2 s each at least, or one that was sampled more often",
             )
         names = NAMES[axis]
-        excursions(r.name, axis.value, names.fin_measured if r.fin_is_measured else names.fin, r.time, r.fin)
-        measurement = r.rate[r.rate_ok] if r.rate_ok.any() else r.angle[r.angle_ok]
+        is_angle, ok = not r.rate_ok.any(), r.rate_ok if r.rate_ok.any() else r.angle_ok
+        measurement = (r.angle if is_angle else r.rate)[ok]
+        fin = names.fin_measured if r.fin_is_measured else names.fin
+        excursions(r.name, axis.value, fin, r.time, r.fin, Answer(r.time[ok], measurement, is_angle))
         if float(np.ptp(measurement)) == 0.0:
             raise DataError(
                 f"run {r.name!r}: the {axis.value} sensor is constant",
@@ -154,6 +156,9 @@ def check_signals(records: Sequence[Record], effects: Sequence[str]) -> tuple[Ef
 def fitted(problem: Problem, solution: Solution) -> Fit:
     """Return the fit record of a solution."""
     floor = white_noise_floor(problem.records)
+    if not all(r.is_whole for r in problem.records):  # samples further apart than those of the clock differ by the motion too
+        left = [problem.residual(solution.x, run)[0] for run in range(len(problem.records))]
+        floor = lowered_noise_floor(floor, problem.records, left)
     names = problem.layout.names
     notes = (
         *parameter_checks(problem, solution, floor),

@@ -17,7 +17,7 @@ from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
 from fieldsid.logs.reader import JOINED, Reader, ReadOptions, reader_of
-from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run, signal_of
+from fieldsid.logs.run import OF_LIMITS, READ_WITH, STEP_LINES, Note, Run, signal_of
 
 MAPPING_FILE = "mapping.yaml"
 
@@ -107,7 +107,8 @@ def chosen_map(mapping: ChannelMap | Path | None, own: ChannelMap | None, channe
         return None
     base = base or ChannelMap({})
     sources = {s: c for s, c in channels.items() if s != TIME}
-    kept = {s: c for s, c in base.sources.items() if signal_of(s) not in sources}
+    lines = {line for fin in sources for line in STEP_LINES.get(fin, ())}  # those of the column that another one stands for now
+    kept = {s: c for s, c in base.sources.items() if s not in lines and signal_of(s) not in sources}
     return replace(base, sources={**kept, **sources}, time=channels.get(TIME, base.time))
 
 

@@ -51,6 +51,16 @@ SIGNALS: Mapping[str, str] = MappingProxyType(
 """Canonical signal names and their units; `thrust` may be in any unit."""
 PART = "["
 """What stands behind a signal in the name of an entry of its sum: `rudder_rad[0]`."""
+STEP_LINES: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {fin: (f"{fin[:-4]}_from_rad", f"{fin[:-4]}_to_rad") for fin in SIGNALS if fin.startswith(("rudder", "elevator"))}
+)
+"""Beside a fin that moves between the run's samples: start and end of its line over the step that each sample begins.
+
+The line has the mean and the first moment of what the fin was told, or did, in that step (`logs/convert/clock.py`).
+"""
+LINES = frozenset(name for pair in STEP_LINES.values() for name in pair)
+COLUMNS: Mapping[str, str] = MappingProxyType({**SIGNALS, **dict.fromkeys(sorted(LINES), "rad")})
+"""All names of a run's signals and their units."""
 GOALS = frozenset({"yaw_goal_rad", "pitch_goal_rad"})
 """The angles that an autopilot was told to hold."""
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fieldsid.errors import DataError, UsageError
 from fieldsid.logs.run import Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
+from fieldsid.numerics.first_order_lag import settling_of
 
 BEFORE_S = 2.0
 AFTER_S = 10.0
@@ -27,7 +29,8 @@ WHOLE = 0.8
 STEADY_S = 1.0
 """Time at the start over which the trim is read."""
 
-_FINS = {"yaw": ("rudder_measured_rad", "rudder_rad"), "pitch": ("elevator_measured_rad", "elevator_rad")}
+YAW = "yaw"
+_FINS = {YAW: ("rudder_measured_rad", "rudder_rad"), "pitch": ("elevator_measured_rad", "elevator_rad")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,7 @@ def segment(run: Run, axis: str) -> Segment:
     if signal is None:
         raise no_fin(run, axis, _FINS[axis][1])
     time, fin = _seen(run, signal)
-    away, limit = excursions(run.name, axis, signal, time, fin)
+    away, limit = excursions(run.name, axis, signal, time, fin, _answer_of(run))
     return _around(run, time, away, signal, limit)
 
 
@@ -108,19 +111,54 @@ def _seen(run: Run, signal: str) -> tuple[FloatArray, FloatArray]:
     return run.time[seen], run[signal][seen]
 
 
-def excursions(name: str, axis: str, signal: str, time: FloatArray, fin: FloatArray) -> tuple[BoolArray, float]:
+class Answer(NamedTuple):
+    """What turns behind a fin: time (n,) s, and a rate (n,) rad/s, or an angle (n,) rad."""
+
+    time: FloatArray
+    values: FloatArray
+    is_angle: bool
+
+
+def _answer_of(run: Run) -> Answer | None:
+    """Return the heading's rate of a run, its heading without one; None where neither was measured."""
+    signal = next((s for s in ("yaw_rate_rad_s", "yaw_rad") if run.has(s)), None)
+    return None if signal is None else Answer(*_seen(run, signal), is_angle=signal == "yaw_rad")
+
+
+def excursions(
+    name: str, axis: str, signal: str, time: FloatArray, fin: FloatArray, answer: Answer | None = None
+) -> tuple[BoolArray, float]:
     """Return where the fin (n,) rad of a run is clearly away from its trim, and the limit in rad.
 
-    Raises DataError where it never is: such a run says nothing of what a fin does.
+    Raises DataError where it never is: such a run says nothing of what a fin does, but for what the heading's answer to a step
+    before it tells.
     """
     away, limit = _away(time, fin)
-    if not away.any():
+    if away.any():
+        return away, limit
+    low, high = np.degrees(fin.min()), np.degrees(fin.max())
+    middle = float(np.median(fin))
+    tells = _settling(answer, middle) if axis == YAW and np.ptp(fin) < LEAST_RAD < abs(middle) else ""
+    if tells:
         raise DataError(
-            f"`{signal}` of run {name!r} never leaves its trim: constant within {np.degrees(np.ptp(fin)):.2f} deg",
-            found=f"{np.degrees(fin.min()):.2f} to {np.degrees(fin.max()):.2f} deg (limit {np.degrees(limit):.2f} deg from trim)",
-            hint=f"leave that run out, or fly an excitation: `sysid plan --axis {axis}`",
+            f"`{signal}` of run {name!r} stands at {np.degrees(middle):.2f} deg throughout: its step is before the first sample",
+            found=f"{time[-1] - time[0]:.3g} s at {low:.2f} to {high:.2f} deg; {tells}",
+            hint="log some seconds before the step, or the step back as well: at one angle C0 and the fin's part are one number",
         )
-    return away, limit
+    raise DataError(
+        f"`{signal}` of run {name!r} never leaves its trim: constant within {high - low:.2f} deg",
+        found=f"{low:.2f} to {high:.2f} deg (limit {np.degrees(limit):.2f} deg from trim)",
+        hint=f"leave that run out, or fly an excitation: `sysid plan --axis {axis}`",
+    )
+
+
+def _settling(answer: Answer | None, fin: float) -> str:
+    """Return in words what a heading's settling at one fin angle in rad tells, where it tells anything."""
+    found = None if answer is None else settling_of(answer.time, np.unwrap(answer.values), integrated=answer.is_angle)
+    if found is None:
+        return ""
+    pole, rate = found
+    return f"the rate settles by a22 = {pole:.3g} 1/s, and with C0 = 0 assumed b2 is {pole * rate / fin:.3g} 1/s^2"
 
 
 def no_fin(run: Run, axis: str, missing: str) -> DataError:

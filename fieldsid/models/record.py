@@ -12,9 +12,10 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
+from fieldsid.logs.doctor.fin_findings import refuse_no_angle
 from fieldsid.logs.doctor.holes import JITTER, hole_notes, is_usual, unbroken
 from fieldsid.logs.doctor.spikes import spikes_of
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import STEP_LINES, Note, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.fin_path import FinPath
@@ -35,7 +36,8 @@ SHORTEST_TIME_CONSTANT_S = MappingProxyType({"surge": 0.35, "depth": 0.35})
 class Record(Brief):
     """Samples (n,) of one run on one axis.
 
-    `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which).
+    `fin` is the command held over each interval, or the measured fin, straight between samples (`fin_is_held` tells which);
+    `fin_line` is what it was told or did between them, where the log has that (`logs/convert/clock.py`).
     Outputs of the motion are `angle`, `rate` and `cross`, the sway (yaw) or heave (pitch) in m/s, as measured, zero where not:
     `angle_ok`, `rate_ok` and `cross_ok` mark samples that were, spikes left out. `signals` holds inputs without gaps and noise
     by role (surge, thrust, roll, depth), none of which knows an output; `thrust_column` is the column that the thrust is from,
@@ -59,6 +61,8 @@ class Record(Brief):
     thrust_column: str = ""
     command_lead: FloatArray | None = None
     """How long before the sample it is first seen at each held command was given, (n,) s, within the steps about it."""
+    fin_line: FloatArray | None = None
+    """Start and end of the fin's line over the interval that each sample begins, (2, n) rad, NaN where it is not known."""
     goal: FloatArray | None = None
     """The angle that an autopilot was told to hold, (n,) rad, where the log has it."""
     steps: FloatArray = field(init=False)
@@ -90,18 +94,18 @@ class Record(Brief):
         object.__setattr__(self, "ok", np.stack([self.angle_ok, self.rate_ok]))
         object.__setattr__(self, "is_whole", bool(self.ok.all()))
         object.__setattr__(self, "missing_fraction", _missing_fraction(steps, regular, usual) if self.fin_is_held else None)
-        object.__setattr__(self, "commanded", self._path(self.fin, self.command_lead))
+        object.__setattr__(self, "commanded", self._path(self.fin, self.command_lead, self.fin_line))
 
     def __len__(self) -> int:
         return int(self.time.size)
 
-    def path_with_lead(self, early: FloatArray | None) -> FinPath:
+    def path_with_lead(self, early: FloatArray) -> FinPath:
         """Return the path of the fin with its held commands given so much before their samples, (n,) s."""
         return self._path(self.fin, early)
 
     def with_fin(self, fin: FloatArray) -> Record:
         """Return the record with another fin, (n,) rad, and all else as it is."""
-        return self._with(fin=fin, commanded=self._path(fin, self.command_lead))
+        return self._with(fin=fin, fin_line=None, commanded=self._path(fin, self.command_lead))
 
     def with_command_lead(self, early: FloatArray) -> Record:
         """Return the record with its held commands given so much before their samples, (n,) s, and all else as it is."""
@@ -111,7 +115,10 @@ class Record(Brief):
         """Return the record that counts as flown at another speed, in m/s, and all else as it is; itself at its own."""
         return self if speed == self.speed or not np.isfinite(speed) else self._with(speed=speed)
 
-    def _path(self, fin: FloatArray, early: FloatArray | None) -> FinPath:
+    def _path(self, fin: FloatArray, early: FloatArray | None, line: FloatArray | None = None) -> FinPath:
+        if line is not None:
+            start, end = np.where(np.isfinite(line[:, :-1]), line[:, :-1], (fin[:-1], fin[:-1] if self.fin_is_held else fin[1:]))
+            return FinPath(start, end, fin[:-1], fin[1:])
         if not self.fin_is_held:
             return FinPath(fin[:-1], fin[1:])
         if early is None:
@@ -169,12 +176,14 @@ def first_part(record: Record, samples: int) -> Record:
     part = slice(0, samples)
     early = None if record.command_lead is None else record.command_lead[part]
     goal = None if record.goal is None else record.goal[part]
+    line = None if record.fin_line is None else record.fin_line[:, part]
     own = ("time", "fin", "angle", "rate", "cross", "angle_ok", "rate_ok", "cross_ok")
     arrays = {name: getattr(record, name)[part] for name in own}
     return replace(
         record,
         **arrays,
         command_lead=early,
+        fin_line=line,
         goal=goal,
         signals=MappingProxyType({k: v[part] for k, v in record.signals.items()}),
     )
@@ -192,6 +201,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     measured = column == names.fin_measured
     if not run.has(column):
         raise no_fin(run, axis.value, column)
+    refuse_no_angle(run, column)
     run = unbroken(run, column)
     if not run.has(names.angle) and not run.has(names.rate):
         raise DataError(
@@ -234,6 +244,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
         cross_ok=cross_ok,
         signals=MappingProxyType(signals),
         thrust_column=thrust_column,
+        fin_line=np.stack([run[line] for line in STEP_LINES[column]]) if run.has(STEP_LINES[column][0]) else None,
         goal=_held_fin(run.signals[names.goal]) if run.has(names.goal) else None,
         # of the smoothed speed: where it swings between two levels, noise would throw the median from one to the other
         speed=float(np.median(signals["surge"])) if "surge" in signals else float("nan"),

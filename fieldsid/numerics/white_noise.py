@@ -22,7 +22,7 @@ MAX_FLOOR_SAMPLES, BLOCK_SAMPLES = 50_000, 1_000
 def white_noise_std(values: FloatArray, ok: BoolArray) -> float:
     """Return the white-noise standard deviation of a smooth signal from its third differences.
 
-    A trimmed mean of their squares excludes the kinks at fin steps. Returns NaN with fewer than 20 samples in a row.
+    A trimmed mean of their squares excludes the kinks at fin steps. Returns NaN with fewer than 20 of them.
     """
     if values.size > MAX_FLOOR_SAMPLES:
         parts = [
@@ -50,6 +50,11 @@ def robust_white_noise_std(differences: FloatArray, order: int) -> float:
 
 
 def _differences(values: FloatArray, ok: BoolArray) -> FloatArray:
-    """Return the third differences of samples that were all measured."""
-    d = np.diff(values, DIFFERENCE_ORDER)
-    return d if ok.all() else d[np.lib.stride_tricks.sliding_window_view(ok, DIFFERENCE_ORDER + 1).all(axis=1)]
+    """Return the third differences of measured samples that are as far apart as most, also where others lie between them."""
+    if ok.all():
+        return np.diff(values, DIFFERENCE_ORDER)
+    apart = np.diff(np.flatnonzero(ok))
+    if apart.size < DIFFERENCE_ORDER:
+        return np.zeros(0)
+    even = np.lib.stride_tricks.sliding_window_view(apart == int(np.median(apart)), DIFFERENCE_ORDER).all(axis=1)
+    return np.diff(values[ok], DIFFERENCE_ORDER)[even]

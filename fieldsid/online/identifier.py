@@ -35,7 +35,7 @@ NOISE_WINDOW, NOISE_EVERY = 1024, 256
 """Samples that the sensors' noise is learnt from, and samples between two looks."""
 WAIT_FOR_RATE_S = 1.0
 """Time after which a vehicle that has sent no rate has none."""
-STATE = 2
+STATE = 3
 """Version of the saved state."""
 _UPPER = np.triu_indices(4)
 
@@ -105,11 +105,13 @@ class OnlineIdentifier:
         speed: float = nan,
         *,
         fin_is_held: bool = True,
+        fin_line: tuple[float, float] | None = None,
     ) -> bool:
         """Take one sample and return whether it joined the estimate.
 
         time in s; fin in rad, a command that holds from this time on, or without `fin_is_held` a measurement, straight since the
-        last; angle in rad (a heading may wrap); rate in rad/s; surge in m/s. NaN is what was not measured.
+        last; fin_line is where the line of mean and first moment of what the fin did since the last starts and ends (rad), where
+        that is known; angle in rad (a heading may wrap); rate in rad/s; surge in m/s. NaN is what was not measured.
         Samples whose time does not go on are passed over; gaps and restarts are survived.
         """
         time, fin, angle, rate = float(time), float(fin), float(angle), float(rate)
@@ -119,7 +121,7 @@ class OnlineIdentifier:
         if isfinite(speed):
             self._speed_sum, self._speeds = self._speed_sum + float(speed), self._speeds + 1
         before = fed.counts["repeated"] + fed.counts["late"]
-        used = fed.push(time, fin, angle, rate, is_held=fin_is_held)
+        used = fed.push(time, fin, angle, rate, is_held=fin_is_held, line=fin_line)
         if fed.counts["repeated"] + fed.counts["late"] == before and isfinite(time):
             self._hear(time, angle, rate, fin)
         return used
@@ -230,7 +232,9 @@ class OnlineIdentifier:
         self._seen += 1
         if self._seen % NOISE_EVERY == 0:
             self._contradiction = None
-            found = [white_noise_std(np.nan_to_num(c), np.isfinite(c)) for c in self._recent().T[1:3]]
+            # each signal's own samples: where they come as messages of their own no two are in one row
+            own = (c[np.isfinite(c)] for c in self._recent().T[1:3])
+            found = [white_noise_std(c, np.ones(c.size, dtype=np.bool_)) for c in own]
             least = MIN_ANGLE_NOISE_RAD, MIN_RATE_NOISE_RAD_S
             self._noise = tuple(max(f, n) if isfinite(f) else n for f, n in zip(found, least, strict=True))  # type: ignore[assignment]
 

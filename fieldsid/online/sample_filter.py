@@ -7,7 +7,7 @@ late, so that spikes can be told.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf, isfinite, nan, remainder, tau
 from typing import Any
@@ -26,6 +26,7 @@ from fieldsid.fitting.regression.recursive_ls import (
     step,
 )
 from fieldsid.fitting.regression.svf_equation import MAX_BRIDGED_GAP_S
+from fieldsid.logs.convert.clock import Track, line_over_steps
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.online.row_colour import RowColour
 from fieldsid.online.spike_gate import SpikeGate
@@ -34,8 +35,14 @@ CLOCK_RESTART_S = 1.0
 """A stamp so far before the last is a clock that started again; one less far is a sample that came late, and is left out."""
 HELD = 2
 """Samples that wait until it can be told whether they are spikes."""
+USUAL = 1.5
+"""Steps to the last sample from which on samples are missing; what comes without a measurement inside less is the fin's alone."""
 MOST_MOVES = 64
 """Moves of the fin that a bridged gap may hold; with more it counts as a long one."""
+
+
+Line = tuple[float, float]
+"""Where the fin's line since the sample before starts and ends, in rad."""
 
 
 class SampleFilter:
@@ -54,13 +61,13 @@ class SampleFilter:
         self._sample, self._row = np.zeros((1, 6)), np.zeros((1, 5))
         self.colour = RowColour(bandwidth, forgetting)
         self.angle_gate, self.rate_gate = SpikeGate(), SpikeGate()
-        self._late: list[tuple[float, float, bool]] = []
-        self._moves: list[tuple[float, float]] = []
+        self._late: list[tuple[float, float, bool, Line | None]] = []
+        self._moves: list[tuple[float, float, Line | None]] = []
         self._fin, self._last_angle = nan, nan
         self.counts = {"used": 0, "missing": 0, "repeated": 0, "gaps": 0, "restarts": 0, "late": 0}
 
-    def push(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool) -> bool:
-        """Take one sample, whose fin held since the last or went there straight; return whether a row joined the estimate."""
+    def push(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None = None) -> bool:
+        """Take one sample, whose fin since the last held, went there straight or along a line; return whether a row joined."""
         if not isfinite(time):
             self.counts["missing"] += 1
             return False
@@ -71,13 +78,13 @@ class SampleFilter:
                 return False
             self.begin_again()
             self.counts["restarts"] += 1
-        self._late.append((time, fin, is_held))
+        self._late.append((time, fin, is_held, line))
         unwrapped = self._unwrapped(angle)
         ready = self.angle_gate.push(unwrapped), self.rate_gate.push(rate)
         if len(self._late) <= HELD:
             return False
-        time, fin, is_held = self._late.pop(0)
-        return self._take(time, fin, *ready, is_held=is_held)
+        time, fin, is_held, line = self._late.pop(0)
+        return self._take(time, fin, *ready, is_held=is_held, line=line)
 
     def begin_again(self) -> None:
         """Let the filter start anew at the next sample; the estimate and its errors stay."""
@@ -104,16 +111,16 @@ class SampleFilter:
         self._last_angle = angle
         return angle
 
-    def _take(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool) -> bool:
+    def _take(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None) -> bool:
         memory = self.memory
-        fin = fin if isfinite(fin) else self._fin
+        fin = fin if isfinite(fin) else self._moves[-1][1] if self._moves else self._fin
         if not isfinite(fin):
             self.counts["missing"] += 1
             return False
         if not isfinite(rate if self._order == 1 else angle):
             self.counts["missing"] += 1
             if len(self._moves) <= MOST_MOVES:
-                self._moves.append((time, fin))
+                self._moves.append((time, fin, line))
             return False
         if memory[SAMPLES] and (time - memory[TIME] > MAX_BRIDGED_GAP_S or len(self._moves) > MOST_MOVES):
             self.counts["gaps"] += 1
@@ -121,7 +128,7 @@ class SampleFilter:
             self._moves.clear()
         angle = self._angle(time, angle, rate)
         rate = rate if isfinite(rate) else 0.0
-        used = self._through_moves(time, fin, angle, rate, is_held=is_held)
+        used = self._through_moves(time, fin, angle, rate, is_held=is_held, line=line)
         self._fin = fin
         return used
 
@@ -134,23 +141,39 @@ class SampleFilter:
             return 0.0
         return float(memory[ANGLE] + 0.5 * (rate + memory[RATE]) * (time - memory[TIME]))
 
-    def _through_moves(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool) -> bool:
-        """Step to a measured sample, through the moves of the fin since the last on straight lines of the signals."""
+    def _through_moves(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, line: Line | None) -> bool:
+        """Step to a measured sample through the moves of the fin since the last.
+
+        Inside a usual step by the moves' own line, on straight lines of the signals where samples are missing.
+        """
         memory, moves = self.memory, self._moves
-        if memory[SAMPLES] and moves:
+        if memory[SAMPLES] and moves and line is None and time - memory[TIME] <= USUAL * memory[H]:
+            line = self._line_of_moves(time, fin, is_held=is_held)
+            self.counts["missing"] -= len(moves)
+        elif memory[SAMPLES] and moves:
             begin, angle0, rate0 = float(memory[TIME]), float(memory[ANGLE]), float(memory[RATE])
-            for at, then in moves:
+            for at, then, along in moves:
                 share = (at - begin) / (time - begin)
-                self._step(
-                    at, then, angle0 + share * (angle - angle0), rate0 + share * (rate - rate0), is_held=is_held, counts=False
-                )
+                straight = angle0 + share * (angle - angle0), rate0 + share * (rate - rate0)
+                self._step(at, along or self._since(then, is_held=is_held), *straight, counts=False)
                 self._fin = then
         moves.clear()
-        return self._step(time, fin, angle, rate, is_held=is_held, counts=True)
+        return self._step(time, line or self._since(fin, is_held=is_held), angle, rate, counts=True)
 
-    def _step(self, time: float, fin: float, angle: float, rate: float, *, is_held: bool, counts: bool) -> bool:
+    def _line_of_moves(self, time: float, fin: float, *, is_held: bool) -> Line | None:
+        """Return the fin's line over the step to a sample: a fin that is told by itself moves between the samples."""
+        begin = float(self.memory[TIME])
+        told = [(begin, self._fin), *((at, then) for at, then, _ in self._moves), *([] if is_held else [(time, fin)])]
+        found = line_over_steps(Track(*np.array(told).T), np.array([begin, time]), inf, is_held=is_held)
+        return None if found is None else (float(found[0, 0]), float(found[1, 0]))
+
+    def _since(self, fin: float, *, is_held: bool) -> Line:
+        """Return the line of a fin that held since the last sample, or went straight."""
         before = self._fin if isfinite(self._fin) else fin
-        self._sample[0] = time, before, before if is_held else fin, angle, rate, float(counts)
+        return before, before if is_held else fin
+
+    def _step(self, time: float, line: Line, angle: float, rate: float, *, counts: bool) -> bool:
+        self._sample[0] = time, *line, angle, rate, float(counts)
         if not step(self.memory, self.packed, *self._settings, self._sample, self._row, 0):
             return False
         self.counts["used"] += 1
@@ -163,8 +186,8 @@ class SampleFilter:
         return {
             "memory": self.memory.tolist(),
             "packed": self.packed.tolist(),
-            "late": [[t, fin if isfinite(fin) else None, is_held] for t, fin, is_held in self._late],
-            "moves": [list(pair) for pair in self._moves],
+            "late": [[t, fin if isfinite(fin) else None, is_held, line] for t, fin, is_held, line in self._late],
+            "moves": [list(move) for move in self._moves],
             "numbers": {k: v if isfinite(v) else None for k, v in numbers.items()},
             "counts": dict(self.counts),
             "colour": self.colour.state(),
@@ -176,8 +199,8 @@ class SampleFilter:
         """Go on from a state; raises ValueError, TypeError or KeyError where it is none."""
         _check_times(state)
         self.memory[:], self.packed[:] = state["memory"], state["packed"]
-        self._late = [(float(t), nan if f is None else float(f), bool(h)) for t, f, h in state["late"]]
-        self._moves = [(float(t), float(f)) for t, f in state["moves"]]
+        self._late = [(float(t), nan if f is None else float(f), bool(h), _line(line)) for t, f, h, line in state["late"]]
+        self._moves = [(float(t), float(f), _line(line)) for t, f, line in state["moves"]]
         fin, angle = (state["numbers"][k] for k in ("fin", "last_angle"))
         self._fin, self._last_angle = (nan if v is None else float(v) for v in (fin, angle))
         self.counts = {k: int(state["counts"][k]) for k in self.counts}
@@ -194,6 +217,10 @@ def _check_times(state: Mapping[str, Any]) -> None:
         raise ValueError(f"{len(late)} samples and {len(moves)} moves of the fin that wait")
     if any(b <= a for a, b in pairwise([begin, *moves, *late])):
         raise ValueError("times that do not go on")
+
+
+def _line(saved: Sequence[float] | None) -> Line | None:
+    return None if saved is None else (float(saved[0]), float(saved[1]))
 
 
 def present_step(memory: FloatArray) -> float:

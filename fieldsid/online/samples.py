@@ -11,8 +11,9 @@ import numpy as np
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.units import UNITS, factor_to
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
+from fieldsid.logs.doctor.fin_findings import refuse_no_angle
 from fieldsid.logs.mapping.canonical_names import TIME, canonical
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import STEP_LINES, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.records.reading import read_json
@@ -25,7 +26,10 @@ LARGEST = 1e18
 
 
 class Sample(NamedTuple):
-    """Time s, fin rad, angle rad, rate rad/s and surge m/s of one axis, NaN where not measured; the fin held or is measured."""
+    """Time s, fin rad, angle rad, rate rad/s and surge m/s of one axis, NaN where not measured; the fin held or is measured.
+
+    `fin_line` is where the fin's line since the last sample starts and ends, in rad, where the log has the fin between them.
+    """
 
     time: float
     fin: float
@@ -33,14 +37,16 @@ class Sample(NamedTuple):
     rate: float = nan
     speed: float = nan
     fin_is_held: bool = True
+    fin_line: tuple[float, float] | None = None
 
 
 def fin_column(run: Run, axis: Axis) -> str:
-    """Return the fin of a run's axis, the measured one where there is one; raises DataError where there is neither."""
+    """Return the fin of a run's axis, the measured one where there is one; raises DataError where none is there, or no angle."""
     names = NAMES[axis]
     column = names.fin_measured if run.has(names.fin_measured) else names.fin
     if not run.has(column):
         raise no_fin(run, axis.value, column)
+    refuse_no_angle(run, column)
     return column
 
 
@@ -56,10 +62,12 @@ def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]
     refuse_contradiction(run, names.angle, names.rate)
     nothing = np.full(len(run), nan)
     wanted = (column, names.angle, names.rate, SURGE)
-    arrays = [run.time, *(run.signals.get(c, nothing) for c in wanted)]
+    lines = [np.append(nan, run.signals.get(c, nothing)[:-1]) for c in STEP_LINES[column]]
+    arrays = [run.time, *(run.signals.get(c, nothing) for c in wanted), *lines]
     start = int(np.searchsorted(run.time, after, side="right"))
-    for row in zip(*(a[start:].tolist() for a in arrays), strict=True):
-        yield Sample(*row)._replace(fin_is_held=column == names.fin)
+    for *row, begin, end in zip(*(a[start:].tolist() for a in arrays), strict=True):
+        line = (begin, end) if isfinite(begin) else None
+        yield Sample(*row)._replace(fin_is_held=column == names.fin, fin_line=line)
 
 
 class MessageReader:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut, facts
-from fieldsid.rounding import number, p_value
-from fieldsid.views._words import error_facts, merit_row, percent, speed_words, table, times, warned, where_block, where_rows
+from fieldsid.rounding import number, p_value, times_noise
+from fieldsid.views._words import error_facts, merit_row, percent, speed_words, table, warned, where_block, where_rows
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -21,7 +21,7 @@ def line(found: Comparison) -> str:
     channel, m = found.leading, found.merit
     fit = m.rate_fit if channel.name == "rate" else m.angle_fit
     worst = f", worst at {channel.where[0].condition}" if channel.fails and channel.where else ""
-    return f"{cut(found.run, 60)}: {channel.name} fit {fit:.1f} %, error {times(channel.over_floor)} x the noise{worst}"
+    return f"{cut(found.run, 60)}: {channel.name} fit {fit:.1f} %, error {times_noise(channel.over_floor)}{worst}"
 
 
 def page(found: Comparison) -> Page:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, facts, listed
-from fieldsid.rounding import number
-from fieldsid.views._words import parameter_block, parameter_rows, table, times, warned
+from fieldsid.rounding import noise_fall, number
+from fieldsid.views._words import parameter_block, parameter_rows, table, warned
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -61,7 +61,7 @@ def figures(found: Extension) -> Mapping[str, Callable[[], Any]]:
 def _fall(found: Extension) -> str:
     before, after = found.gain.over_floor
     where = "unseen data" if found.gain.unseen else "the runs fitted to"
-    return f"the error on {where} goes from {times(before)} to {times(after)} x the noise floor"
+    return f"the error on {where} goes from {noise_fall(before, after)}"
 
 
 def _verdict(found: Extension) -> str:

@@ -27,13 +27,13 @@ def page(run: Run) -> Page:
     """Return the findings, the run's length and rate, and each signal's count and range."""
     import numpy as np
 
-    from fieldsid.logs.run import EXPLAINING, SIGNALS
+    from fieldsid.logs.run import COLUMNS, EXPLAINING
 
     rows = []
     for name, values in run.signals.items():
         seen = values[np.isfinite(values)]
         span = (number(float(seen.min())), number(float(seen.max()))) if seen.size else ("-", "-")
-        rows.append((name, SIGNALS.get(name, ""), str(seen.size), *span))
+        rows.append((name, COLUMNS.get(name, ""), str(seen.size), *span))
     known = facts(
         "Statistics",
         (

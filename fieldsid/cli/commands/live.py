@@ -280,7 +280,7 @@ def _looks(
         for sample in samples:
             if sample is None:
                 continue
-            identifier.update(*sample[:-1], fin_is_held=sample.fin_is_held)
+            identifier.update(*sample[:5], fin_is_held=sample.fin_is_held, fin_line=sample.fin_line)
             watch.excitation.hear(sample.time, sample.fin, sample.rate)
             fresh = True
             if sample.time >= due or sample.time < due - 2.0 * every:

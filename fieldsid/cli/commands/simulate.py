@@ -120,13 +120,13 @@ def _replayed(model: Model, path: Path, mapping: Path | None, speed: float | Non
 
 def _render(to: Console, body: Mapping[str, Any]) -> None:
     from fieldsid.cli.console import table
-    from fieldsid.logs.run import SIGNALS
+    from fieldsid.logs.run import COLUMNS
     from fieldsid.rounding import number
 
     rows = [
         (name, *(number(factor * v[k]) for k in ("low", "high", "end")), unit)
         for name, v in body["signals"].items()
-        for factor, unit in [shown_in(SIGNALS[name])]
+        for factor, unit in [shown_in(COLUMNS[name])]
     ]
     to.print(table("", ("signal", "low", "high", "end", "unit"), rows))
     if body["file"]:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, repeated, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named, times, used
+from fieldsid.cli.headlines.words import Body, counted, named, used
 from fieldsid.cli.voice import shown_in
 from fieldsid.comparison.sufficient import is_noise
-from fieldsid.rounding import MANY, number
+from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 MODELS = "models"
 LEAST_TO_SPARE_ONE = 3
@@ -137,7 +137,7 @@ def _before_to_after(body: Body) -> str:
     """Return the error over the noise floor; of a log without noise, whose floor is that of its digits, in its own units."""
     before, after = body["over_floor"]["before"], body["over_floor"]["after"]
     if before < MANY:
-        return f"{times(before)} to {times(after)} x the noise floor"
+        return noise_fall(before, after)
     side = "validation" if body["unseen"] else "train"
     return " to ".join(_rms(body[when][side]) for when in ("before", "after"))
 
@@ -187,6 +187,6 @@ def of_new_effect(body: Body, look: str) -> Headline:
 def left_says(body: Body) -> str:
     """Return what the model as it now is leaves."""
     sides = (("unseen data", body["left"]["unseen"]), ("the runs fitted to", body["left"]["fitted"]))
-    said = ", ".join(f"{times(error)} x the noise floor on {name}" for name, error in sides if isfinite(error))
+    said = ", ".join(times_noise(error, f"the noise floor on {name}") for name, error in sides if isfinite(error))
     quiet = all(is_noise(error) for _, error in sides if isfinite(error))
     return f"left: {said}: " + ("that is the noise" if quiet else "more is missing than the sensors' noise explains")

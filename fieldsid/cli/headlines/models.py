@@ -11,7 +11,10 @@ from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, named, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
 from fieldsid.comparison.sufficient import is_noise, over_noise
-from fieldsid.rounding import MANY, number
+from fieldsid.rounding import MANY, noise_fall, number, times_noise
+
+NO_NOISE, WHOLE_FIT = "filtered_sensor", 99.0
+"""Code of the warning that a log shows no white noise, and the fit in per cent from which on nothing is missing of such a one."""
 
 
 def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
@@ -33,9 +36,11 @@ def of_identify(body: Body, files: Sequence[Sequence[Path]]) -> Headline:
 
 def _left(over: float, fit: Body) -> str:
     """Return what a fit leaves; of a log without noise, whose floor is that of its digits, how well it follows."""
-    if over >= MANY:
+    fits = [f for n in ("angle", "rate") if isfinite(f := fit[f"{n}_fit_percent"])]
+    if over >= MANY or any(w["code"] == NO_NOISE for w in fit["warnings"]):
         followed = (f"{n} fit {fit[f'{n}_fit_percent']:.1f} %" for n in ("angle", "rate") if isfinite(fit[f"{n}_fit_percent"]))
-        return f"{', '.join(followed)}, of a log with next to no noise: something is missing"
+        missing = ": something is missing" if min(fits) < WHOLE_FIT else ""
+        return f"{', '.join(followed)}, of a log with next to no noise{missing}"
     return f"what is left is {over:.2f} x the noise" + ("" if is_noise(over) else ": something is missing")
 
 
@@ -143,7 +148,7 @@ def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: S
     """Return which of several models follows the runs best, if any; inputs: what that one was fitted to."""
     scores = sorted(zip((float(m["over_floor"]) for m in body["models"]), names, strict=True))
     (least, best), (second, _) = scores[:2]
-    others = ", ".join(f"{n} at {s:.2f} x" for s, n in scores[1:])
+    others = ", ".join(f"{n} at {f'{s:.2f} x' if s < MANY else times_noise(s)}" for s, n in scores[1:])
     word = "follows no better than the next" if second <= close * least else "follows best"
     over = body["models"][0]["runs"]
     fitted = [(n, named(m["fitted_to"])) for n, m in zip(names, body["models"], strict=True) if m["fitted_to"]]
@@ -154,7 +159,7 @@ def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: S
     entry = next(m for m in body["models"] if m["model"] == body["best"])
     fails = any(e["failing"] for e in entry["runs"])
     return Headline(
-        f"{best} {word}: {least:.2f} x the noise; {others}",
+        f"{best} {word}: {times_noise(least)}; {others}",
         rests,
         after_compare(body["best"], str(body["axis"]), fails, runs, inputs),
     )
@@ -190,7 +195,7 @@ def of_history(body: Body, inputs: Sequence[Path]) -> Headline:
         return Headline("nothing was added yet", f"{model}, whose line begins with itself", next_)
     first, last = steps[0]["over_floor"]["before"], steps[-1]["over_floor"]["after"]
     added = ", then ".join("+".join(g["added"]) for g in steps)
-    says = f"with {added} the error fell from {first:.2f} to {last:.2f} x the noise floor"
+    says = f"with {added} the error fell from {noise_fall(first, last)}"
     state = "every file is as it was" if body["intact"] else "not every file is as it was"
     more = not is_noise(last) and logs
     next_ = pasted("diagnose", logs, "--axis", axis, "--model", model) if more else used(axis, model)

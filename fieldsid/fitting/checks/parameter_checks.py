@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from fieldsid.fitting.checks.authority_checks import authority_check
+from fieldsid.fitting.checks.damping_law import LIMITING_EFFECTS, slope_at_rest
 from fieldsid.fitting.problem.estimator import Solution
 from fieldsid.fitting.problem.problem import Problem
 from fieldsid.logs.run import Note
@@ -17,6 +18,8 @@ from fieldsid.rounding import in_unit
 MAX_CORRELATION = 0.95
 CLEAR_STD_ERRORS = 2.0
 """Standard errors above which a value differs significantly from zero."""
+CLEAR_GAIN = 10.0
+"""Log likelihood that a law of damping must be worse by not to count."""
 
 
 def parameter_checks(problem: Problem, solution: Solution, floor: Noise) -> tuple[Note, ...]:
@@ -40,23 +43,39 @@ def _errors(problem: Problem, solution: Solution) -> dict[str, float]:
 
 def _stability(problem: Problem, solution: Solution) -> Iterator[Note]:
     names, v, s = NAMES[problem.layout.axis], _values(problem, solution), _errors(problem, solution)
-    damping = v[names.damping]
-    if damping < 0.0:
-        held = "quadratic" in v and v["quadratic"] > 0.0
-        tail = "held by quadratic damping" if held else "nothing in the model holds it"
-        unsure = f"the model turns by itself, and its error of {s[names.damping]:.2g} leaves open whether the vehicle does"
-        turns = "the vehicle turns by itself" if damping < -CLEAR_STD_ERRORS * s[names.damping] else unsure
-        yield Note(
-            "unstable",
-            f"UNSTABLE: {problem.layout.shown(names.damping)} = {damping:.3g} 1/s is negative, {turns}; {tail}",
-            {"value": damping, "limit": 0.0} | ({} if "quadratic" in v else {"hint": "--effects quadratic_damping"}),
-        )
+    if v[names.damping] < 0.0:
+        yield _slope(problem, solution, v, s[names.damping])
     if names.stiffness is not None and v[names.stiffness] < -CLEAR_STD_ERRORS * s[names.stiffness]:
         yield Note(
             "negative_righting",
             f"{names.stiffness} = {v[names.stiffness]:.3g} 1/s^2 is negative: no righting moment at this speed",
             {"value": v[names.stiffness], "limit": 0.0},
         )
+
+
+def _slope(problem: Problem, solution: Solution, values: Mapping[str, float], error: float) -> Note:
+    """Return what a negative damping says: of the vehicle only where no other law of damping that fits as well says otherwise."""
+    name = NAMES[problem.layout.axis].damping
+    damping, shown = values[name], problem.layout.shown(name)
+    data = {"value": damping, "limit": 0.0} | ({} if "quadratic" in values else {"hint": "--effects quadratic_damping"})
+    if damping >= -CLEAR_STD_ERRORS * error:
+        leaves = f"the model turns by itself, and its error of {error:.2g} leaves open whether the vehicle does"
+        return Note("unstable", f"{shown} = {damping:.3g} 1/s is negative: {leaves}", data)
+    limited = "rate_power" not in values and any(e.name in LIMITING_EFFECTS for e in problem.layout.effects)
+    free = slope_at_rest(problem, solution.x) if limited else None
+    if free is not None and not free.is_negative and free.gained > -CLEAR_GAIN:
+        says = (
+            f"{shown} = {damping:.3g} 1/s, the slope at rest of a curve fitted to turns, is negative by this law of damping only:"
+            f" with the power {free.power:.1f} of the rate (log likelihood {free.gained:+.0f}) it is {free.value:.2g} +/- "
+            f"{free.std_error:.2g}, and the vehicle need not turn by itself; `sysid extend MODEL --add quadratic_damping` "
+            "takes that power"
+        )
+        return Note("slope_at_rest", says, data | {"free": free.value, "std_error": free.std_error, "power": free.power})
+    tail = "held by quadratic damping" if values.get("quadratic", 0.0) > 0.0 else "nothing in the model holds it"
+    curve = ", the slope at rest of a curve fitted to turns," if limited or "rate_power" in values else ""
+    return Note(
+        "unstable", f"UNSTABLE: {shown} = {damping:.3g} 1/s{curve} is negative, the vehicle turns by itself; {tail}", data
+    )
 
 
 def _bounds(problem: Problem, solution: Solution) -> Iterator[Note]:

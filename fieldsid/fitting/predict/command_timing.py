@@ -1,12 +1,12 @@
 """The time, between two samples, at which a held command jumped: unknown from its log, but visible in the motion.
 
-A log shows a command at its samples only, and an import resamples commands of another clock: a jump first seen at sample k was
-made at some time since sample k - 1. In a free run that time is a nuisance of the run, as its initial state is. Each of K times
-is estimated by Gauss-Newton with a uniform prior over an interval, about one shift of them all; a model that was fitted to such
-logs has absorbed half an interval, so that the shift lies between -1/2 and 1 of it. The times are used only where they explain
-more than the shift alone (a delay or a clock offset) and a disturbance do: log L(own times) - log L(shift) > (K - 1) / 2 log n +
-MIN_TIMING_EVIDENCE_GAIN with each likelihood at its best sensor noise and disturbance moment, because a disturbance at the time
-of a jump looks the same. Source: Schwarz 1978, Annals of Statistics 6(2).
+A log of one row for all shows a command at its samples only: a jump first seen at sample k was made at some time since sample
+k - 1. One whose commands have times of their own keeps those. In a free run that time is a nuisance of the run, as its initial
+state is. Each of K times is estimated by Gauss-Newton with a uniform prior over an interval, about one shift of them all; a
+model that was fitted to such logs has absorbed half an interval, so that the shift lies between -1/2 and 1 of it. The times are
+used only where they explain more than the shift alone (a delay or a clock offset) and a disturbance do: log L(own times) - log
+L(shift) > (K - 1) / 2 log n + MIN_TIMING_EVIDENCE_GAIN with each likelihood at its best sensor noise and disturbance moment,
+because a disturbance at the time of a jump looks the same. Source: Schwarz 1978, Annals of Statistics 6(2).
 """
 
 from __future__ import annotations
@@ -73,10 +73,15 @@ def command_timing(problem: Problem, x: FloatArray, floor: Noise) -> Record | No
 
 
 def jumps_of(record: Record) -> npt.NDArray[np.intp]:
-    """Return the samples (K,) at which a held command is first seen after a jump; none for one that always moves."""
+    """Return the samples (K,) at which a held command is first seen after a jump; none where it always moves or has its times."""
     change = np.abs(np.diff(record.fin))
     found = np.flatnonzero(change > MIN_JUMP_RANGE_SHARE * np.ptp(record.fin)) + 1
-    told = record.fin_is_held and found.size * MIN_SAMPLES_PER_JUMP <= len(record) and found.size <= MAX_JUMPS
+    told = (
+        record.fin_is_held
+        and record.fin_line is None
+        and found.size * MIN_SAMPLES_PER_JUMP <= len(record)
+        and found.size <= MAX_JUMPS
+    )
     return found if told else found[:0]
 
 

@@ -23,7 +23,7 @@ from fieldsid.models.effect import Effect
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.record import Record
 from fieldsid.models.speed_law import SpeedLaw
-from fieldsid.noise.white_floor import white_noise_floor
+from fieldsid.noise.white_floor import lowered_noise_floor, white_noise_floor
 from fieldsid.noise.whiten import is_white
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
@@ -77,6 +77,8 @@ def predict(model: Model, record: Record, *, effects: tuple[Effect, ...] | None 
     """Return a model's free run on a record; raises DivergenceError when it grows without bound."""
     floor = white_noise_floor([record])
     logged, x = frozen_problem(model, record, effects_of(model) if effects is None else effects)
+    if not record.is_whole:  # the differences of samples further apart than those of the clock contain the motion
+        floor = lowered_noise_floor(floor, [record], [logged.residual(refit_nuisances(logged, x, 0, floor), 0)[0]])
     problem, x = with_command_timing(logged, x, floor)
     as_timed = problem
     problem, x, faster = speed_correction.correct_speed(problem, x, floor)

@@ -15,11 +15,13 @@ from fieldsid.logs.convert.clock import Track, one_clock, summed
 from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, refuse_impossible_steps, refuse_long_gaps
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
+from fieldsid.logs.convert.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
+from fieldsid.logs.convert.readings import by_reading
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
 from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
-from fieldsid.logs.run import PART, SIGNALS, Note, Run, signal_of
+from fieldsid.logs.run import COLUMNS, PART, Note, Run, signal_of
 from fieldsid.numerics.arrays import FloatArray
 
 WHOLE = (-np.inf, np.inf)
@@ -44,6 +46,7 @@ def assemble(
         time = next(iter(raw.series.values())).time if raw.series else np.zeros(0)
         run = Run(raw.name, time, {s: v.values for s, v in raw.series.items()}, path, raw.notes)
         return run if part == WHOLE else run.between(*part)
+    raw = by_reading(raw)
     notes = list(raw.notes)
     tracks: dict[str, Track] = {}
     for signal, series in raw.series.items():
@@ -59,13 +62,14 @@ def assemble(
             f"{mapping.place} maps no signal", found="an empty `signals`", hint=f"map one of those that {_inspect(path)} shows"
         )
     if "yaw_rad" in tracks:
-        tracks["yaw_rad"], found = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
-        notes += found
+        tracks["yaw_rad"], fills = without_fills(tracks["yaw_rad"])
+        tracks["yaw_rad"], lines = unwrapped_over(tracks["yaw_rad"], tracks.get("yaw_rate_rad_s"), mapping.gap_factor)
+        notes += fills + lines
     time, signals, clock_notes = _on_one_clock(raw, tracks, mapping)
     if time.size < 2:
         counted = _counted(time, [*notes, *clock_notes])
         raise LogError(f"`{path}` has too few samples", found=counted, hint=f"{_inspect(path)} shows what is in it")
-    signals = {s: signals[s] for s in SIGNALS if s in signals}
+    signals = {s: signals[s] for s in COLUMNS if s in signals}
     run = Run(raw.name, time, signals, path, _distinct([*notes, *clock_notes]))
     run = run if part == WHOLE else run.between(*part)
     refuse_long_gaps(run.time, run.signals, options, limit_s=max_gap_s)

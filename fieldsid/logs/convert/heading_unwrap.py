@@ -127,7 +127,7 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
     """Return what a crossing is judged by; None where no step is too fast, or too many are, or noise hides them."""
     steps, dt = np.diff(values), np.diff(time)
     turned = steps - TURN * np.round(steps / TURN)
-    noise = _noise(np.where(np.abs(turned) > np.maximum(FASTEST_RAD_S * dt, STAIR_RAD), np.nan, turned))
+    noise = noise_of_steps(np.where(np.abs(turned) > np.maximum(FASTEST_RAD_S * dt, STAIR_RAD), np.nan, turned))
     least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise)
     limit = np.maximum(FASTEST_RAD_S * dt, least)
     jumps = np.flatnonzero(np.abs(steps) > limit)
@@ -138,7 +138,7 @@ def _path(time: FloatArray, values: FloatArray, rate: Track | None) -> _Path | N
     return _Path(time, values, least, _swept(time, turned, calm, rate), turned / dt, calm, jumps, abs(spread) <= 2.0 * least)
 
 
-def _noise(turned: FloatArray) -> float:
+def noise_of_steps(turned: FloatArray) -> float:
     """Return the standard deviation of white noise on a heading from its steps (n-1,), NaN where they are no motion."""
     bends = np.abs(np.diff(turned))
     bends = bends[np.isfinite(bends)]

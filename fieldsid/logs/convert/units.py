@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fieldsid.errors import MappingError
-from fieldsid.logs.run import SIGNALS, signal_of
+from fieldsid.logs.run import COLUMNS, signal_of
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.registry import near
 
@@ -96,7 +96,7 @@ def find_unit(name: str) -> Unit | None:
 
 def dimension_of(signal: str) -> str | None:
     """Return the dimension of a canonical signal, or an entry of its sum; None for `thrust`, which may be in any unit."""
-    return _DIMENSION_OF.get(SIGNALS[signal_of(signal)])
+    return _DIMENSION_OF.get(COLUMNS[signal_of(signal)])
 
 
 def factor_to(signal: str, unit: str) -> float:
@@ -115,7 +115,7 @@ def factor_to(signal: str, unit: str) -> float:
             found=f"{picked.name} is a unit of {picked.dimension}",
             hint=f"use one of: {', '.join(fitting)}",
         )
-    return picked.factor * 30.0 / math.pi if SIGNALS[signal] == "1/min" else picked.factor
+    return picked.factor * 30.0 / math.pi if COLUMNS[signal] == "1/min" else picked.factor
 
 
 def scaled(values: FloatArray, factor: float) -> FloatArray:

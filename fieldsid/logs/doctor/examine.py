@@ -15,7 +15,7 @@ from fieldsid.logs.doctor.limit_findings import limit_findings
 from fieldsid.logs.doctor.pair_findings import pair_findings
 from fieldsid.logs.doctor.signal_findings import signal_findings
 from fieldsid.logs.doctor.stated import Stated
-from fieldsid.logs.run import Note, Run
+from fieldsid.logs.run import LINES, Note, Run
 
 JITTER_LIMIT = 0.2
 """Standard deviation of the sampling step over its median."""
@@ -33,7 +33,7 @@ def examine(run: Run, fin_max_rad: Mapping[str, float] | None = None, stated: St
     stated = stated or Stated()
     with np.errstate(over="ignore", invalid="ignore"):
         findings = [*_sampling(run, stated), *_fins(run, fin_max_rad or {})]
-        for name in run.signals:
+        for name in (s for s in run.signals if s not in LINES):
             findings += signal_findings(run, name, stated)
         faulty = {str(n.data.get("signal")) for n in findings}
         return (

@@ -6,11 +6,15 @@ import math
 
 import numpy as np
 
+from fieldsid.errors import DataError
+from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 WIDEST = 0.8
 """Deflection in rad, 46 deg, that no fin of a vehicle has: the flow leaves it at half of that."""
+BEYOND = math.pi
+"""Deflection in rad that no fin, rudder or turning thruster reaches: such numbers are in another unit."""
 LARGE = 0.25
 """Share of a fin's range from which on a change is a step."""
 ALONE_S = 1.5
@@ -43,6 +47,20 @@ def _range(run: Run, fin: str) -> list[Note]:
         "its whole range, set `unit: counts` with `centre: 0` and its largest angle in rad as `scale`"
     )
     return [Note("fin_range", message, {"signal": fin, "value": largest, "limit": WIDEST})]
+
+
+def refuse_no_angle(run: Run, fin: str) -> None:
+    """Raise DataError where a fin's numbers (rad) are none of an angle: a fit would go through, its authority in no unit."""
+    values = run[fin][np.isfinite(run[fin])]
+    if not float(np.abs(values).max(initial=0.0)) > BEYOND or not float(np.percentile(np.abs(values), 99)) > BEYOND:
+        return
+    servo = servo_of(values)
+    unit = "its unit, probably `unit: deg`" if servo is None else f"`unit: counts` and `centre: {servo.centre:g}`"
+    raise DataError(
+        f"`{fin}` of run {run.name!r} is no angle in rad: no fin turns by {np.max(np.abs(values)):.4g} rad",
+        found=f"{values.min():.4g} to {values.max():.4g} rad (limit {BEYOND:.3g} rad)",
+        hint=f"set {unit} at `{fin}` in the mapping, and import the log again",
+    )
 
 
 def _early(run: Run, fin: str, rate: str) -> list[Note]:

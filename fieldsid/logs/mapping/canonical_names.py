@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit
-from fieldsid.logs.run import SIGNALS
+from fieldsid.logs.run import LINES, SIGNALS
 
 TIME = "time_s"
 _BRACKET = re.compile(r"[\[(](?P<unit>[^\])]+)[\])]")
@@ -44,6 +44,8 @@ def canonical(column: str) -> Canonical | None:
     name = column.strip().lower()
     if name in ("thrust", "thrust_ratio"):
         return Canonical(name, "1")
+    if name in LINES:
+        return Canonical(name, "rad")
     for stem, suffix in _splits(name):
         unit = _SUFFIX.get(suffix)
         if unit is None:

@@ -17,7 +17,7 @@ from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._unpacked_rows import refuse_repeated
 from fieldsid.logs.readers._unpacked_size import UnpackedSize
-from fieldsid.logs.run import SIGNALS, Note
+from fieldsid.logs.run import COLUMNS, Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
 from fieldsid.records.check import check
@@ -156,7 +156,7 @@ def _notes_of_ours(path: Path, table: Any) -> tuple[Note, ...] | None:
 
 def _series_of_ours(path: Path, table: Any) -> dict[str, Series]:
     """Return the signals of a run of ours on its time; raises LogError where a column is missing, twice there or no numbers."""
-    kept = [n for n in table.column_names if n in SIGNALS or n == TIME]
+    kept = [n for n in table.column_names if n in COLUMNS or n == TIME]
     numbers = {n: _cells(table.column(i)) for i, n in enumerate(table.column_names) if n in kept}
     wrong = [n for n in (TIME, *kept) if kept.count(n) != 1 or numbers[n].dtype.kind not in "fiub"]
     if not wrong and not (numbers[TIME].size > 1 and bool(np.isfinite(numbers[TIME]).all())):

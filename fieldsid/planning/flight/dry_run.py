@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fieldsid.dynamics.free_run import Trajectory, command_record, simulate
-from fieldsid.logs.run import Run
+from fieldsid.logs.run import STEP_LINES, Run
 from fieldsid.maneuvers import Limits, Maneuver, Parameters, Schedule, fly
 from fieldsid.models.axis import NAMES
 from fieldsid.models.model import Model
@@ -86,7 +86,9 @@ def run_of(
 
 def replayed(model: Model, record: Record, trajectory: Trajectory) -> Run:
     """Return the Run of a trajectory that was simulated along a record's fin."""
-    return run_of(model, trajectory.time, record.fin, trajectory.angle, trajectory.rate, speed=record.speed, name=record.name)
+    run = run_of(model, trajectory.time, record.fin, trajectory.angle, trajectory.rate, speed=record.speed, name=record.name)
+    lines = () if record.fin_line is None else zip(STEP_LINES[NAMES[model.axis].fin], record.fin_line, strict=True)
+    return replace(run, signals={**run.signals, **dict(lines)})
 
 
 def with_noise(run: Run, model: Model, seed: int) -> Run:

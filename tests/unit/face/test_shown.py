@@ -81,7 +81,7 @@ def test_a_repr_says_what_matters(held, kind, says):
     ("kind", "words"),
     [
         ("Change", ("yaw authority -16.7 +/- ", "damping", "gains")),
-        ("Comparison", ("pulses", "fit", "x the noise", "worst at")),
+        ("Comparison", ("pulses", "fit", "far more than the noise", "worst at")),
         ("TurnPrediction", ("rudder 0.3 rad, u_turn", "m at 1.00 .. 1.40 m/s", "extrapolated", "1 measured circle")),
         ("TurnRow", ("1.00 m/s, port: radius", "u-turn in", "u_turn, extrapolated")),
         ("MeasuredRow", ("circle, starboard: measured 4.0", "predicted")),

@@ -1,0 +1,97 @@
+"""An end of the heading's range, 0 or 360 deg, that stands where a compass read failed, told from a heading that is there.
+
+A heading comes to an end of its range and goes on behind it: seen around the circle it makes no jump. One that stands there for
+nothing jumps there and back time and again, always to the same number, and the samples between, by themselves, go on as if
+it were not there. A heading held at its wrap and interpolated the long way round (`heading_unwrap.py`) does not: there what lies
+between two visits of the end goes on from nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.logs.convert.clock import Track
+from fieldsid.logs.convert.heading_unwrap import FASTEST_RAD_S, MIN_JUMP_RAD, NOISES, TURN, noise_of_steps
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import BoolArray, FloatArray
+
+END_RAD = 1e-6
+"""How far from a multiple of a right angle, which every frame makes of it, an end of the range may be."""
+FEWEST = 3
+"""Visits by a jump from which on a number is a fill."""
+GOES_ON = 0.8
+"""Share of them over which the other samples must go on."""
+MOSTLY = 0.5
+"""Share of the samples between the first and the last visit from which on the heading itself is at the end."""
+FAST = 0.95
+"""Share of the steps below the fastest motion that is reckoned with; half of it again is allowed."""
+
+
+def without_fills(heading: Track) -> tuple[Track, list[Note]]:
+    """Return a heading (n,) in rad with fill values at the ends of its range missing, and notes that say so."""
+    values, notes = heading.values, list[Note]()
+    seen = np.flatnonzero(np.isfinite(values))
+    if seen.size <= 2 * FEWEST:
+        return heading, notes
+    for end in sorted({float(values[seen].min()), float(values[seen].max())}):
+        if abs(math.remainder(end, 0.5 * math.pi)) > END_RAD:
+            continue
+        fills = seen[_fills(heading.time[seen], values[seen], end)]
+        if fills.size:
+            values = values.copy()
+            values[fills] = np.nan
+            seen = np.flatnonzero(np.isfinite(values))
+            notes.append(_note(end, fills.size, values.size))
+    return Track(heading.time, values, heading.label), notes
+
+
+def _note(end: float, count: int, of: int) -> Note:
+    message = (
+        f"yaw_rad jumps to exactly {end:.6g} and back, an end of its range: {count} of {of} samples, taken as what is written "
+        "where a compass has nothing (now missing)"
+    )
+    return Note("dropouts", message, {"signal": "yaw_rad", "value": count, "limit": FEWEST, "number": end, "samples": count})
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _fills(time: FloatArray, values: FloatArray, end: float) -> BoolArray:
+    """Return which samples (n,) are a fill at an end of the range."""
+    at_end = values == end
+    begins, stops = _blocks(at_end)
+    inside = (begins > 0) & (stops < values.size)
+    before, after = begins[inside] - 1, stops[inside]
+    others = np.flatnonzero(~at_end)
+    none = np.zeros(values.size, dtype=np.bool_)
+    if others.size < 3 or before.size < FEWEST or at_end[before[0] : after[-1]].mean() > MOSTLY:
+        return none
+    steps, dt = _around(np.diff(values[others])), np.diff(time[others])
+    least = max(MIN_JUMP_RAD, NOISES * math.sqrt(2.0) * noise_of_steps(steps))
+    jumped = (np.abs(_around(values[before] - end)) > least + FASTEST_RAD_S * (time[before + 1] - time[before])) & (
+        np.abs(_around(values[after] - end)) > least + FASTEST_RAD_S * (time[after] - time[after - 1])
+    )
+    fastest = 1.5 * float(np.quantile(np.abs(steps) / dt, FAST))
+    over = np.abs(_around(values[after] - values[before])) <= least + fastest * (time[after] - time[before])
+    if jumped.sum() < FEWEST or over[jumped].mean() < GOES_ON:
+        return none
+    return np.asarray(at_end & _far(values, others, end, least))
+
+
+def _far(values: FloatArray, others: npt.NDArray[np.intp], end: float, least: float) -> BoolArray:
+    """Return the samples (n,) beside which, before or after, the heading was away from an end of its range."""
+    low = np.searchsorted(others, np.arange(values.size)).clip(1, others.size - 1)
+    off = np.abs(_around(values[others] - end))
+    return np.asarray((off[low - 1] > least) | (off[low] > least))
+
+
+def _blocks(mask: BoolArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return where the runs of a mask (n,) begin, and where the samples behind them are."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges[::2], edges[1::2]
+
+
+def _around(angle: FloatArray) -> FloatArray:
+    """Return angles (n,) in rad within half a turn."""
+    return np.asarray(angle - TURN * np.round(angle / TURN))
