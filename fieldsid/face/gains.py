@@ -83,7 +83,7 @@ def design_schedule(
     models: Models,
     *,
     controller: str | None = None,
-    damping: float = 0.7071,
+    damping: float | None = None,
     phase_margin: float = 45.0,
     speeds: str | Sequence[float] | None = None,
     fin_limit: float | None = None,
@@ -105,7 +105,6 @@ def design_schedule(
     from fieldsid.schedule import FinLimits, Wish
     from fieldsid.schedule import design_schedule as design
     from fieldsid.schedule.make import usual_controller
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
@@ -114,7 +113,7 @@ def design_schedule(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller or usual_controller(source), damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
+        wish=Wish(controller or usual_controller(source), damping, phase_margin),
         limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
         runs=runs_behind(source, _say),

@@ -16,9 +16,9 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.lockstep import parallel_map
-from fieldsid.schedule.best_constant import best_constant, held_at
 from fieldsid.schedule.flown.pace import LONGER, Pace, pace_of
 from fieldsid.schedule.flown.response import (
+    FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
     Steps,
@@ -34,14 +34,17 @@ from fieldsid.schedule.flown.response import (
 from fieldsid.schedule.flown.straight_leg import straight_leg
 from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, control_margins, margins, worst_of
-from fieldsid.schedule.plants import models_plants, plants_of
+from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.rows import DESIGN_DRAWS, place_of
+from fieldsid.schedule.rows import SEED as DESIGN_SEED
+from fieldsid.schedule.search.best_constant import best_constant, multiples_of
+from fieldsid.schedule.search.objective import Outcome, Place
+from fieldsid.schedule.wish import STEP_ANGLE_RAD
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 
 VERIFY_DRAWS = 60
 SEED = 77
-STEP_ANGLE_RAD = {Axis.YAW: 0.3490658503988659, Axis.PITCH: 0.17453292519943295}
-"""20 deg of heading, 10 deg of pitch."""
 STEPS_RAD = {
     Axis.YAW: (0.08726646259971647, STEP_ANGLE_RAD[Axis.YAW], 1.5707963267948966),
     Axis.PITCH: (0.03490658503988659, STEP_ANGLE_RAD[Axis.PITCH], 0.3490658503988659),
@@ -49,9 +52,6 @@ STEPS_RAD = {
 """A small, the standard and a large step: 5, 20 and 90 deg of heading, 2, 10 and 20 deg of pitch."""
 FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
-FLIGHT_ERROR_SHARE = 0.01
-"""What a flight is off its model's by, over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less
-than said, which is half a swing of settling where an overshoot just touches the corridor."""
 AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
 PITCH_LIMIT_RAD = 0.3490658503988659
@@ -120,6 +120,8 @@ class Check(Displayed):
     depth_overshoot: float
     depth_settling: float
     depth_flown: float
+    outcome: Outcome
+    """What the gains come to by the objective that rows are designed for."""
 
     @property
     def overshoot(self) -> float:
@@ -159,7 +161,7 @@ class Check(Displayed):
             "fin_offset_error_rad": self.bent_error, "fin_offset_error_unknown_rad": self.bent_error_unknown,
             "leg_rms_rad": self.leg_rms, "leg_fin_rms_rad": self.leg_fin_rms,
             "depth_overshoot_percent": 100 * self.depth_overshoot, "depth_settling_s": self.depth_settling,
-            "depth_flown_s": self.depth_flown,
+            "depth_flown_s": self.depth_flown, "answer_s": self.outcome.settled, "fin_use": self.outcome.fin,
         }  # fmt: skip
 
 
@@ -209,11 +211,13 @@ class Verification(Plotted):
     """The largest curvature (1/m) that the runs held, NaN where each speed has a model of its own."""
     actuator: Mapping[str, float | None]
     """Lag (s), delay (s), rate limit (rad/s) and latency (s) that it was flown with."""
+    worse: tuple[bool, ...]
+    """Whether the constant gain is better, by speed."""
 
     @property
     def extrapolated(self) -> tuple[float, float] | None:
         """The smallest step (rad) that turns tighter than the runs did, and the least share of its curvature that they held."""
-        for i, size in enumerate(STEPS_RAD[self.schedule.axis]):
+        for i, size in enumerate(steps_of(self.schedule)):
             held = min(self.tightest_flown / max(tightest(flown.scheduled[i]), 1e-9) for flown in self.flown)
             if held < MIN_COVERED_SHARE:
                 return size, held
@@ -260,25 +264,41 @@ def verify_schedule(
         of = plants_of(source, limits, runs, schedule.provenance.get("length_m"))
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
-    seen, size = of.tightest_flown, STEP_ANGLE_RAD[schedule.axis]
+    seen, size = of.tightest_flown, schedule.wish.step_of(schedule.axis)
     paces = [pace_of(plant, schedule.at(plant.speed).fin_limit, size) for plant in plants]
-    constant = best_constant(schedule, plants, paces, step=size)
+    judged = [_judged(of, schedule, speed) for speed, _ in places]
+    one = best_constant(multiples_of([r.gains for r in schedule.rows]), judged)
+    constant = replace(schedule.rows[0], gains=one)
 
     def checked(i: int) -> tuple[Check, Check, FlownSet]:
         speed, knot = places[i]
-        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), seen, knot=knot)
-        one, steps, leg = _check(flight, schedule.at(speed), schedule.rows, constant=False)
-        held = held_at(constant, schedule, speed)
+        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), seen, judged[i], knot=knot)
+        own, steps, leg = _check(flight, schedule.at(speed), schedule.rows, constant=False)
+        held = replace(schedule.at(speed), gains=one)
         other, theirs, _ = _check(flight, held, (held,), constant=True)
-        return one, other, FlownSet(speed, paces[i], steps, theirs, leg)
+        return own, other, FlownSet(speed, paces[i], steps, theirs, leg)
 
     scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
     kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
     unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
+    demands = [place.demand for place in judged]
+    worse = tuple(a.outcome.worse_than(b.outcome, d) for a, b, d in zip(scheduled, compared, demands, strict=True))
     return Verification(
-        schedule, scheduled, compared, constant, flown, draws, spread, of.draws_of, kept, heard, unstable, seen, of.actuator
+        schedule, scheduled, compared, constant, flown, draws, spread, of.draws_of, kept, heard, unstable, seen, of.actuator, worse
     )
+
+
+def steps_of(schedule: Schedule) -> tuple[float, float, float]:
+    """Return the steps (rad) that a schedule is tried with: the standard ones, its own in place of the middle one."""
+    small, _, large = STEPS_RAD[schedule.axis]
+    return small, schedule.wish.step_of(schedule.axis), large
+
+
+def _judged(of: Plants, schedule: Schedule, speed: float) -> Place:
+    """Return where gains are judged by the objective: on the draws that the rows were designed on."""
+    limit = schedule.at(speed).fin_limit
+    return place_of(of.at(speed, limit, DESIGN_DRAWS, DESIGN_SEED), schedule.wish, limit, schedule.answer.settling)
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
@@ -303,6 +323,7 @@ class _Flight:
     schedule: Schedule
     noise: Noise | None
     seen: float
+    place: Place
     knot: bool
 
 
@@ -311,8 +332,9 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     phase, gain, delay = control_margins(plant, row.gains)
     found = margins(plant, row.gains)
     least_phase, least_gain, least_delay = found.worst()
-    flights = [_flown_to_rest(plant, rows, size, pace) for size in STEPS_RAD[schedule.axis]]
-    small, usual, large = (_step(s, size) for s, size in zip(flights, STEPS_RAD[schedule.axis], strict=True))
+    sizes = steps_of(schedule)
+    flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]
+    small, usual, large = (_step(s, size) for s, size in zip(flights, sizes, strict=True))
     large = _with_what_is_known(large, flights[2], plant, flight.seen)
     known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
@@ -327,6 +349,7 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
         (small, usual, large), float(np.min(flights[2].speed[:, 0])),
         float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
         float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled, pace.leg,
+        flight.place.outcome(row.gains),
     )  # fmt: skip
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
 

@@ -12,7 +12,7 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule.design import Wish
+from fieldsid.schedule.wish import Wish
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import DEPTH_STEP_M, PITCH_LIMIT_RAD, verify_schedule

@@ -12,7 +12,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.plant.parameter_source import load_parameter_source
-from fieldsid.schedule.design import Wish
+from fieldsid.schedule.wish import Wish
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import checked_speeds, verify_schedule

@@ -15,7 +15,7 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource, source_of_models
-from fieldsid.schedule.design import Wish
+from fieldsid.schedule.wish import Wish
 from fieldsid.schedule.flown.response import overshoot, settling, swing
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule, usual_controller

@@ -23,7 +23,7 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource, source_of_models
-from fieldsid.schedule.design import Wish
+from fieldsid.schedule.wish import Wish
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.record import Schedule
 from fieldsid.schedule.verify import STEPS_RAD, StepCheck, verify_schedule

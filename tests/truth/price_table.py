@@ -24,7 +24,7 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule import optimum
-from fieldsid.schedule.design import Wish
+from fieldsid.schedule.wish import Wish
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import STEPS_RAD
 from truth.gain_table import FLOWN_S, HUNTS, identified, law_of

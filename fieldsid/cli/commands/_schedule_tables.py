@@ -25,7 +25,7 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
 
     from fieldsid.rounding import number
     from fieldsid.schedule.verdict import fin_of, lost
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
+    from fieldsid.schedule.verify import steps_of
 
     (times, angle), extra = shown_in("rad"), ("kz",) if schedule.depth else ()
     rows = [
@@ -52,7 +52,7 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
     to.print(f"counted with: {'; '.join(counted)}")
     to.print(
         f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}; "
-        f"held: those that come to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
+        f"held: those that come to rest from a {degrees(steps_of(schedule)[1]):.0f} deg step"
     )
     if rejected := schedule.provenance["draws_rejected"]:
         to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")

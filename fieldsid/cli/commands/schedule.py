@@ -31,7 +31,7 @@ Controller = Annotated[
     str | None,
     typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr; pd where the runs have a rate, else p."),
 ]
-Damping = Annotated[float, typer.Option("--damping", help="Damping ratio of the closed loop.")]
+Damping = Annotated[float | None, typer.Option("--damping", help="Damping ratio of the closed loop.")]
 PhaseWanted = Annotated[str, typer.Option("--phase-margin", metavar="ANGLE", help="Phase margin to keep, `45deg`.")]
 Speeds = Annotated[
     str | None, typer.Option("--speeds", metavar="LIST", help="Speeds of the rows, m/s; those of the models if not given.")
@@ -99,7 +99,7 @@ Write = Annotated[bool, typer.Option("--write", help="Change the file of `--into
 def design(
     models: ModelFiles,
     controller: Controller = None,
-    damping: Damping = 0.7071,
+    damping: Damping = None,
     phase_margin: PhaseWanted = "45deg",
     speeds: Speeds = None,
     fin_limit: FinLimit = None,
@@ -128,11 +128,10 @@ def design(
     from fieldsid.face.arguments import length_of, runs_behind
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.schedule.design import Wish
+    from fieldsid.schedule.wish import Wish
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import body_of, save_schedule
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
@@ -145,7 +144,7 @@ def design(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller or usual_controller(source), damping, margin, STEP_ANGLE_RAD[source.axis]),
+        wish=Wish(controller or usual_controller(source), damping, margin),
         limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
         runs=runs_behind(source, say),
