@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
+from fieldsid.schedule.check import Check
 from fieldsid.schedule.flown.response import Steps
-from fieldsid.schedule.search.objective import DRAWS_MARGIN_SHARE
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import Check, Verification, steps_of
+from fieldsid.schedule.search.objective import DRAWS_MARGIN_SHARE
+from fieldsid.schedule.verify import Verification, steps_of
 
 SHOWN_SHARE = 25.0 / 60.0
 """Of a flight: a step that serves has settled by then."""

@@ -8,12 +8,12 @@ from math import ceil, degrees
 
 from fieldsid.errors import UsageError
 from fieldsid.runtime.lockstep import parallel_map
-from fieldsid.schedule.design import Sought, answering, designed, quickest, with_bandwidth
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants
 from fieldsid.schedule.record import Row
 from fieldsid.schedule.search.best_constant import best_constant, improved, multiples_of
+from fieldsid.schedule.search.design import Sought, answering, designed, quickest, with_bandwidth
 from fieldsid.schedule.search.objective import BETTER_SHARE, Place, demand_of
 from fieldsid.schedule.wish import QUICKEST, Wish
 

@@ -9,10 +9,11 @@ from typing import Any
 
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.rounding import number
+from fieldsid.schedule.check import READ_OFF
 from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import DEPTH_STEP_M, READ_OFF, Verification, steps_of
+from fieldsid.schedule.verify import DEPTH_STEP_M, Verification, steps_of
 
 MOST_NAMED = 3
 
@@ -116,8 +117,8 @@ def against_constant(checked: Verification) -> str:
     named = ", ".join(f"{n} {number(v, 3)}" for n, v in (("kp", row.kp), ("ki", row.ki), ("kd", row.kd)) if v or n == "kp")
     lacking = next((c for c in checked.constant if not c.outcome.serves), None)
     ours, theirs = (max(c.outcome.settled for c in part) for part in (checked.scheduled, checked.constant))
-    if any(checked.worse):
-        where = ", ".join(number(c.speed, 3) for c, worse in zip(checked.scheduled, checked.worse, strict=True) if worse)
+    if checked.worse:
+        where = ", ".join(number(speed, 3) for speed in checked.worse)
         return f"one constant gain, {named}, is better at {where} m/s: {_compared(ours, theirs)}"
     if lacking is not None and all(c.outcome.serves for c in checked.scheduled):
         return f"no one gain for all speeds keeps what was asked: the best, {named}, does not at {number(lacking.speed, 3)} m/s"

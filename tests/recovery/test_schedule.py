@@ -12,10 +12,10 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.plant.parameter_source import load_parameter_source
-from fieldsid.schedule.wish import Wish
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import checked_speeds, verify_schedule
+from fieldsid.schedule.wish import Wish
 
 KNOTS = (1.2, 1.6, 2.0)
 FINS = Fins(lag=0.15, rate=1.0, limit=0.3)

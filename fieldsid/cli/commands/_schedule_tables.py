@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.plant.parameter_source import ParameterSource
+    from fieldsid.schedule.check import Check, StepCheck
     from fieldsid.schedule.record import Schedule
-    from fieldsid.schedule.verify import Check, StepCheck, Verification
+    from fieldsid.schedule.verify import Verification
 
 SLOWED_SHARE = 0.995
 """Below it a row's share is not printed as 1.00."""

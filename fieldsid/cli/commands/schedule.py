@@ -128,10 +128,10 @@ def design(
     from fieldsid.face.arguments import length_of, runs_behind
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.schedule.wish import Wish
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import body_of, save_schedule
+    from fieldsid.schedule.wish import Wish
 
     refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)

@@ -12,6 +12,7 @@ from fieldsid.schedule.search.optimum import minimum
 MULTIPLES = (1.0, 0.7, 1.4, 0.5, 2.0)
 FARTHEST = log(1.5)
 
+
 def best_constant(candidates: Sequence[Gains], places: Sequence[Place]) -> Gains:
     """Return the gains of least cost at the speed where they cost most; of those that cost alike, the ones of less fin."""
     best, least = candidates[0], (inf, inf)

@@ -16,7 +16,9 @@ def bound_by(search: Search, found: Found) -> str:
     """Return what keeps gains that were sought as quick as may be from more bandwidth."""
     demand, wish = search.place.demand, search.wish
     if found.share >= 1.0 - 2.0 * PLACE_ROUNDING:
-        return f"damping {number(wish.damped, 3)}" if demand.fin_use > demand.fin_of(found.gains) * A_LITTLE_MORE else _fin(demand)
+        return (
+            f"damping {number(wish.damped, 3)}" if demand.fin_use > demand.fin_of(found.gains) * A_LITTLE_MORE else _fin(demand)
+        )
     share = A_LITTLE_MORE * found.share
     outcome = search.at(share, max(found.more, search.needed(share))).outcome
     lacks = dict(zip(_words(demand, wish), (*outcome.own, *outcome.drawn), strict=True))

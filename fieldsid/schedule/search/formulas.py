@@ -55,7 +55,7 @@ def _rate(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
 
     def gains(share: float, more: float) -> Gains:
         w = omega * share
-        return Gains(kp=(w * w - min(k, 0.5 * w * w)) / b, kd=max(2.0 * wish.damped * more * w - a, 0.0) / b)
+        return Gains(kp=(w * w - min(k, 0.5 * w * w)) / b, kd=max(2.0 * wish.damped * more * w - a, 0.0) / b + 0.0)
 
     return gains
 

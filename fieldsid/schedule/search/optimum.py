@@ -23,7 +23,7 @@ PLACE_ROUNDING = 1e-3
 """To how much of an e-fold the least is found: gains to a thousandth."""
 NEARLY = 0.95
 """The whole fin is taken where a little less settles no sooner."""
-MOST_TRIES = 12
+MOST_TRIES, MOST_TURNS = 12, 4
 NEAR_DAMPING = 0.3
 """How far from the damping of the quickest gains, in e-folds, that of slower ones is sought."""
 
@@ -74,10 +74,15 @@ class Search:
     def least_fin(self, quick: Found) -> Found:
         """Return the gains of least fin that settle as soon as is asked; the quickest where these do not."""
         bare = self.at(quick.share, self.needed(quick.share))
-        slowed = self._better(self._slowed(quick), self._slowed(bare))
-        near = log(slowed.more)
-        more = least(self._of_damping(slowed.share), max(near - NEAR_DAMPING, 0.0), near + NEAR_DAMPING)
-        return self._better(slowed, self._slowed(self.at(slowed.share, min(exp(more), self.most_damping))))
+        found = self._better(self._slowed(quick), self._slowed(bare))
+        for _ in range(MOST_TURNS):
+            near = log(found.more)
+            more = least(self._of_damping(found.share), max(near - NEAR_DAMPING, 0.0), near + NEAR_DAMPING)
+            better = self._better(found, self._slowed(self.at(found.share, min(exp(more), self.most_damping))))
+            gained, found = found.share / better.share - 1.0, better
+            if gained < PLACE_ROUNDING:
+                break
+        return found
 
     def _better(self, *found: Found) -> Found:
         return min(found, key=lambda f: (self.cost(f), f.share))
