@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
-    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
+    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "quantities", "strict",
     "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
     "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
     "trial_folder", "change", "reporting", "figures", "views", "face",

@@ -2,8 +2,8 @@
 
 Every hull is drawn, flown with sensor noise, identified from pulses, given all three, and steered by each at its speeds:
     python tests/truth/against_table.py --draws 7 --seed 7 [--controller pd] [--settling quickest]
-`said` is what verify says at the rows, `flown` what a step of 20 deg does on the hull itself. `worse` counts rows that the constant
-gain is better than by more than 1 % of the objective: it lacks less, settles sooner than all rows are to, or asks for less fin.
+`said` is what verify says at the rows, `flown` what a step of 20 deg does on the hull itself. The last line counts rows that the
+constant gain is better than by more than 1 %: it lacks less, settles sooner where a row is late, or asks for less fin.
 """
 
 from __future__ import annotations

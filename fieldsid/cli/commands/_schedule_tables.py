@@ -38,22 +38,23 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
             number(times * r.feed_forward, 3),
             number(times * r.fin_limit, 3),
             *((number(r.depth_gain, 3),) if schedule.depth else ()),
+            f"{100 * r.fin_use:.0f}%",
             f"{r.phase_margin_deg:.0f}",
-            f"{r.slowed:.2f}",
             f"{r.settling:.1f}" if isfinite(r.settling) else "never",
             f"{100 * r.draws_held:.0f}%",
             "yes" if r.supported else "no",
+            r.binds,
         )
         for r in schedule.rows
     ]
-    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "settle s", "held", "data")
+    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "asks", "phase", "settle s", "held", "data", "bound by")
     to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angle}", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
     counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
     to.print(f"counted with: {'; '.join(counted)}")
     to.print(
-        f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}; "
-        f"held: those that come to rest from a {degrees(steps_of(schedule)[1]):.0f} deg step"
+        f"asks: of the fin by a {degrees(steps_of(schedule)[1]):.0f} deg step; phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}; "
+        "held: those that come to rest from that step"
     )
     if rejected := schedule.provenance["draws_rejected"]:
         to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")
