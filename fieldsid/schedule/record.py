@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import load_record, save_record
-from fieldsid.display import Brief, Displayed, Plotted
+from fieldsid.display import Brief, Displayed, InControl, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
@@ -100,7 +100,7 @@ class Answer(Brief):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Schedule(Plotted):
+class Schedule(InControl, Plotted):
     """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions).
 
     actuator is the fin's lag, delay and rate that the design counted with, stated those of them that were said, not modelled;

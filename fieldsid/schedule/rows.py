@@ -74,9 +74,14 @@ def _too_quick(slowest: Sought, settling: float) -> UsageError:
     possible = ceil(10.0 * (1.0 + BETTER_SHARE) * slowest.settled) / 10.0
     return UsageError(
         f"no gains settle a {degrees(slowest.step):.3g} deg step within {settling:.3g} s at {slowest.plant.speed:.3g} m/s",
-        found=f"{slowest.settled:.3g} s there, bound by {slowest.binds}",
+        found=f"{slowest.settled:.3g} s there, bound by {slowest.binds}; {_path(slowest)}",
         hint=f"`--settling {possible:g}s` is possible at all of these speeds, `--settling quickest` leaves each its own",
     )
+
+
+def _path(sought: Sought) -> str:
+    """Return the fin's lag and delay in words: they are what a margin is lost to."""
+    return f"fin lag {sought.plant.lag[0]:.3g} s, delay {sought.plant.delay[0]:.3g} s"
 
 
 def _with_bandwidth(quick: Sequence[Sought], bandwidth: float) -> list[Sought]:
@@ -86,7 +91,7 @@ def _with_bandwidth(quick: Sequence[Sought], bandwidth: float) -> list[Sought]:
         possible = float(f"{0.99 * slowest.bandwidth:.2g}")
         raise UsageError(
             f"no gains have a bandwidth of {bandwidth:.3g} rad/s at {slowest.plant.speed:.3g} m/s",
-            found=f"{slowest.bandwidth:.3g} rad/s there, bound by {slowest.binds}",
+            found=f"{slowest.bandwidth:.3g} rad/s there, bound by {slowest.binds}; {_path(slowest)}",
             hint=f"`--bandwidth {possible:g}rad/s` is possible at all of these speeds",
         )
     return [sought for sought in found if sought is not None]

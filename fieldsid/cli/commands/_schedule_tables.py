@@ -43,17 +43,19 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
             f"{r.settling:.1f}" if isfinite(r.settling) else "never",
             f"{100 * r.draws_held:.0f}%",
             "yes" if r.supported else "no",
-            r.binds,
         )
         for r in schedule.rows
     ]
-    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "asks", "phase", "settle s", "held", "data", "bound by")
+    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "asks", "phase", "settle s", "held", "data")
     to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angle}", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
     counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
     to.print(f"counted with: {'; '.join(counted)}")
+    for binds in dict.fromkeys(r.binds for r in schedule.rows):
+        to.print(f"bound by {binds}: {', '.join(number(r.speed, 3) for r in schedule.rows if r.binds == binds)} m/s")
+    drawn = f"{schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}"
     to.print(
-        f"asks: of the fin by a {degrees(steps_of(schedule)[1]):.0f} deg step; phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}; "
+        f"asks: of the fin by a {degrees(steps_of(schedule)[1]):.0f} deg step; phase, settle: the worst of 95 % of {drawn}; "
         "held: those that come to rest from that step"
     )
     if rejected := schedule.provenance["draws_rejected"]:
@@ -136,6 +138,7 @@ def _settles(seconds: float, step: StepCheck) -> str:
 def render_export(to: Console, body: Mapping[str, Any]) -> None:
     """Print the file written, or the text where there is none."""
     if body["file"]:
-        to.print(f"exported: {body['file']}", soft_wrap=True)
+        to.out(body["difference"], end="", highlight=False)
+        to.print(f"exported: {body['file']}" + (f"; as it was: {body['backup']}" if body["backup"] else ""), soft_wrap=True)
     else:
         to.out(body["text"], end="", highlight=False)

@@ -297,10 +297,10 @@ def export(
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
-    """Write a schedule as plain YAML, ROS 2 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
+    """Write a schedule as plain YAML, ROS 2 or PX4 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
 
     `--into FILE --key A.B.C` shows how an existing YAML file would change, comments and order kept, and changes it only with
-    `--write`; the file as it was is kept as .bak.
+    `--write`. A file that is changed, or replaced by `-o FILE --force`, is kept as it was as .bak, and the difference is shown.
 
     Example: sysid schedule export gains.yaml --to ros2 -o heading.yaml
     """
@@ -318,12 +318,23 @@ def export(
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
     body: dict[str, Any] = {"schema": "fieldsid/export/1", "target": target.name, "text": text, "file": None}
+    body |= {"difference": "", "backup": None}
     if output is not None:
-        from fieldsid.artifacts import write_text
-
-        body["file"] = str(write_text(output, text, force=force))
+        body |= _written(output, text, force=force)
     headline, is_file = of_export(body, schedule), body["file"] is None
     return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline, is_file=is_file)
+
+
+def _written(output: Path, text: str, *, force: bool) -> dict[str, Any]:
+    """Write an export; of a file that it replaces the difference is shown and a backup kept."""
+    from fieldsid.artifacts import write_text
+    from fieldsid.exports._patch import patch_text, write_patch
+
+    if not (force and output.is_file()):
+        return {"file": str(write_text(output, text, force=force))}
+    patch = patch_text(output, text)
+    backup = str(write_patch(patch)) if patch.difference else None
+    return {"file": str(output), "difference": patch.difference, "backup": backup}
 
 
 def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:

@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.search.formulas import Formula, formula_of
 from fieldsid.schedule.search.objective import LACK_ROUNDING, Outcome, Place
-from fieldsid.schedule.wish import MOST_DAMPING, RATE_FED, Wish
+from fieldsid.schedule.wish import DAMPING, MOST_DAMPING, RATE_FED, Wish
 
 SLOWEST_SHARE = 0.03
 SCANNED = 7
@@ -66,10 +66,15 @@ class Search:
 
     def quickest(self) -> Found:
         """Return the gains that settle soonest, or of a formula the largest, that lack nothing, or the least."""
-        top, less = (self.at(share, self.needed(share)) for share in (1.0, NEARLY))
+        top, less = (self.usual(share) for share in (1.0, NEARLY))
         if top.outcome.serves and self.cost(top) <= self.cost(less):
             return self.damped(1.0)
-        return self.damped(exp(minimum(lambda x: self.cost(self.at(exp(x), self.needed(exp(x)))), log(SLOWEST_SHARE), 0.0)))
+        return self.damped(exp(minimum(lambda x: self.cost(self.usual(exp(x))), log(SLOWEST_SHARE), 0.0)))
+
+    def usual(self, share: float) -> Found:
+        """Return the gains of a share with the usual damping, or that which poles and margins need."""
+        usual = DAMPING / self.wish.damped if self.most_damping > 1.0 else 1.0
+        return self.at(share, max(self.needed(share), usual))
 
     def least_fin(self, quick: Found) -> Found:
         """Return the gains of least fin that settle as soon as is asked; the quickest where these do not."""

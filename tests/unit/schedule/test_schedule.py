@@ -305,9 +305,9 @@ def test_where_one_constant_gain_is_better_it_is_said(yaw):
     rows = [replace(r, gains=r.gains.times(0.2) if i else r.gains) for i, r in enumerate(slow.rows)]
     checked = verify_schedule(replace(slow, rows=tuple(rows)), yaw, draws=4)
     assert checked.slowest[1] < checked.slowest[0]
-    assert against_constant(checked).startswith(
-        "one constant gain, kp -0.372, is better at 1.36, 1.63, 1.92, 2.19 m/s: the slowest step settles in "
-    )
+    assert checked.worse == slow.speeds[1:]
+    assert against_constant(checked).startswith("one constant gain, kp ")
+    assert "is better at 1.36, 1.63, 1.92, 2.19 m/s: the slowest step settles in " in against_constant(checked)
     assert all(c.phase_least_deg >= 44.0 - 1.5 for c in checked.constant)
 
 
