@@ -52,7 +52,8 @@ def design_rows(plants: Plants, knots: Sequence[float], asked: Asked) -> tuple[t
 def place_of(plant: LinearPlant, wish: Wish, fin_limit: float, answer: float) -> Place:
     """Return where the gains of one speed are tried: its plant with what is asked there."""
     family = plant.distinct()
-    return Place(family, demand_of(family, wish, fin_limit, answer))
+    place = Place(family, demand_of(family, wish, fin_limit, answer))
+    return place if wish.bandwidth is None else place.with_bandwidth(wish.bandwidth)
 
 
 def _answer(quick: Sequence[Sought], wish: Wish) -> float:

@@ -37,4 +37,11 @@ def _words(demand: Demand, wish: Wish) -> list[str]:
     own = (f"damping {number(wish.damped, 3)}", f"phase margin {number(margin, 3)} deg", _fin(demand))
     over = (f"overshoot {number(100.0 * o, 3)} %" for o in (demand.own_overshoot, demand.draws_overshoot))
     (ours, theirs), half = over, number(DRAWS_MARGIN_SHARE * margin, 3)
-    return [*own, ours, f"phase margin {half} deg by the draws", f"{theirs} by the draws", "swing after the step by the draws"]
+    return [
+        *own,
+        "bandwidth",
+        ours,
+        f"phase margin {half} deg by the draws",
+        f"{theirs} by the draws",
+        "swing after the step by the draws",
+    ]

@@ -108,11 +108,11 @@ def answering(quick: Sought, answer: float, says: str) -> Sought:
 
 def with_bandwidth(quick: Sought, bandwidth: float) -> Sought | None:
     """Return the gains of a bandwidth (rad/s) with the damping that suits it best, None where they do not serve."""
-    share = quick.found.share * bandwidth / quick.bandwidth
-    found = quick.search.damped(share)
+    search = replace(quick.search, place=quick.search.place.with_bandwidth(bandwidth))
+    found = search.damped(quick.found.share * bandwidth / quick.bandwidth)
     if not found.outcome.serves:
         return None
-    return replace(quick, found=found, binds=f"bandwidth {bandwidth:.3g} rad/s", slowed=1.0)
+    return replace(quick, search=search, found=found, binds=f"bandwidth {bandwidth:.3g} rad/s", slowed=1.0)
 
 
 def designed(sought: Sought) -> Designed:

@@ -33,6 +33,7 @@ from fieldsid.schedule.flown.response import (
 from fieldsid.schedule.linear_plant import LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, PlantResponse, margins, margins_of, plant_response, worst_of
 from fieldsid.schedule.record import Row
+from fieldsid.schedule.search.formulas import bandwidth_of
 from fieldsid.schedule.wish import QUICKEST, Wish, overshoot_of
 
 DRAWS_MARGIN_SHARE = 0.5
@@ -57,7 +58,7 @@ class Demand:
 
     The step may ask for `fin_use` of `fin_limit` (rad), the estimate may overshoot by `own_overshoot` and 95 % of the draws by
     `draws_overshoot`, as shares. It is flown at `pace`, and is to settle within `settling` s; with `largest` the largest gain
-    that leaves all that is the best, as a formula has it.
+    that leaves all that is the best, as a formula has it. The formula's poles are to have a `bandwidth` (rad/s), if one is asked.
     """
 
     damping: float
@@ -70,6 +71,7 @@ class Demand:
     pace: Pace
     settling: float = QUICKEST
     largest: bool = False
+    bandwidth: float | None = None
 
     def fin_of(self, gains: Gains) -> float:
         """Return the share of the fin's limit that the step asks for."""
@@ -80,8 +82,8 @@ class Demand:
 class Outcome:
     """What gains come to: settling (s), the share of the fin that the step asks for, |kp|, and what is lacked, as shares.
 
-    `own` is what the estimate lacks of damping, phase margin, fin and overshoot, `drawn` what the draws do of phase margin,
-    overshoot and rest.
+    `own` is what the estimate lacks of damping, phase margin, fin, bandwidth and overshoot, `drawn` what the draws do of phase
+    margin, overshoot and rest.
     """
 
     own: tuple[float, ...]
@@ -125,7 +127,16 @@ def demand_of(family: LinearPlant, wish: Wish, fin_limit: float, answer: float =
     # poles other than the designed pair (an integrator's, the fin's) may be a little less damped, never below half
     floor = damping if wish.kind == "p" and damping < 1.0 else min(damping, 1.0) * 0.8
     return Demand(
-        floor, wish.phase_margin_deg, step, own, min(drawn, own), fin_limit, wish.most_fin, pace, answer, wish.is_formula
+        floor,
+        wish.phase_margin_deg,
+        step,
+        own,
+        min(drawn, own),
+        fin_limit,
+        wish.most_fin,
+        pace,
+        answer,
+        wish.is_formula or wish.bandwidth is not None,
     )
 
 
@@ -153,6 +164,10 @@ class Place:
         pace = replace(self.demand.pace, flight=max(self.demand.pace.flight, ANSWER_TIMES * answer))
         return Place(self.plant, replace(self.demand, settling=answer, pace=pace))
 
+    def with_bandwidth(self, bandwidth: float) -> Place:
+        """Return the same with a bandwidth (rad/s) asked for in place of the largest gain."""
+        return Place(self.plant, replace(self.demand, largest=False, bandwidth=bandwidth))
+
     def linear_lacks(self, gains: Gains) -> tuple[list[float], list[float]]:
         """Return `own` and `drawn` of an outcome as far as they need no flight."""
         demand, found = self.demand, margins_of(self.known, gains)
@@ -161,6 +176,7 @@ class Place:
             max(demand.damping - float(found.damping[0]), 0.0) / demand.damping,
             max(asked - float(phase[0]), 0.0) / asked,
             max(demand.fin_of(gains) / demand.fin_use - 1.0, 0.0),
+            0.0 if demand.bandwidth is None else abs(bandwidth_of(self.plant.one(), gains) / demand.bandwidth - 1.0),
             0.0,
         ]
         return own, [_of_draws((DRAWS_MARGIN_SHARE * asked - phase) / asked) if self.plant.count > 1 else 0.0, 0.0, 0.0]
@@ -182,7 +198,7 @@ class Place:
             return Outcome(tuple(own), tuple(drawn), inf, fin, kp)
         time, angle = self.step(gains)
         moved = about_rest(angle, demand.step)
-        own[3] = max(float(overshoot(angle, demand.step)[0]) - demand.own_overshoot, 0.0)
+        own[4] = max(float(overshoot(angle, demand.step)[0]) - demand.own_overshoot, 0.0)
         drawn[1] = _of_draws(overshoot(moved, demand.step) - demand.draws_overshoot)
         drawn[2] = _of_draws(swing(angle, demand.step) - LIMIT_CYCLE_SHARE)
         settled = smooth_settling(time, moved, demand.step)

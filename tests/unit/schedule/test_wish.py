@@ -35,11 +35,12 @@ def source_of(a22=0.9, b2=-0.8, lag=0.2, quadratic=0.6, spread=0.04):
 
 
 def places(source, schedule):
-    plants = models_plants(source, FinLimits(), ())
-    return [
-        place_of(plants.at(r.speed, LIMIT, DESIGN_DRAWS, SEED), schedule.wish, LIMIT, schedule.answer.settling)
-        for r in schedule.rows
-    ]
+    plants, answer = models_plants(source, FinLimits(), ()), schedule.answer.settling
+    return [place_of(plants.at(u, LIMIT, DESIGN_DRAWS, SEED), schedule.wish, LIMIT, answer) for u in schedule.speeds]
+
+
+def settled(source, schedule):
+    return np.array([p.outcome(r.gains).settled for p, r in zip(places(source, schedule), schedule.rows, strict=True)])
 
 
 @pytest.mark.parametrize("settling", [None, QUICKEST], ids=["one answer", "quickest"])
@@ -63,8 +64,7 @@ def test_no_constant_gain_is_better_in_any_row(seed, settling):
 def test_all_speeds_settle_alike_and_the_gain_falls_with_the_square_of_the_speed():
     source = source_of()
     schedule = design_schedule(source, LIMIT, speeds=SPEEDS, wish=Wish("pd"))
-    settled = [p.outcome(r.gains).settled for p, r in zip(places(source, schedule), schedule.rows, strict=True)]
-    assert max(settled) / min(settled) < 1.03
+    assert np.ptp(np.log(settled(source, schedule))) < 0.03
     power = np.polyfit(np.log(SPEEDS), np.log(np.abs(schedule.column("kp"))), 1)[0]
     assert -2.3 < power < -1.4
     assert schedule.rows[0].binds == "fin at 20.0 deg"
@@ -79,9 +79,7 @@ def test_all_speeds_settle_alike_and_the_gain_falls_with_the_square_of_the_speed
 def test_an_answer_that_is_asked_is_the_answer_and_a_quicker_one_is_refused_with_what_is_possible():
     source = source_of()
     asked = design_schedule(source, LIMIT, speeds=SPEEDS, wish=Wish("pd", settling=9.0))
-    assert all(
-        p.outcome(r.gains).settled == pytest.approx(9.0, rel=0.02) for p, r in zip(places(source, asked), asked.rows, strict=True)
-    )
+    assert settled(source, asked) == pytest.approx(9.0, rel=0.02)
     assert all(r.fin_use < 0.9 for r in asked.rows)
     with pytest.raises(UsageError, match=r"within 2 s at 1 m/s") as caught:
         design_schedule(source, LIMIT, speeds=SPEEDS, wish=Wish("pd", settling=2.0))
@@ -91,12 +89,14 @@ def test_an_answer_that_is_asked_is_the_answer_and_a_quicker_one_is_refused_with
     assert design_schedule(source, LIMIT, speeds=SPEEDS, wish=Wish("pd", settling=possible)).answer.settling == possible
 
 
-@pytest.mark.parametrize(("latency", "step", "bound"), [(0.0, None, "fin at 20.0 deg"), (0.6, 0.03, "phase margin")])
+@pytest.mark.parametrize(
+    ("latency", "step", "bound"), [(0.0, None, "fin at 20.0 deg; .*"), (0.6, 0.03, "(damping|phase margin) .*delay 0.6 s")]
+)
 def test_a_bandwidth_is_kept_and_one_beyond_fin_or_latency_is_refused_with_what_is_possible(latency, step, bound):
     source, limits = source_of(), FinLimits(latency=latency)
     with pytest.raises(UsageError, match="bandwidth of 6 rad/s") as caught:
         design_schedule(source, LIMIT, speeds=SPEEDS, wish=Wish("pd", bandwidth=6.0, step=step), limits=limits)
-    assert bound in caught.value.found
+    assert re.search(f"bound by {bound}", caught.value.found)
     possible = float(re.search(r"--bandwidth ([0-9.]+)rad/s", caught.value.hint).group(1))
     made = design_schedule(source, LIMIT, speeds=SPEEDS, wish=Wish("pd", bandwidth=possible, step=step), limits=limits)
     authority = [0.8 * (u / 1.5) ** 2 for u in SPEEDS]
