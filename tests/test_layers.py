@@ -16,10 +16,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fieldsid"
 
 ORDER = (
-    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "quantities",
-    "strict", "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting",
-    "estimators", "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule",
-    "exports", "trial_folder", "change", "reporting", "figures", "views", "face",
+    "_version", "errors", "numerics", "runtime", "registry", "page", "display", "artifacts", "rounding", "angles", "strict",
+    "templates", "guide", "logs", "vehicle", "maneuvers", "models", "effects", "dynamics", "noise", "fitting", "estimators",
+    "comparison", "planning", "online", "diagnosis", "extension", "batch", "plant", "turning", "schedule", "exports",
+    "trial_folder", "change", "reporting", "figures", "views", "face",
     "demo", "cli", "__main__",
 )  # fmt: skip
 """A room may import itself and what stands before it."""

@@ -165,14 +165,14 @@ def design(
     alike, each with the least fin that does: as soon as asked, else as the slowest can. P and PI have the damping's gain. Each
     row says what binds it, and what none holds is refused with what is possible. The feed-forward cancels the trim.
 
-    Example: sysid schedule design law.yaml --settling 6s --fin-limit 15deg -o gains.yaml
+    Example: sysid schedule design law.yaml --fin-limit 15deg -o gains.yaml
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import length_of, runs_behind
+    from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import body_of, save_schedule
@@ -243,8 +243,8 @@ def verify(
     from fieldsid.angles import parse_margin
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import designed_from, runs_behind
+    from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
     from fieldsid.schedule.verify import verify_schedule
@@ -349,7 +349,7 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
 
 
 def _time(text: str | None, option: str) -> float | None:
-    from fieldsid.quantities import parse_time
+    from fieldsid.face.quantities import parse_time
 
     return None if text is None else parse_time(text, option)
 

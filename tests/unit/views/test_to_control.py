@@ -1,4 +1,4 @@
-"""Models and schedules as python-control systems: poles, margins and steps by it are those of the package's own plant and loop."""
+"""Models and schedules as python-control systems: poles, margins and steps by it are those of the own plant and loop."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fieldsid.errors import UsageError
-from fieldsid.quantities import BANDWIDTH, DECIBEL, parse_quantity, parse_share, parse_time
+from fieldsid.face.quantities import BANDWIDTH, DECIBEL, parse_quantity, parse_share, parse_time
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("4s", 4.0), ("400ms", 0.4), (" 2.5 ", 2.5), ("0.3 s", 0.3), ("1e-1s", 0.1)])
