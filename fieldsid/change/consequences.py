@@ -43,7 +43,7 @@ def gain_changes(
 
     Raises ModelError where no gain holds one of the two loops.
     """
-    wish = Wish() if before is None else Wish(before.kind, before.damping, before.phase_margin_deg)
+    wish = Wish() if before is None else before.wish
     was = before or design_schedule(old, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
     now = design_schedule(new, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
     level = 0.05 / len(speeds)  # the speeds are asked together

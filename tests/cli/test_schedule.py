@@ -141,6 +141,7 @@ def test_a_file_that_an_export_replaces_is_shown_and_kept(run_cli, gains, tmp_pa
     assert "-1\t1\tUUV_YAW_P\t4.0\t9" in answer.out
     assert "as it was: " in answer.out
     assert (tmp_path / "uuv.params.bak").read_text() == "1\t1\tUUV_YAW_P\t4.0\t9\n"
+    assert run_cli("schedule", "export", gains, "--to", "px4").out == own.read_text()
     again = run_cli("schedule", "export", gains, "--to", "px4", "-o", own, "--force", "--json")
     assert json.loads(again.out)["difference"] == ""
     assert not (tmp_path / "uuv.params.bak2").exists()

@@ -138,7 +138,7 @@ def _settles(seconds: float, step: StepCheck) -> str:
 def render_export(to: Console, body: Mapping[str, Any]) -> None:
     """Print the file written, or the text where there is none."""
     if body["file"]:
-        to.out(body["difference"], end="", highlight=False)
+        to.file.write(body["difference"])
         to.print(f"exported: {body['file']}" + (f"; as it was: {body['backup']}" if body["backup"] else ""), soft_wrap=True)
     else:
-        to.out(body["text"], end="", highlight=False)
+        to.file.write(body["text"])  # as it is: a console makes blanks of a tab
