@@ -20,6 +20,8 @@ from fieldsid.schedule.wish import Wish
 
 INTEGRAL_SHARE = 0.1
 """Integral corner over the proportional loop's crossover: a tenth costs six degrees of phase."""
+LEAST_STIFF = 1e-6
+"""Of the fin's stiffness, what is left of a hull that the whole fin hardly holds."""
 Formula = Callable[[float, float], Gains]
 """Gains of a share of the bandwidth that uses the fin allowed, and of a multiple of the damping wished."""
 
@@ -32,7 +34,7 @@ def formula_of(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
 def fin_bandwidth(plant: LinearPlant, fin: float, error: float) -> float:
     """Return the bandwidth (rad/s) at which the formula's gain asks for a fin (rad) at an error (rad)."""
     most = abs(float(plant.slow_authority[0])) * fin / error
-    return float(np.sqrt(most + min(max(float(plant.stiffness[0]), 0.0), most)))
+    return float(np.sqrt(max(most + min(float(plant.stiffness[0]), most), LEAST_STIFF * most)))
 
 
 def bandwidth_of(plant: LinearPlant, gains: Gains) -> float:
