@@ -33,6 +33,10 @@ def _none(_record: Any) -> Mapping[str, Callable[[], Any]]:
     return {}
 
 
+def _no_system(_record: Any, _speed: float | None) -> Any:
+    raise UsageError("only a model and a schedule are linear systems")
+
+
 def _unread(_table: DataFrame, _name: str) -> Any:
     raise UsageError("only a run is read from a table")
 
@@ -42,7 +46,8 @@ class View(Generic[T]):
     """How records of one class are shown; `name` is the class's in small letters, `turn_row` of TurnRow.
 
     `line` says what matters, `page` everything in words. `frames` and `figures` make tables and matplotlib figures by the
-    name of a part, the first unasked. `label` tells records of one kind apart. `read` makes a record of a table.
+    name of a part, the first unasked. `label` tells records of one kind apart. `read` makes a record of a table, `system`
+    python-control systems at a speed.
     """
 
     name: str
@@ -52,6 +57,7 @@ class View(Generic[T]):
     label: Callable[[T], str] = str
     figures: Callable[[T], Mapping[str, Callable[[], Any]]] = _none
     read: Callable[[DataFrame, str], T] = _unread
+    system: Callable[[T, float | None], Any] = _no_system
 
 
 def view_of(kind: type) -> View[Any]:
@@ -89,6 +95,21 @@ class Displayed(Brief):
         """Return a part of the record as a pandas table, without a name its first; raises UsageError naming the parts."""
         table: DataFrame = _part(view_of(type(self)).frames(self), part, f"{type(self).__name__}.to_frame")
         return table
+
+
+class InControl:
+    """A record that is a linear system at each speed."""
+
+    __slots__ = ()
+
+    def to_control(self, speed: float | None = None) -> Any:
+        """Return python-control's StateSpace at a speed (m/s), its signals named as a run's columns.
+
+        A model is fin to angle and rate, without a speed at its law's own; a schedule reference, angle and rate to fin, without
+        a speed a mapping of the rows' by speed. `control.interconnect` of both is the closed loop. Raises FieldsidError where
+        python-control is not installed.
+        """
+        return view_of(type(self)).system(self, speed)
 
 
 class Plotted(Displayed):

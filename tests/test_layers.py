@@ -35,7 +35,7 @@ SUB_ROOMS = {
     "planning": ("specify", "belief", "flight", "safety", "design", "discriminate", "output"),
     "plant": ("laws",),
     "turning": ("measured", "steady", "maneuvering"),
-    "schedule": ("flown",),
+    "schedule": ("flown", "search"),
     "cli": ("help", "trial", "headlines", "live", "commands"),
 }
 """The folders inside a room: each may import itself and what stands before it. Files that stand in the room itself are its

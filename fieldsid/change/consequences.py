@@ -17,11 +17,11 @@ from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.flight.dry_run import dry_run
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule.controller import least_damping
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.margins import margins
 from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.wish import Wish
 from fieldsid.turning.radius import turn_radius
 
 DRAWS, SEED = 400, 20
@@ -43,7 +43,7 @@ def gain_changes(
 
     Raises ModelError where no gain holds one of the two loops.
     """
-    wish = Wish() if before is None else Wish(before.kind, before.damping, before.phase_margin_deg)
+    wish = Wish() if before is None else before.wish
     was = before or design_schedule(old, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
     now = design_schedule(new, fin.limit, speeds=speeds, wish=wish, limits=fin.stated)
     level = 0.05 / len(speeds)  # the speeds are asked together

@@ -219,16 +219,18 @@ def _scheduled(result: Result) -> str:
     first, last = result["rows"][0], result["rows"][-1]
     return (
         f"kp goes from {number(abs(first['kp']), 2)} at {number(first['speed_m_s'], 2)} m/s to "
-        f"{number(abs(last['kp']), 2)} at {number(last['speed_m_s'], 2)} m/s, as each speed's own model and its errors say; "
-        "the feed-forward holds the fin's own trim."
+        f"{number(abs(last['kp']), 2)} at {number(last['speed_m_s'], 2)} m/s, so that all speeds settle alike with no more "
+        "fin than that takes; the feed-forward holds the fin's own trim."
     )
 
 
 def _verified(result: Result) -> str:
     ours, constant = (max(briefs.settled(c) for c in result[part]) for part in ("scheduled", "constant"))
+    fin, its = (100.0 * result[part][-1]["fin_use"] for part in ("scheduled", "constant"))
     return (
         f"The least phase margin over speeds and errors is {result['worst']['phase_margin_deg']:.0f} deg. A heading step settles "
-        f"within {ours:.0f} s at every speed, with one constant gain within {constant:.0f} s."
+        f"within {ours:.0f} s at every speed, with one constant gain within {constant:.0f} s; at the highest speed it asks for "
+        f"{fin:.0f} % of the fin, with one constant gain for {its:.0f} %."
     )
 
 

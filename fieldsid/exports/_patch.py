@@ -83,6 +83,11 @@ def patch_yaml(path: Path, key: str, columns: Mapping[str, Sequence[float]]) -> 
     return patch
 
 
+def patch_text(path: Path, text: str) -> Patch:
+    """Return the change that makes a text of a whole file; raises ArtifactError where the file cannot be read."""
+    return Patch(path, _text(path), text)
+
+
 def write_patch(patch: Patch) -> Path:
     """Write a change in place and return the backup's path; raises ArtifactError where the file is read-only."""
     path = patch.path

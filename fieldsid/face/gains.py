@@ -84,7 +84,12 @@ def design_schedule(
     models: Models,
     *,
     controller: str | None = None,
-    damping: float = 0.7071,
+    settling: float | None = None,
+    bandwidth: float | None = None,
+    overshoot: float | None = None,
+    step: float | None = None,
+    fin_use: float | None = None,
+    damping: float | None = None,
     phase_margin: float = 45.0,
     speeds: str | Sequence[float] | None = None,
     fin_limit: float | None = None,
@@ -98,7 +103,10 @@ def design_schedule(
 ) -> Schedule:
     """Return gains per speed for heading or pitch, by the models' axis.
 
-    controller: p, pd, pi, pid or lqr; without it pd where the models' runs have a rate, else p. phase_margin: in deg. speeds:
+    controller: p, pd, pi, pid or lqr; without it pd where the models' runs have a rate, else p. settling (s) or bandwidth
+    (rad/s): how soon a step is to settle at all speeds, without them as soon as the slowest of them can; 0 leaves each its own.
+    overshoot: the most, as a share. step (rad): the error that may ask for fin_use, a share, of the fin's limit. damping: without
+    it that of the overshoot, else 0.7071. phase_margin: in deg. speeds:
     in m/s or as `1.0,1.5`, without them the models' own. fin_limit (rad), fin_rate (rad/s): without them the vehicle's.
     fin_lag, delay (s): without them the models'. latency (s): the autopilot's own, on top. depth: the loop above pitch.
     Raises UsageError for what cannot be meant, ModelError where no gain holds the loop.
@@ -106,7 +114,6 @@ def design_schedule(
     from fieldsid.schedule import FinLimits, Wish
     from fieldsid.schedule import design_schedule as design
     from fieldsid.schedule.make import usual_controller
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     own_effects()
     source, known = source_of(models, law), vehicle_of(vehicle)
@@ -115,7 +122,7 @@ def design_schedule(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller or usual_controller(source), damping, phase_margin, STEP_ANGLE_RAD[source.axis]),
+        wish=Wish(controller or usual_controller(source), damping, phase_margin, step, bandwidth, settling, overshoot, fin_use),
         limits=FinLimits(fin_lag, delay, rate, latency),
         depth=depth,
         runs=runs_behind(source, _say),

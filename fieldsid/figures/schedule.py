@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fieldsid.figures import canvas
+from fieldsid.schedule.check import Check
 from fieldsid.schedule.flown.response import Steps
-from fieldsid.schedule.optimum import DRAWS_MARGIN_SHARE
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import STEPS_RAD, Check, Verification
+from fieldsid.schedule.search.objective import DRAWS_MARGIN_SHARE
+from fieldsid.schedule.verify import Verification, steps_of
 
 SHOWN_SHARE = 25.0 / 60.0
 """Of a flight: a step that serves has settled by then."""
@@ -33,7 +34,7 @@ def figure(schedule: Schedule, verification: Verification) -> Figure:
     draw_leg([(f.speed, f.leg) for f in verification.flown], verification.disturbance, leg)
     *steps, fin = np.ravel(right.subplots(4, 1))
     until = SHOWN_SHARE * max(f.pace.flight for f in verification.flown)
-    for at, (size, ax) in enumerate(zip(STEPS_RAD[schedule.axis], steps, strict=True)):
+    for at, (size, ax) in enumerate(zip(steps_of(schedule), steps, strict=True)):
         draw_steps([(f.speed, f.scheduled[at], f.constant[at]) for f in verification.flown], size, until, ax)
     steps[0].set_title(
         f"steps with the {schedule.kind} schedule; thin: one constant gain, kp = {verification.constant_row.gains.kp:.3g}",
@@ -110,7 +111,7 @@ def draw_fin(schedule: Schedule, steps: Sequence[tuple[float, Steps, Steps]], un
     for sign in (-1.0, 1.0):
         ax.axhline(sign * np.degrees(limit), color="0.3", linewidth=1.0, linestyle="-.")
     at_stop = max(float(np.mean(np.abs(large.fin[:, 0]) >= STOP_SHARE * limit)) * float(large.time[-1]) for _, _, large in steps)
-    usual, large = (np.degrees(STEPS_RAD[schedule.axis][i]) for i in (1, 2))
+    usual, large = (np.degrees(steps_of(schedule)[i]) for i in (1, 2))
     ax.set_title(
         f"fin in the {usual:.0f}° step, thin in the {large:.0f}° step: at its limit for up to {at_stop:.1f} s",
         loc="left",

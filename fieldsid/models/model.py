@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import save_record
-from fieldsid.display import Brief, Displayed
+from fieldsid.display import Brief, Displayed, InControl
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.wrong_file import unless_log
 from fieldsid.models.axis import NAMES, Axis
@@ -44,7 +44,7 @@ class Noise(Brief):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Model(Displayed):
+class Model(InControl, Displayed):
     """An identified model.
 
     `values` holds the base parameters at the law's reference speed and the effects' shared coefficients (SI,

@@ -35,7 +35,16 @@ ROW: Shape = {
     **dict.fromkeys(("phase_margin_deg", "gain_margin_db", "delay_margin_s"), maybe(number())),
     "draws_held": number(0.0, 1.0),
     "settling_s": _SECONDS,
+    "binds?": text,
+    "fin_use?": maybe(number(0.0)),
 }
+ANSWER: Shape = {
+    "settling_s?": _SECONDS,
+    "step_rad?": maybe(above_zero()),
+    "asked_settling_s?": maybe(above_zero()),
+    **dict.fromkeys(("asked_bandwidth_rad_s?", "asked_overshoot?", "asked_fin_use?"), maybe(number(0.0))),
+}
+"""What the loop was asked for."""
 FINS: Shape = {"names": [text], "shares": [number()], "limits": [above_zero()], "unit": text}
 """The fins of the plane that its gains steer."""
 PROVENANCE: Shape = {
@@ -61,5 +70,6 @@ SCHEDULE: Shape = {
     "stated": _FIN,
     "rows": at_least_one(ROW),
     "provenance": PROVENANCE,
+    "answer?": ANSWER,
     "warnings?": [{"code": text, "message": text}],
 }

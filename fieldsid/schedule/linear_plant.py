@@ -216,6 +216,15 @@ def plants_at(source: ParameterSource, speed: float, limits: FinLimits, draws: i
     return [(_plant_of_model(model, speed, limits, draws, own_seed, centre), share) for model, own_seed, share in near]
 
 
+def between(near: Sequence[tuple[LinearPlant, float]]) -> LinearPlant:
+    """Return the plant that lies between some by their weights, draw by draw."""
+    first = near[0][0]
+    if len(near) == 1:
+        return first
+    parts: dict[str, Any] = {n: np.sum([share * getattr(plant, n) for plant, share in near], axis=0) for n in PARTS}
+    return replace(first, **parts)
+
+
 def family_at(source: ParameterSource, speed: float, limits: FinLimits, draws: int, seed: int) -> LinearPlant:
     """Return the whole uncertainty set at a speed: the draws of every neighbouring model."""
     plants = [p for p, _ in plants_at(source, speed, limits, draws, seed)]

@@ -15,16 +15,12 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.plant.remedies import in_radians, wider_fin
 from fieldsid.records.named_inputs import sha256_of
-from fieldsid.runtime.lockstep import parallel_map
-from fieldsid.schedule.controller import Gains
-from fieldsid.schedule.design import PROPORTIONAL, Wish, check_wish, design_gains
 from fieldsid.schedule.linear_plant import FinLimits, not_counted, plants_at
-from fieldsid.schedule.margins import margins
 from fieldsid.schedule.plants import Plants, models_plants, plants_of
-from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.record import Answer, Schedule
+from fieldsid.schedule.rows import DESIGN_DRAWS, SEED, Asked, design_rows
+from fieldsid.schedule.wish import PROPORTIONAL, Wish, check_wish
 
-DESIGN_DRAWS = 24
-SEED = 41
 FIN = {Axis.YAW: "rudder", Axis.PITCH: "elevator"}
 TURNS = {
     (Axis.YAW, 1.0): "positive rudder turns to starboard (b2 > 0)",
@@ -70,18 +66,19 @@ def design_schedule(
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
     plants, refused = plants_of(source, limits, runs, length), False
+    asked = Asked(fin_limit, wish, depth)
     try:
-        rows = _rows(plants, knots, fin_limit, wish, depth=depth)
+        rows, answer = design_rows(plants, knots, asked)
     except ModelError as error:
         if plants.belief is None or wish.kind in PROPORTIONAL:
             raise  # nothing but a rate holds what may be unstable
         # what pulses say of an unstable hull's sway may be further off than each speed's own model, which holds near its pulses
         plants, refused = models_plants(source, limits, runs, _took_no_gains(error)), True
-        rows = _rows(plants, knots, fin_limit, wish, depth=depth)
+        rows, answer = design_rows(plants, knots, asked)
     return Schedule(
         axis=source.axis,
         kind=wish.kind,
-        damping=wish.damping,
+        damping=wish.damped,
         phase_margin_deg=wish.phase_margin_deg,
         depth=depth,
         rows=rows,
@@ -89,6 +86,7 @@ def design_schedule(
         provenance=_provenance(plants, wish, knots) | {"belief_refused": refused, "length_m": length} | _told(fins),
         stated=limits.record(),
         notes=() if plants.note is None else (plants.note,),
+        answer=Answer(answer, wish.step_of(source.axis), wish.settling, wish.bandwidth, wish.overshoot, wish.fin_use),
     )
 
 
@@ -109,30 +107,6 @@ def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
     if not all(np.isfinite(s) and s > 0 for s in knots):
         raise UsageError("speeds must be above zero", found=f"{knots}", hint="write `--speeds 1.0,1.5,2.0`")
     return knots
-
-
-def _rows(plants: Plants, knots: Sequence[float], fin_limit: float, wish: Wish, *, depth: bool) -> tuple[Row, ...]:
-    return tuple(parallel_map(lambda speed: _row(plants, speed, fin_limit, wish, depth=depth), knots))
-
-
-def _row(plants: Plants, speed: float, fin_limit: float, wish: Wish, *, depth: bool) -> Row:
-    near = plants.at(speed, fin_limit, DESIGN_DRAWS, SEED)
-    made = [(design_gains(plant, wish, fin_limit), plant, share) for plant, share in near]
-    gains, forward, reference, depth_gain, slowed = Gains(0.0), 0.0, 0.0, 0.0, 1.0
-    for designed, plant, share in made:
-        own = designed.gains.times(share)
-        gains = Gains(gains.kp + own.kp, gains.ki + own.ki, gains.kd + own.kd)
-        forward -= share * float(plant.offset[0])
-        reference += share * designed.reference_gain
-        depth_gain += share * designed.depth_gain
-        slowed = min(slowed, designed.slowed)
-    worst = [margins(plant, gains).worst() for _, plant, _ in made]
-    phase, gain, delay = (min(w[i] for w in worst) for i in range(3))
-    gains = Gains(float(gains.kp), float(gains.ki), float(gains.kd))
-    return Row(
-        float(speed), gains, forward, reference, fin_limit, depth_gain if depth else 0.0, plants.source.supports(speed), slowed,
-        phase, gain, delay, min(d.held for d, _, _ in made), max(d.settling for d, _, _ in made),
-    )  # fmt: skip
 
 
 def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: float, limits: FinLimits) -> None:
@@ -171,7 +145,7 @@ def _provenance(plants: Plants, wish: Wish, knots: Sequence[float]) -> dict[str,
         "sign_convention": f"{TURNS[source.axis, sign]}; angles rad, NED, body forward-starboard-down",
         "law": f"{FIN[source.axis]} = kp (ref - {source.axis.value}) + ki int(ref - {source.axis.value}) dt - kd rate "
         "+ feed_forward + reference_gain ref, limited to +/- fin_limit",
-        "wished": {"controller": wish.kind, "damping_ratio": wish.damping, "phase_margin_deg": wish.phase_margin_deg},
+        "wished": {"controller": wish.kind, "damping_ratio": wish.damped, "phase_margin_deg": wish.phase_margin_deg},
     }
 
 

@@ -107,15 +107,20 @@ def _read_off(size: FloatArray, phase: FloatArray, log_omega: FloatArray, dampin
     )
 
 
+def python_control() -> Any:
+    """Return the module; raises FieldsidError where python-control is not installed."""
+    try:
+        return import_module("control")
+    except ImportError as error:
+        raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
+
+
 def control_margins(plant: LinearPlant, gains: Gains) -> tuple[float, float, float]:
     """Return phase (deg), gain (dB) and delay (s) margin of the estimate by python-control, from its frequency response.
 
     Raises FieldsidError when python-control is not installed.
     """
-    try:
-        control: Any = import_module("control")
-    except ImportError as error:
-        raise FieldsidError("python-control is not installed", found=str(error), hint="pip install control") from error
+    control = python_control()
     response = loop(plant.one(), gains, CONTROL_GRID_RAD_S)[0]
     system = control.FrequencyResponseData(response, CONTROL_GRID_RAD_S, smooth=True)
     gain, phase, _, _, phase_crossing, _ = control.stability_margins(system)

@@ -14,7 +14,7 @@ from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.schedule.believed_plant import LAG, RATE, believed_plant
 from fieldsid.schedule.flown.speed_kept import slowing, speed_kept_said
-from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, family_at, plants_at
+from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, between, family_at, plants_at
 from fieldsid.turning.maneuvering.belief import Belief, believe, fitted_to, like_no_vehicle, not_fitted
 from fieldsid.turning.maneuvering.equations import coefficients
 from fieldsid.turning.steady.speed_loss import SurgeModel, fit_surge
@@ -35,20 +35,20 @@ class Plants:
     belief: Belief | None
     note: Note | None = None
 
-    def at(self, speed: float, fin_limit: float, draws: int, seed: int) -> list[tuple[LinearPlant, float]]:
-        """Return the plants next to a speed (m/s), `draws` of the errors of each, with weights that sum to one."""
+    def at(self, speed: float, fin_limit: float, draws: int, seed: int) -> LinearPlant:
+        """Return the plant at a speed (m/s), `draws` of its errors: between two models' speeds what lies between them."""
         near = plants_at(self.source, speed, self.limits, draws, seed)
         if self.belief is None:
-            return [(slowing(plant, self.surge, fin_limit, seed), share) for plant, share in near]
+            return slowing(between(near), self.surge, fin_limit, seed)
         first = near[0][0]
         offset = np.sum([share * plant.offset for plant, share in near], axis=0)
-        return [(believed_plant(self.belief, replace(first, offset=offset), self.limits, draws), 1.0)]
+        return believed_plant(self.belief, replace(first, offset=offset), self.limits, draws)
 
     def family_at(self, speed: float, fin_limit: float, draws: int, seed: int) -> LinearPlant:
         """Return the whole uncertainty set at a speed (m/s)."""
         if self.belief is None:
             return slowing(family_at(self.source, speed, self.limits, draws, seed), self.surge, fin_limit, seed)
-        return self.at(speed, fin_limit, draws, seed)[0][0]
+        return self.at(speed, fin_limit, draws, seed)
 
     def noise_at(self, speed: float) -> Noise | None:
         """Return the noise of the model that counts most at a speed (m/s), None for a table."""

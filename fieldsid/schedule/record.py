@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fieldsid.artifacts import save_record
-from fieldsid.display import Displayed, Plotted
+from fieldsid.display import Brief, Displayed, InControl, Plotted
 from fieldsid.errors import ArtifactError
 from fieldsid.logs.run import Note
 from fieldsid.logs.wrong_file import unless_log
@@ -20,6 +20,7 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.records.check import ShapeError
 from fieldsid.records.reading import load_record
 from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.wish import PROPORTIONAL, QUICKEST, Wish
 
 KIND = "fieldsid/schedule"
 COLUMNS = ("speed_m_s", "kp", "ki", "kd", "feed_forward_rad", "reference_gain", "fin_limit_rad", "depth_gain", "supported")
@@ -31,7 +32,8 @@ class Row(Displayed):
     """Gains at one speed: fin = kp e + ki int e - kd rate + feed_forward + reference_gain ref, limited to fin_limit.
 
     depth_gain (pitch): pitch reference = depth_gain (depth - depth wanted), rad/m, nose up positive. Margins are the least over
-    95 % of the draws; `draws_held` is the share of them that come to rest from the standard step, within `settling_s`.
+    95 % of the draws; `draws_held` is the share of them that come to rest from the step, within `settling`. `binds` says what
+    keeps the gains from more bandwidth, `fin_use` which share of the fin's limit the step asks for.
     """
 
     speed: float
@@ -47,6 +49,8 @@ class Row(Displayed):
     delay_margin_s: float = float("nan")
     draws_held: float = float("nan")
     settling: float = float("nan")
+    binds: str = ""
+    fin_use: float = float("nan")
 
     def record(self) -> dict[str, Any]:
         """Return the row by the names an export writes, with its margins."""
@@ -66,11 +70,39 @@ class Row(Displayed):
             "delay_margin_s": self.delay_margin_s,
             "draws_held": self.draws_held,
             "settling_s": self.settling,
+            "binds": self.binds,
+            "fin_use": self.fin_use,
         }
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Schedule(Plotted):
+class Answer(Brief):
+    """The answer that rows were designed for: all settle from `step` (rad) within `settling` s, 0 where each has its own.
+
+    The rest is what was asked: settling (s), bandwidth (rad/s), overshoot and fin as shares, None where it was not.
+    """
+
+    settling: float = QUICKEST
+    step: float | None = None
+    asked_settling: float | None = None
+    bandwidth: float | None = None
+    overshoot: float | None = None
+    fin_use: float | None = None
+
+    def record(self) -> dict[str, float | None]:
+        """Return the answer by its fields' names with units."""
+        return {
+            "settling_s": self.settling,
+            "step_rad": self.step,
+            "asked_settling_s": self.asked_settling,
+            "asked_bandwidth_rad_s": self.bandwidth,
+            "asked_overshoot": self.overshoot,
+            "asked_fin_use": self.fin_use,
+        }
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Schedule(InControl, Plotted):
     """Rows at rising speeds, the controller's kind and wishes, and provenance (models, runs, conventions).
 
     actuator is the fin's lag, delay and rate that the design counted with, stated those of them that were said, not modelled;
@@ -87,6 +119,14 @@ class Schedule(Plotted):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     stated: Mapping[str, float | None] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
+    answer: Answer = field(default_factory=Answer)
+
+    @property
+    def wish(self) -> Wish:
+        """What was asked, as it is asked again: of a file without an answer the quickest gains of each speed."""
+        a = self.answer
+        settling = QUICKEST if a.step is None and self.kind not in PROPORTIONAL else a.asked_settling
+        return Wish(self.kind, self.damping, self.phase_margin_deg, a.step, a.bandwidth, settling, a.overshoot, a.fin_use)
 
     @property
     def speeds(self) -> tuple[float, ...]:
@@ -130,6 +170,7 @@ class Schedule(Plotted):
             mixed("depth_gain"), inside and a.supported and b.supported, min(a.slowed, b.slowed),
             min(a.phase_margin_deg, b.phase_margin_deg), min(a.gain_margin_db, b.gain_margin_db),
             min(a.delay_margin_s, b.delay_margin_s), min(a.draws_held, b.draws_held), max(a.settling, b.settling),
+            a.binds if share <= 1.0 - share else b.binds, mixed("fin_use"),
         )  # fmt: skip
 
 
@@ -143,6 +184,7 @@ def body_of(schedule: Schedule) -> dict[str, Any]:
         "depth": schedule.depth,
         "actuator": dict(schedule.actuator),
         "stated": dict(schedule.stated),
+        "answer": schedule.answer.record(),
         "rows": [r.record() for r in schedule.rows],
         "provenance": dict(schedule.provenance),
         "warnings": [{"code": n.code, "message": n.message} for n in schedule.notes],
@@ -177,6 +219,7 @@ def load_schedule(path: Path) -> Schedule:
         provenance={**body["provenance"], **fins, "inputs": body.get("inputs", [])},
         stated=dict(body["stated"]),
         notes=tuple(Note(n["code"], n["message"]) for n in body.get("warnings", ())),
+        answer=_answer(body.get("answer", {})),
     )
 
 
@@ -198,5 +241,10 @@ def _row(r: Mapping[str, Any]) -> Row:
         float(r["speed_m_s"]), Gains(float(r["kp"]), float(r["ki"]), float(r["kd"])), float(r["feed_forward_rad"]),
         float(r["reference_gain"]), float(r["fin_limit_rad"]), float(r["depth_gain"]), r["supported"], float(r["slowed"]),
         margin("phase_margin_deg"), margin("gain_margin_db"), margin("delay_margin_s"), float(r["draws_held"]),
-        margin("settling_s"),
+        margin("settling_s"), r.get("binds", ""), float("nan") if r.get("fin_use") is None else float(r["fin_use"]),
     )  # fmt: skip
+
+
+def _answer(body: Mapping[str, Any]) -> Answer:
+    """Return the answer of a file, of one from before there were any an empty one."""
+    return Answer(body.get("settling_s") or QUICKEST, *(body.get(name) for name in list(Answer().record())[1:]))

@@ -9,17 +9,11 @@ from typing import Any
 
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.rounding import number
-from fieldsid.schedule.best_constant import MARGIN_ROUNDING_DEG, margin_kept
+from fieldsid.schedule.check import READ_OFF
 from fieldsid.schedule.linear_plant import not_counted
 from fieldsid.schedule.margins import HELD_SHARE
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import (
-    DEPTH_STEP_M,
-    READ_OFF,
-    STEP_ANGLE_RAD,
-    STEPS_RAD,
-    Verification,
-)
+from fieldsid.schedule.verify import DEPTH_STEP_M, Verification, steps_of
 
 MOST_NAMED = 3
 
@@ -82,7 +76,7 @@ def verdict_of(checked: Verification, schedule: Schedule, gates: tuple[Gate, ...
         return "does not hold", "; ".join(faults)
     weakest = checked.weakest("phase_margin_deg")
     margin = f"least phase margin {number(weakest.phase_least_deg, 3)} deg at {number(weakest.speed, 3)} m/s"
-    return "holds", f"{margin}; {_settles(checked, degrees(STEP_ANGLE_RAD[schedule.axis]))}"
+    return "holds", f"{margin}; {_settles(checked, degrees(steps_of(schedule)[1]))}"
 
 
 def _settles(checked: Verification, step: float) -> str:
@@ -95,7 +89,7 @@ def _settles(checked: Verification, step: float) -> str:
 def _faults(checked: Verification, schedule: Schedule) -> list[str]:
     """Return why the loop does not hold, whatever was asked for."""
     weakest, slowest = checked.weakest("phase_margin_deg"), max(checked.scheduled, key=lambda c: c.settling)
-    step, found = degrees(STEP_ANGLE_RAD[schedule.axis]), []
+    step, found = degrees(steps_of(schedule)[1]), []
     if weakest.phase_least_deg <= 0.0:
         of = f" by {weakest.unstable} of the draws" if checked.spread else ""
         found.append(f"unstable at {number(weakest.speed, 3)} m/s{of}, phase margin {number(weakest.phase_least_deg, 3)} deg")
@@ -118,21 +112,25 @@ def _faults(checked: Verification, schedule: Schedule) -> list[str]:
 
 
 def against_constant(checked: Verification) -> str:
-    """Return how the schedule compares with the best one gain for all speeds, by the slowest standard step of each."""
-    row, (own, other) = checked.constant_row.gains, checked.slowest
+    """Return how the schedule compares with the best one gain for all speeds, by the objective that its rows are designed for."""
+    row = checked.constant_row.gains
     named = ", ".join(f"{n} {number(v, 3)}" for n, v in (("kp", row.kp), ("ki", row.ki), ("kd", row.kd)) if v or n == "kp")
-    least = min(c.phase_least_deg for c in checked.constant)
-    wanted = margin_kept(checked.schedule)
-    if least < min(wanted, checked.weakest("phase_margin_deg").phase_least_deg - MARGIN_ROUNDING_DEG):
-        return f"no one gain for all speeds keeps the schedule's margin: the best, {named}, has {least:.0f} deg at least"
-    never = f"more than {_longest(checked)}"
-    ours, theirs = (f"{value:.1f} s" if isfinite(value) else never for value in (own, other))
-    times = f"the slowest step settles in {ours} with the schedule, {theirs} with {named}"
-    if any(c.hunts for c in checked.constant):
-        return f"no one gain for all speeds comes to rest at every speed: the best, {named}, does not"
-    if other < own:
-        return f"one constant gain is better: {times}, with a phase margin of {least:.0f} deg at least"
-    return f"against the best constant gain: {times}"
+    lacking = next((c for c in checked.constant if not c.outcome.serves), None)
+    ours, theirs = (max(c.outcome.settled for c in part) for part in (checked.scheduled, checked.constant))
+    if checked.worse:
+        where = ", ".join(number(speed, 3) for speed in checked.worse)
+        return f"one constant gain, {named}, is better at {where} m/s: {_compared(ours, theirs)}"
+    if lacking is not None and all(c.outcome.serves for c in checked.scheduled):
+        return f"no one gain for all speeds keeps what was asked: the best, {named}, does not at {number(lacking.speed, 3)} m/s"
+    pairs = zip(checked.scheduled, checked.constant, strict=True)
+    own, one = max(pairs, key=lambda pair: pair[1].outcome.fin / pair[0].outcome.fin)
+    fins = f"{100.0 * one.outcome.fin:.0f} % of the fin with it, {100.0 * own.outcome.fin:.0f} % with the schedule"
+    return f"against the best constant gain, {named}: {_compared(ours, theirs)}; at {number(own.speed, 3)} m/s it asks for {fins}"
+
+
+def _compared(ours: float, theirs: float) -> str:
+    both = (f"{s:.1f} s" if isfinite(s) else "never" for s in (ours, theirs))
+    return "the slowest step settles in {} with the schedule, {} with it".format(*both)
 
 
 def _longest(checked: Verification) -> str:
@@ -178,7 +176,7 @@ def _extrapolated(checked: Verification) -> list[str]:
     step = f"a {degrees(size):.0f} deg step turns tighter than any run, which held {100 * held:.0f} % of its curvature"
     if not checked.unsaid:
         return [f"{step}: how it settles is extrapolated until a turn that tight is flown"]
-    large = f"a {degrees(STEPS_RAD[checked.schedule.axis][2]):.0f} deg step"
+    large = f"a {degrees(steps_of(checked.schedule)[2]):.0f} deg step"
     why = "the hull alone is unstable, and what its fin does against such a turn was not measured"
     return [f"{step}: {why}; how {large} settles is not said (`-`) until a turn that tight is flown"]
 

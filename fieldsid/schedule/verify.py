@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
-from fieldsid.display import Brief, Displayed, Plotted
+from fieldsid.display import Brief, Plotted
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import Noise
 from fieldsid.plant.parameter_source import ParameterSource
 from fieldsid.runtime.lockstep import parallel_map
-from fieldsid.schedule.best_constant import best_constant, held_at
+from fieldsid.schedule.check import READ_OFF, Check, StepCheck
 from fieldsid.schedule.flown.pace import LONGER, Pace, pace_of
 from fieldsid.schedule.flown.response import (
+    FLIGHT_ERROR_SHARE,
     LIMIT_CYCLE_SHARE,
     SETTLING_BAND,
     Steps,
@@ -34,14 +33,17 @@ from fieldsid.schedule.flown.response import (
 from fieldsid.schedule.flown.straight_leg import straight_leg
 from fieldsid.schedule.linear_plant import PARTS, FinLimits, LinearPlant
 from fieldsid.schedule.margins import HELD_SHARE, control_margins, margins, worst_of
-from fieldsid.schedule.plants import models_plants, plants_of
+from fieldsid.schedule.plants import Plants, models_plants, plants_of
 from fieldsid.schedule.record import Row, Schedule
+from fieldsid.schedule.rows import DESIGN_DRAWS, place_of
+from fieldsid.schedule.rows import SEED as DESIGN_SEED
+from fieldsid.schedule.search.best_constant import best_constant, multiples_of
+from fieldsid.schedule.search.objective import Place
+from fieldsid.schedule.wish import STEP_ANGLE_RAD
 from fieldsid.turning.model_error import MIN_COVERED_SHARE
 
 VERIFY_DRAWS = 60
 SEED = 77
-STEP_ANGLE_RAD = {Axis.YAW: 0.3490658503988659, Axis.PITCH: 0.17453292519943295}
-"""20 deg of heading, 10 deg of pitch."""
 STEPS_RAD = {
     Axis.YAW: (0.08726646259971647, STEP_ANGLE_RAD[Axis.YAW], 1.5707963267948966),
     Axis.PITCH: (0.03490658503988659, STEP_ANGLE_RAD[Axis.PITCH], 0.3490658503988659),
@@ -49,129 +51,9 @@ STEPS_RAD = {
 """A small, the standard and a large step: 5, 20 and 90 deg of heading, 2, 10 and 20 deg of pitch."""
 FIN_OFFSET_RAD = 0.05235987755982988
 """3 deg: the fin offset a schedule is tried with."""
-FLIGHT_ERROR_SHARE = 0.01
-"""What a flight is off its model's by, over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less
-than said, which is half a swing of settling where an overshoot just touches the corridor."""
 AT_REST_SHARE = 0.5 * LIMIT_CYCLE_SHARE
 DEPTH_STEP_M = 2.0
 PITCH_LIMIT_RAD = 0.3490658503988659
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class StepCheck(Brief):
-    """A step of one size (rad) by the estimate and by 95 % of the draws: overshoot as a share of it, settling in s (5 %).
-
-    Those of the draws are about where each comes to rest; `off` (rad) is how far that is from what was asked, by 95 % of them:
-    what a trim that is not known to better leaves. `settling_median` and `settling95` (s) are the middle of the draws and the
-    band that holds 95 % of them: settling jumps by half a swing where an overshoot just leaves the corridor. `swing` is what
-    still swings in the last quarter, peak to peak as a share of the step, by 95 % of the draws; `flown` (s) how long they were
-    flown. Overshoot and settling are NaN
-    where what was flown does not say them (`_with_what_is_known`).
-    """
-
-    size: float
-    overshoot: float
-    overshoot_most: float
-    settling: float
-    settling_most: float
-    settling_median: float
-    settling95: tuple[float, float]
-    swing: float
-    off: float
-    flown: float
-
-    def record(self) -> dict[str, Any]:
-        """Return the step by its fields' names with units."""
-        return {
-            "step_rad": self.size, "said": not np.isnan(self.settling), "overshoot_percent": 100 * self.overshoot,
-            "overshoot_most_percent": 100 * self.overshoot_most, "settling_s": self.settling,
-            "settling_most_s": self.settling_most, "settling_median_s": self.settling_median,
-            "settling_interval95_s": list(self.settling95), "swing_percent": 100 * self.swing,
-            "steady_error_most_rad": self.off, "flown_s": self.flown,
-        }  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class Check(Displayed):
-    """One speed under one set of gains: margins at the estimate (python-control) and the least over 95 % of the draws; steps.
-
-    `steps` are of the small, the standard and the large size; `unstable` how many of the draws are, `speed_least` (m/s) the
-    least speed in the large step. `bent_error` is the steady error (rad) of a 3 deg fin offset that the feed-forward knows,
-    `bent_error_unknown` one it does not; `leg_rms` and `leg_fin_rms` (rad) are of a straight leg in the models' disturbance.
-    """
-
-    speed: float
-    knot: bool
-    supported: bool
-    constant: bool
-    phase_deg: float
-    gain_db: float
-    delay_s: float
-    phase_least_deg: float
-    gain_least_db: float
-    delay_least_s: float
-    unstable: int
-    steps: tuple[StepCheck, StepCheck, StepCheck]
-    speed_least: float
-    bent_error: float
-    bent_error_unknown: float
-    leg_rms: float
-    leg_fin_rms: float
-    depth_overshoot: float
-    depth_settling: float
-    depth_flown: float
-
-    @property
-    def overshoot(self) -> float:
-        """Overshoot of the standard step by the estimate, as a share."""
-        return self.steps[1].overshoot
-
-    @property
-    def overshoot_most(self) -> float:
-        """The most overshoot of the standard step by 95 % of the draws, as a share."""
-        return self.steps[1].overshoot_most
-
-    @property
-    def settling(self) -> float:
-        """Settling time of the standard step by the estimate, s."""
-        return self.steps[1].settling
-
-    @property
-    def settling_most(self) -> float:
-        """Settling time of the standard step by 95 % of the draws, s."""
-        return self.steps[1].settling_most
-
-    @property
-    def hunts(self) -> StepCheck | None:
-        """The first step after which the loop goes on swinging, a limit cycle; None where all come to rest."""
-        return next((s for s in self.steps if s.swing > LIMIT_CYCLE_SHARE), None)
-
-    def record(self) -> dict[str, Any]:
-        """Return the check by its fields' names with units."""
-        return {
-            "speed_m_s": self.speed, "knot": self.knot, "supported": self.supported, "constant_gain": self.constant,
-            "phase_margin_deg": self.phase_deg, "gain_margin_db": self.gain_db, "delay_margin_s": self.delay_s,
-            "phase_margin_least_deg": self.phase_least_deg, "gain_margin_least_db": self.gain_least_db,
-            "delay_margin_least_s": self.delay_least_s, "unstable_draws": self.unstable,
-            "overshoot_percent": 100 * self.overshoot, "overshoot_most_percent": 100 * self.overshoot_most,
-            "settling_s": self.settling, "settling_most_s": self.settling_most,
-            "steps": [s.record() for s in self.steps], "speed_least_m_s": self.speed_least,
-            "fin_offset_error_rad": self.bent_error, "fin_offset_error_unknown_rad": self.bent_error_unknown,
-            "leg_rms_rad": self.leg_rms, "leg_fin_rms_rad": self.leg_fin_rms,
-            "depth_overshoot_percent": 100 * self.depth_overshoot, "depth_settling_s": self.depth_settling,
-            "depth_flown_s": self.depth_flown,
-        }  # fmt: skip
-
-
-READ_OFF: Mapping[str, tuple[float, Callable[[Check], float]]] = MappingProxyType(
-    {
-        "phase_margin_deg": (1.0, lambda c: c.phase_least_deg),
-        "gain_margin_db": (1.0, lambda c: c.gain_least_db),
-        "delay_margin_s": (1.0, lambda c: c.delay_least_s),
-        "overshoot_percent": (-1.0, lambda c: 100.0 * c.overshoot_most),
-    }
-)
-"""The numbers a gate may ask for: 1 where more is better, -1 where less is, and how each is read off a check."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -209,11 +91,13 @@ class Verification(Plotted):
     """The largest curvature (1/m) that the runs held, NaN where each speed has a model of its own."""
     actuator: Mapping[str, float | None]
     """Lag (s), delay (s), rate limit (rad/s) and latency (s) that it was flown with."""
+    worse: tuple[float, ...]
+    """The speeds (m/s) of rows that the constant gain is better than."""
 
     @property
     def extrapolated(self) -> tuple[float, float] | None:
         """The smallest step (rad) that turns tighter than the runs did, and the least share of its curvature that they held."""
-        for i, size in enumerate(STEPS_RAD[self.schedule.axis]):
+        for i, size in enumerate(steps_of(self.schedule)):
             held = min(self.tightest_flown / max(tightest(flown.scheduled[i]), 1e-9) for flown in self.flown)
             if held < MIN_COVERED_SHARE:
                 return size, held
@@ -260,25 +144,55 @@ def verify_schedule(
         of = plants_of(source, limits, runs, schedule.provenance.get("length_m"))
     places = checked_speeds(schedule)
     plants = [of.family_at(speed, schedule.at(speed).fin_limit, draws, SEED + 10 * i) for i, (speed, _) in enumerate(places)]
-    seen, size = of.tightest_flown, STEP_ANGLE_RAD[schedule.axis]
+    seen, size = of.tightest_flown, schedule.wish.step_of(schedule.axis)
     paces = [pace_of(plant, schedule.at(plant.speed).fin_limit, size) for plant in plants]
-    constant = best_constant(schedule, plants, paces, step=size)
+    judged = [_judged(of, schedule, speed) for speed, _ in places]
+    one = best_constant(multiples_of([r.gains for r in schedule.rows]), judged)
+    constant = replace(schedule.rows[0], gains=one)
 
     def checked(i: int) -> tuple[Check, Check, FlownSet]:
         speed, knot = places[i]
-        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), seen, knot=knot)
-        one, steps, leg = _check(flight, schedule.at(speed), schedule.rows, constant=False)
-        held = held_at(constant, schedule, speed)
+        flight = _Flight(plants[i], paces[i], schedule, of.noise_at(speed), seen, judged[i], knot=knot)
+        own, steps, leg = _check(flight, schedule.at(speed), schedule.rows, constant=False)
+        held = replace(schedule.at(speed), gains=one)
         other, theirs, _ = _check(flight, held, (held,), constant=True)
-        return one, other, FlownSet(speed, paces[i], steps, theirs, leg)
+        return own, other, FlownSet(speed, paces[i], steps, theirs, leg)
 
     scheduled, compared, flown = zip(*parallel_map(checked, list(range(len(places)))), strict=True)
     spread = any(bool((getattr(plants[0], name) != getattr(plants[0], name)[:1]).any()) for name in PARTS if name != "speed_loss")
     kept, heard = of.says, max((m.noise.disturbance for m in source.models), default=0.0)
     unstable = of.belief is None and any(float(p.growth[0]) > 0.0 for p in plants)
+    demands = [place.demand for place in judged]
+    judgements = zip(scheduled, compared, demands, strict=True)
+    worse = tuple(a.speed for a, b, demand in judgements if a.knot and a.outcome.worse_than(b.outcome, demand))
     return Verification(
-        schedule, scheduled, compared, constant, flown, draws, spread, of.draws_of, kept, heard, unstable, seen, of.actuator
+        schedule,
+        scheduled,
+        compared,
+        constant,
+        flown,
+        draws,
+        spread,
+        of.draws_of,
+        kept,
+        heard,
+        unstable,
+        seen,
+        of.actuator,
+        worse,
     )
+
+
+def steps_of(schedule: Schedule) -> tuple[float, float, float]:
+    """Return the steps (rad) that a schedule is tried with: the standard ones, its own in place of the middle one."""
+    small, _, large = STEPS_RAD[schedule.axis]
+    return small, schedule.wish.step_of(schedule.axis), large
+
+
+def _judged(of: Plants, schedule: Schedule, speed: float) -> Place:
+    """Return where gains are judged by the objective: on the draws that the rows were designed on."""
+    limit = schedule.at(speed).fin_limit
+    return place_of(of.at(speed, limit, DESIGN_DRAWS, DESIGN_SEED), schedule.wish, limit, schedule.answer.settling)
 
 
 def checked_speeds(schedule: Schedule) -> list[tuple[float, bool]]:
@@ -303,6 +217,7 @@ class _Flight:
     schedule: Schedule
     noise: Noise | None
     seen: float
+    place: Place
     knot: bool
 
 
@@ -311,8 +226,9 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
     phase, gain, delay = control_margins(plant, row.gains)
     found = margins(plant, row.gains)
     least_phase, least_gain, least_delay = found.worst()
-    flights = [_flown_to_rest(plant, rows, size, pace) for size in STEPS_RAD[schedule.axis]]
-    small, usual, large = (_step(s, size) for s, size in zip(flights, STEPS_RAD[schedule.axis], strict=True))
+    sizes = steps_of(schedule)
+    flights = [_flown_to_rest(plant, rows, size, pace) for size in sizes]
+    small, usual, large = (_step(s, size) for s, size in zip(flights, sizes, strict=True))
     large = _with_what_is_known(large, flights[2], plant, flight.seen)
     known = [_trimmed(r, -FIN_OFFSET_RAD) for r in rows]
     one = plant.one()
@@ -327,6 +243,7 @@ def _check(flight: _Flight, row: Row, rows: Sequence[Row], *, constant: bool) ->
         (small, usual, large), float(np.min(flights[2].speed[:, 0])),
         float(steady_error(bent.angle, 0.0)[0]), float(steady_error(unknown.angle, 0.0)[0]),
         float(np.std(leg.angle[:, 0])), float(np.std(leg.fin[:, 0])), depth_over, depth_settled, pace.leg,
+        flight.place.outcome(row.gains),
     )  # fmt: skip
     return check, (flights[0].one(), flights[1].one(), flights[2].one()), leg
 

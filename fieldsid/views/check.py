@@ -8,7 +8,7 @@ from fieldsid.rounding import number
 from fieldsid.views._row import row_view
 
 if TYPE_CHECKING:
-    from fieldsid.schedule.verify import Check
+    from fieldsid.schedule.check import Check
 
 
 def line(check: Check) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Page, facts, listed
@@ -48,4 +48,11 @@ def label(model: Model) -> str:
     return "+".join(model.runs) or model.axis.value
 
 
-VIEW = View("model", line, page, frames, label)
+def system(model: Model, speed: float | None) -> Any:
+    """Return the plant at a speed."""
+    from fieldsid.views._control import model_system
+
+    return model_system(model, speed)
+
+
+VIEW = View("model", line, page, frames, label, system=system)

@@ -33,12 +33,12 @@ def page(schedule: Schedule) -> Page:
             *(number(v, 4) for v in (r.gains.kp, r.gains.ki, r.gains.kd)),
             *(number(v, 3) for v in (r.feed_forward, r.fin_limit)),
             f"{r.phase_margin_deg:.0f}",
-            f"{r.slowed:.2f}",
             "yes" if r.supported else "no",
+            r.binds,
         )
         for r in schedule.rows
     )
-    heads = ("m/s", "kp", "ki", "kd", "forward rad", "fin rad", "phase deg", "slowed", "data")
+    heads = ("m/s", "kp", "ki", "kd", "forward rad", "fin rad", "phase deg", "data", "bound by")
     known = facts(
         "Statistics",
         (
@@ -66,4 +66,13 @@ def figures(schedule: Schedule) -> Mapping[str, Callable[[], Any]]:
     return {"gains": lambda: gains_figure(schedule)}
 
 
-VIEW = View("schedule", line, page, frames, lambda schedule: schedule.axis.value, figures)
+def system(schedule: Schedule, speed: float | None) -> Any:
+    """Return the controller at a speed, without one those of the rows by speed."""
+    from fieldsid.views._control import controller_system
+
+    if speed is None:
+        return {row.speed: controller_system(row, schedule.axis) for row in schedule.rows}
+    return controller_system(schedule.at(speed), schedule.axis)
+
+
+VIEW = View("schedule", line, page, frames, lambda schedule: schedule.axis.value, figures, system=system)

@@ -131,6 +131,40 @@ def test_export_into_shows_first_and_writes_only_when_told(run_cli, gains, tmp_p
     assert (tmp_path / "vehicle_config.yaml.bak").read_text().startswith("# mine")
 
 
+def test_a_file_that_an_export_replaces_is_shown_and_kept(run_cli, gains, tmp_path):
+    own = tmp_path / "uuv.params"
+    own.write_text("1\t1\tUUV_YAW_P\t4.0\t9\n")
+    assert run_cli("schedule", "export", gains, "--to", "px4", "-o", own).code == 2
+    assert not (tmp_path / "uuv.params.bak").exists()
+    answer = run_cli("schedule", "export", gains, "--to", "px4", "-o", own, "--force")
+    assert answer.code == 0
+    assert "-1\t1\tUUV_YAW_P\t4.0\t9" in answer.out
+    assert "as it was: " in answer.out
+    assert (tmp_path / "uuv.params.bak").read_text() == "1\t1\tUUV_YAW_P\t4.0\t9\n"
+    assert run_cli("schedule", "export", gains, "--to", "px4").out == own.read_text()
+    again = run_cli("schedule", "export", gains, "--to", "px4", "-o", own, "--force", "--json")
+    assert json.loads(again.out)["difference"] == ""
+    assert not (tmp_path / "uuv.params.bak2").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--settling=0.5s", "no gains settle a 20 deg step within 0.5 s"),
+        ("--settling=soon", "'soon' is no number with `s` or `ms`"),
+        ("--bandwidth=50", "no gains have a bandwidth of 50 rad/s"),
+        ("--overshoot=0.2", "is 0.2 % or 20 %"),
+        ("--fin-use=300%", "the share of the fin must lie in 1 .. 100 %"),
+        ("--latency=20s", "`--latency` must be a number, 0 to 10 s"),
+    ],
+)
+def test_a_wish_that_cannot_be_had_is_refused_with_a_hint(run_cli, tmp_path, option, said):
+    answer = run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.26", "--controller", "pd", option)
+    assert answer.code == 2
+    assert said in answer.err
+    assert "hint: " in answer.err
+
+
 def test_export_into_needs_a_key_that_is_there(run_cli, gains, tmp_path):
     config = tmp_path / "vehicle_config.yaml"
     config.write_text("control: {heading: 1}\n")

@@ -76,7 +76,7 @@ def test_the_text_carries_provenance_signs_margins_and_support(name, schedule):
         assert word in text, word
 
 
-@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"yaml"}))
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"yaml", "px4"}))
 def test_every_number_has_a_decimal_point_and_no_exponent(name, schedule):
     target = all_targets()[name]
     body = "\n".join(
@@ -206,7 +206,28 @@ def read_moos(text, node):
     return {k: [float(r[k]) for r in rows] for k in rows[0]}
 
 
-READERS = {"yaml": read_yaml, "ros2": read_ros2, "dune": read_dune, "ardupilot": read_ardupilot, "moos": read_moos}
+def read_px4(text, node):
+    rows = [line.removeprefix("# row: ") for line in text.splitlines() if line.startswith("# row: ")]
+    held = [dict(part.split(" = ") for part in row.split(", ")) for row in rows]
+    columns = {k: [float(r[k]) for r in held] for k in held[0]}
+    lines = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
+    assert [line[:2] + line[4:] for line in lines] == [["1", "1", "9"]] * 2
+    gains = {name.removeprefix(f"{node}_"): float(value) for _, _, name, value, _ in lines}
+    axis = {name.split("_")[0] for name in gains}.pop()
+    assert axis in ("YAW", "PITCH")
+    for name, column in (("P", "kp"), ("D", "kd")):
+        assert gains[f"{axis}_{name}"] == pytest.approx(abs(columns[column][-1]) / columns["fin_limit_rad"][-1], abs=1e-5)
+    return columns
+
+
+READERS = {
+    "px4": read_px4,
+    "yaml": read_yaml,
+    "ros2": read_ros2,
+    "dune": read_dune,
+    "ardupilot": read_ardupilot,
+    "moos": read_moos,
+}
 
 
 def test_every_target_has_a_reader_here():

@@ -12,10 +12,10 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import DEPTH_STEP_M, PITCH_LIMIT_RAD, verify_schedule
+from fieldsid.schedule.wish import Wish
 
 HULL, FINS, SPEED, START_M = with_fins(REMUS, 3.0), Fins(lag=0.15, limit=0.35, elevator_offset=0.02), 1.5, 5.0
 TIMES, PULSES = (0.0, 4.0, 6.0, 8.0, 20.0, 22.0, 24.0, 36.0), (np.nan, 0.15, -0.15, np.nan, -0.1, 0.1, np.nan, np.nan)
@@ -33,7 +33,7 @@ def schedule():
     run = Run("pitch", log.pop("time_s"), log)
     (found,) = identify([run], Axis.PITCH, effects=("heave_coupling",), method="output_error")
     source = source_of_models([found.model], ["pitch"])
-    wish = Wish("pd", largest_error=float(np.radians(10.0)))
+    wish = Wish("pd", step=float(np.radians(10.0)))
     made = design_schedule(source, 0.26, wish=wish, limits=FinLimits(lag=FINS.lag), depth=True)
     (check,) = verify_schedule(made, source, draws=20).scheduled
     return made, check

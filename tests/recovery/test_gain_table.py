@@ -10,8 +10,8 @@ from truth.gain_table import Outcome, evaluate, identified, table
 from truth.maneuvering.hulls import KINDS, Hull, draw_hull
 
 from fieldsid.errors import ModelError
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.wish import Wish
 
 SEED = 7
 

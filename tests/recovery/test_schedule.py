@@ -12,10 +12,10 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.models.model import save_model
 from fieldsid.plant.parameter_source import load_parameter_source
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.verify import checked_speeds, verify_schedule
+from fieldsid.schedule.wish import Wish
 
 KNOTS = (1.2, 1.6, 2.0)
 FINS = Fins(lag=0.15, rate=1.0, limit=0.3)
@@ -29,7 +29,7 @@ def flown(speed: float, seed: int, fins: Fins = FINS) -> Run:
     return Run(f"pulses_{speed:.1f}", log.pop("time_s"), log)
 
 
-def schedule_from(folder, fins: Fins, kind: str = "pd", bandwidth: float | None = 1.0):
+def schedule_from(folder, fins: Fins, kind: str = "pd", bandwidth: float | None = 0.9):
     paths = []
     for i, speed in enumerate(KNOTS):
         (fit,) = identify([flown(speed, 20 + i, fins)], Axis.YAW, method="output_error")

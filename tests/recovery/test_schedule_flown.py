@@ -15,11 +15,11 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource, source_of_models
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.flown.response import overshoot, settling, swing
 from fieldsid.schedule.linear_plant import FinLimits
 from fieldsid.schedule.make import design_schedule, usual_controller
 from fieldsid.schedule.verify import STEPS_RAD, verify_schedule
+from fieldsid.schedule.wish import Wish
 
 FINS = Fins(lag=0.15, limit=0.35)
 HULLS = {"stable": with_fins(REMUS, 3.0), "hardly stable": with_fins(REMUS, 2.0), "unstable": REMUS}

@@ -23,10 +23,11 @@ from fieldsid.fitting.identify import identify
 from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import ParameterSource, source_of_models
-from fieldsid.schedule.design import Wish
+from fieldsid.schedule.check import StepCheck
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.record import Schedule
-from fieldsid.schedule.verify import STEPS_RAD, StepCheck, verify_schedule
+from fieldsid.schedule.verify import STEPS_RAD, verify_schedule
+from fieldsid.schedule.wish import Wish
 from truth.maneuvering.hulls import KINDS, Hull, draw_hull
 from truth.maneuvering.steered import steered
 from truth.maneuvering.trials import SETS, training

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.plant.parameter_source import ParameterSource
+    from fieldsid.schedule.check import Check, StepCheck
     from fieldsid.schedule.record import Schedule
-    from fieldsid.schedule.verify import Check, StepCheck, Verification
+    from fieldsid.schedule.verify import Verification
 
 SLOWED_SHARE = 0.995
 """Below it a row's share is not printed as 1.00."""
@@ -25,7 +26,7 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
 
     from fieldsid.rounding import number
     from fieldsid.schedule.verdict import fin_of, lost
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
+    from fieldsid.schedule.verify import steps_of
 
     (times, angle), extra = shown_in("rad"), ("kz",) if schedule.depth else ()
     rows = [
@@ -37,22 +38,25 @@ def render_design(to: Console, schedule: Schedule, source: ParameterSource, body
             number(times * r.feed_forward, 3),
             number(times * r.fin_limit, 3),
             *((number(r.depth_gain, 3),) if schedule.depth else ()),
+            f"{100 * r.fin_use:.0f}%",
             f"{r.phase_margin_deg:.0f}",
-            f"{r.slowed:.2f}",
             f"{r.settling:.1f}" if isfinite(r.settling) else "never",
             f"{100 * r.draws_held:.0f}%",
             "yes" if r.supported else "no",
         )
         for r in schedule.rows
     ]
-    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "phase", "slowed", "settle s", "held", "data")
+    columns = ("m/s", "kp", "ki", "kd", "forward", "fin", *extra, "asks", "phase", "settle s", "held", "data")
     to.print(table(f"{schedule.axis.value}, {schedule.kind}: gains per speed, forward and fin in {angle}", columns, rows, left=0))
     to.print(f"signs: {schedule.provenance['sign_convention']}")
     counted = (fin_of(schedule.actuator), str(schedule.provenance["speed_lost"]), *lost(source))
     to.print(f"counted with: {'; '.join(counted)}")
+    for binds in dict.fromkeys(r.binds for r in schedule.rows):
+        to.print(f"bound by {binds}: {', '.join(number(r.speed, 3) for r in schedule.rows if r.binds == binds)} m/s")
+    drawn = f"{schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}"
     to.print(
-        f"phase, settle: the worst of 95 % of {schedule.provenance['draws']} draws of {schedule.provenance['draws_of']}; "
-        f"held: those that come to rest from a {degrees(STEP_ANGLE_RAD[schedule.axis]):.0f} deg step"
+        f"asks: of the fin by a {degrees(steps_of(schedule)[1]):.0f} deg step; phase, settle: the worst of 95 % of {drawn}; "
+        "held: those that come to rest from that step"
     )
     if rejected := schedule.provenance["draws_rejected"]:
         to.print(f"up to {100 * rejected:.0f} % of the draws were rejected as outside what is physical, and drawn anew")
@@ -134,6 +138,7 @@ def _settles(seconds: float, step: StepCheck) -> str:
 def render_export(to: Console, body: Mapping[str, Any]) -> None:
     """Print the file written, or the text where there is none."""
     if body["file"]:
-        to.print(f"exported: {body['file']}", soft_wrap=True)
+        print_file(to, body["difference"])
+        to.print(f"exported: {body['file']}" + (f"; as it was: {body['backup']}" if body["backup"] else ""), soft_wrap=True)
     else:
         print_file(to, body["text"])

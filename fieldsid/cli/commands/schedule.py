@@ -26,13 +26,44 @@ command = typer.Typer(
     "Example: sysid schedule design models/*.yaml -o gains.yaml"
 )
 
+ANSWERED = "The answer asked"
 ScheduleFile = Annotated[Path, typer.Argument(metavar="SCHEDULE", help="A schedule written by `sysid schedule design`.")]
 Controller = Annotated[
     str | None,
     typer.Option("--controller", metavar="KIND", help="p, pd, pi, pid or lqr; pd where the runs have a rate, else p."),
 ]
-Damping = Annotated[float, typer.Option("--damping", help="Damping ratio of the closed loop.")]
-PhaseWanted = Annotated[str, typer.Option("--phase-margin", metavar="ANGLE", help="Phase margin to keep, `45deg`.")]
+Settling = Annotated[
+    str | None,
+    typer.Option(
+        "--settling", metavar="TIME", help="Settle within this, `4s`, or `quickest`; if not given as the slowest speed can.",
+        rich_help_panel=ANSWERED,
+    ),
+]  # fmt: skip
+Bandwidth = Annotated[
+    str | None,
+    typer.Option("--bandwidth", metavar="RATE", help="Bandwidth in place of a time, `1rad/s`.", rich_help_panel=ANSWERED),
+]
+Overshoot = Annotated[
+    str | None, typer.Option("--overshoot", metavar="SHARE", help="The most overshoot, `10%`.", rich_help_panel=ANSWERED)
+]
+Step = Annotated[
+    str | None,
+    typer.Option(
+        "--step", metavar="ANGLE", help="The error that may ask for the whole fin: 20 deg of yaw, 10 of pitch if not given.",
+        rich_help_panel=ANSWERED,
+    ),
+]  # fmt: skip
+FinUse = Annotated[
+    str | None,
+    typer.Option("--fin-use", metavar="SHARE", help="Of the fin that step may ask for, `80%`.", rich_help_panel=ANSWERED),
+]
+Damping = Annotated[
+    float | None,
+    typer.Option("--damping", help="Damping ratio of the loop: that of the overshoot, else 0.7071.", rich_help_panel=ANSWERED),
+]
+PhaseWanted = Annotated[
+    str, typer.Option("--phase-margin", metavar="ANGLE", help="Phase margin to keep, `45deg`.", rich_help_panel=ANSWERED)
+]
 Speeds = Annotated[
     str | None, typer.Option("--speeds", metavar="LIST", help="Speeds of the rows, m/s; those of the models if not given.")
 ]
@@ -52,17 +83,19 @@ FinRate = Annotated[
     ),
 ]
 FinLag = Annotated[
-    float | None,
-    typer.Option("--fin-lag", metavar="S", help="Time constant of the fin; the model's if not given.", rich_help_panel=LIMITS),
+    str | None,
+    typer.Option("--fin-lag", metavar="TIME", help="Time constant, `0.2s`; the model's if not given.", rich_help_panel=LIMITS),
 ]
 Delay = Annotated[
-    float | None,
-    typer.Option("--delay", metavar="S", help="Dead time from command to fin; the model's if not given.", rich_help_panel=LIMITS),
+    str | None,
+    typer.Option(
+        "--delay", metavar="TIME", help="Dead time from command to fin; the model's if not given.", rich_help_panel=LIMITS
+    ),
 ]
 Latency = Annotated[
-    float | None,
+    str | None,
     typer.Option(
-        "--latency", metavar="S", help="The autopilot's own, sensor to command, with half its period.", rich_help_panel=LIMITS
+        "--latency", metavar="TIME", help="The autopilot's own, sensor to command, with half its period.", rich_help_panel=LIMITS
     ),
 ]
 Depth = Annotated[bool, typer.Option("--depth", help="Add the depth loop above pitch.")]
@@ -79,9 +112,15 @@ MarginFigure = Annotated[
 NeedPhase = Annotated[
     str | None, typer.Option("--require-phase-margin", metavar="ANGLE", help="Exit 1 when any speed has less, `40deg`.")
 ]
-NeedGain = Annotated[float | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less.")]
-NeedDelay = Annotated[float | None, typer.Option("--require-delay-margin", metavar="S", help="Exit 1 when any speed has less.")]
-MostOvershoot = Annotated[float | None, typer.Option("--max-overshoot", metavar="PERCENT", help="Exit 1 when any step has more.")]
+NeedGain = Annotated[
+    str | None, typer.Option("--require-gain-margin", metavar="DB", help="Exit 1 when any speed has less, `6dB`.")
+]
+NeedDelay = Annotated[
+    str | None, typer.Option("--require-delay-margin", metavar="TIME", help="Exit 1 when any speed has less, `0.3s`.")
+]
+MostOvershoot = Annotated[
+    str | None, typer.Option("--max-overshoot", metavar="SHARE", help="Exit 1 when any step has more, `20%`.")
+]
 TARGETS = ", ".join(m.name for m in iter_modules([str(Path(__file__).parents[2] / "exports")]) if not m.name.startswith("_"))
 To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"One of {TARGETS}.")]
 Node = Annotated[
@@ -99,7 +138,12 @@ Write = Annotated[bool, typer.Option("--write", help="Change the file of `--into
 def design(
     models: ModelFiles,
     controller: Controller = None,
-    damping: Damping = 0.7071,
+    settling: Settling = None,
+    bandwidth: Bandwidth = None,
+    overshoot: Overshoot = None,
+    step: Step = None,
+    fin_use: FinUse = None,
+    damping: Damping = None,
     phase_margin: PhaseWanted = "45deg",
     speeds: Speeds = None,
     fin_limit: FinLimit = None,
@@ -117,22 +161,22 @@ def design(
     """Design gains per speed: PD or P with feed-forward, PI, PID, LQR; heading or pitch, by the models' axis.
 
     Damping and phase margin hold with the fin's lag and delay, half of the margin for 95 % of the draws of the models' errors,
-    and a step flown by them comes to rest: with the fin's limits and the speed lost in the turn. P and PI are slowed until they
-    do; with a rate the gains are those of least error and fin, each over its largest. What none holds is refused. The
-    feed-forward cancels the trim.
+    and a step flown by them comes to rest: with the fin's limits and the speed lost in the turn. With a rate all speeds settle
+    alike, each with the least fin that does: as soon as asked, else as the slowest can. P and PI have the damping's gain. Each
+    row says what binds it, and what none holds is refused with what is possible. The feed-forward cancels the trim.
 
-    Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
+    Example: sysid schedule design law.yaml --fin-limit 15deg -o gains.yaml
     """
-    from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, parse_angle, parse_margin
+    from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import fins_of, length_of, runs_behind
+    from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
-    from fieldsid.schedule.design import Wish
     from fieldsid.schedule.linear_plant import FinLimits
     from fieldsid.schedule.make import design_schedule, usual_controller
     from fieldsid.schedule.record import body_of, save_schedule
-    from fieldsid.schedule.verify import STEP_ANGLE_RAD
+    from fieldsid.schedule.wish import QUICKEST, Wish
 
     refuse_existing(output, force=force)
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
@@ -145,8 +189,17 @@ def design(
         source,
         limit,
         speeds=speeds_of(speeds),
-        wish=Wish(controller or usual_controller(source), damping, margin, STEP_ANGLE_RAD[source.axis]),
-        limits=FinLimits(fin_lag, delay, rate, latency),
+        wish=Wish(
+            controller or usual_controller(source),
+            damping,
+            margin,
+            step=None if step is None else parse_angle(step, "--step", TILT, HEADING),
+            bandwidth=None if bandwidth is None else parse_quantity(bandwidth, "--bandwidth", BANDWIDTH, "1rad/s"),
+            settling=QUICKEST if settling == "quickest" else _time(settling, "--settling"),
+            overshoot=None if overshoot is None else parse_share(overshoot, "--overshoot"),
+            fin_use=None if fin_use is None else parse_share(fin_use, "--fin-use"),
+        ),
+        limits=FinLimits(_time(fin_lag, "--fin-lag"), _time(delay, "--delay"), rate, _time(latency, "--latency")),
         depth=depth,
         runs=runs_behind(source, say),
         length=length_of(vehicle),
@@ -191,6 +244,7 @@ def verify(
     from fieldsid.angles import parse_margin
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import designed_from, runs_behind
+    from fieldsid.face.quantities import DECIBEL, parse_quantity, parse_share, parse_time
     from fieldsid.plant.parameter_source import load_parameter_source
     from fieldsid.schedule.record import load_schedule
     from fieldsid.schedule.verdict import against_constant, gates_of, rests_on, verdict_of
@@ -202,7 +256,10 @@ def verify(
     source = load_parameter_source(models or designed_from(known, str(schedule)))
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     checked = verify_schedule(known, source, runs=runs_behind(source, say))
-    wanted = (least, require_gain_margin, require_delay_margin, max_overshoot)
+    gain = None if require_gain_margin is None else parse_quantity(require_gain_margin, "--require-gain-margin", DECIBEL, "6dB")
+    delay = None if require_delay_margin is None else parse_time(require_delay_margin, "--require-delay-margin", "0.3s")
+    most = None if max_overshoot is None else 100.0 * parse_share(max_overshoot, "--max-overshoot")
+    wanted = (least, gain, delay, most)
     gates = gates_of(checked, dict(zip(checked.worst, wanted, strict=True)))
     verdict, says = verdict_of(checked, known, gates)
     body = {
@@ -241,10 +298,10 @@ def export(
     force: Force = False,
     as_json: JsonFlag = False,
 ) -> Mapping[str, Any]:
-    """Write a schedule as plain YAML, ROS 2 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
+    """Write a schedule as plain YAML, ROS 2 or PX4 parameters, DUNE ini, ArduPilot .param or MOOS block; to stdout without `-o`.
 
     `--into FILE --key A.B.C` shows how an existing YAML file would change, comments and order kept, and changes it only with
-    `--write`; the file as it was is kept as .bak.
+    `--write`. A file that is changed, or replaced by `-o FILE --force`, is kept as it was as .bak, and the difference is shown.
 
     Example: sysid schedule export gains.yaml --to ros2 -o heading.yaml
     """
@@ -262,12 +319,23 @@ def export(
     target = pick_target(to)
     text = target.render(known, node or target.node, template)
     body: dict[str, Any] = {"schema": "fieldsid/export/1", "target": target.name, "text": text, "file": None}
+    body |= {"difference": "", "backup": None}
     if output is not None:
-        from fieldsid.artifacts import write_text
-
-        body["file"] = str(write_text(output, text, force=force))
+        body |= _written(output, text, force=force)
     headline, is_file = of_export(body, schedule), body["file"] is None
     return emit(body, as_json=as_json, render=lambda out: render_export(out, body), headline=headline, is_file=is_file)
+
+
+def _written(output: Path, text: str, *, force: bool) -> dict[str, Any]:
+    """Write an export; of a file that it replaces the difference is shown and a backup kept."""
+    from fieldsid.artifacts import write_text
+    from fieldsid.exports._patch import patch_text, write_patch
+
+    if not (force and output.is_file()):
+        return {"file": str(write_text(output, text, force=force))}
+    patch = patch_text(output, text)
+    backup = str(write_patch(patch)) if patch.difference else None
+    return {"file": str(output), "difference": patch.difference, "backup": backup}
 
 
 def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write: bool, as_json: bool) -> Mapping[str, Any]:
@@ -279,6 +347,12 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     body = {"schema": "fieldsid/export/1", "target": "into", "difference": patch.difference, "file": str(into), "backup": backup}
     headline = of_patch(body, schedule, key)
     return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
+
+
+def _time(text: str | None, option: str) -> float | None:
+    from fieldsid.face.quantities import parse_time
+
+    return None if text is None else parse_time(text, option)
 
 
 def _limits(

@@ -19,6 +19,9 @@ from fieldsid.schedule.record import Row
 HULL_STEPS = 2.0
 """Steps of a plant in one of a flight in surge, sway and yaw: half of it moves the settling by less than a hundredth."""
 SETTLING_BAND = 0.05
+FLIGHT_ERROR_SHARE = 0.01
+"""What a flight is off its model's by, over the step: hulls of `tests/truth/gain_table.py` overshot by 0.2 to 0.8 % more or less
+than said, which is half a swing of settling where an overshoot just touches the corridor."""
 FASTEST_LAG_S = 1e-6
 TAIL_SHARE = 0.25
 """The last part of a response: what still swings there is a limit cycle."""

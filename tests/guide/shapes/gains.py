@@ -40,6 +40,10 @@ class Row(Shape):
     """Share of the draws with the wished margin that come to rest from the standard step."""
     settling_s: Number
     """Time of 95 % of them to stay within 5 % of it."""
+    binds: str
+    """What keeps the gains from more bandwidth."""
+    fin_use: Number
+    """The share of the fin's limit that the step asks for."""
 
 
 class Actuator(Shape):
@@ -53,6 +57,23 @@ class Actuator(Shape):
     """Fastest rate; null where it is not limited."""
     latency_s: Number
     """The autopilot's own."""
+
+
+class Answer(Shape):
+    """The answer to a step that the rows were designed for, and what was asked of it; null where it was not."""
+
+    settling_s: float
+    """The time in which all rows settle; zero where each has its own."""
+    step_rad: Number
+    """The step, the error that may ask for the fin."""
+    asked_settling_s: Number
+    """The time asked; zero for the quickest."""
+    asked_bandwidth_rad_s: Number
+    """The bandwidth asked."""
+    asked_overshoot: Number
+    """The overshoot asked, as a share."""
+    asked_fin_use: Number
+    """The share of the fin asked."""
 
 
 class Schedule(Result):
@@ -71,6 +92,8 @@ class Schedule(Result):
     """Whether a depth loop is added."""
     actuator: Actuator
     """The fin."""
+    answer: Answer
+    """The answer to a step."""
     rows: list[Row]
     """One for each speed."""
     stated: dict[str, Any]
@@ -161,6 +184,10 @@ class Check(Shape):
     """Its settling time."""
     depth_flown_s: Number
     """How long it was flown."""
+    answer_s: Number
+    """The time to settle that the rows are designed by."""
+    fin_use: Number
+    """The share of the fin's limit that the step asks for."""
 
 
 class Worst(Shape):
@@ -235,6 +262,10 @@ class Export(Shape):
     """The file's text."""
     file: str | None
     """The file that was written."""
+    difference: str
+    """How a file that was replaced has changed, as a unified difference."""
+    backup: str | None
+    """That file as it was; null where none was replaced."""
 
 
 class Patch(Shape):

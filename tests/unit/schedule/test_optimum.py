@@ -9,9 +9,9 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.make import design_schedule
-from fieldsid.schedule.optimum import minimum
+from fieldsid.schedule.search.optimum import minimum
+from fieldsid.schedule.wish import Wish
 
 REFERENCE = 1.5
 HULLS = {

@@ -11,12 +11,12 @@ from fieldsid.logs.run import Run
 from fieldsid.models.axis import Axis
 from fieldsid.plant.parameter_source import source_of_models
 from fieldsid.schedule.controller import closed_poles
-from fieldsid.schedule.design import Wish
 from fieldsid.schedule.flown import response
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.plants import plants_of
 from fieldsid.schedule.verdict import verdict_of
 from fieldsid.schedule.verify import stated_limits, verify_schedule
+from fieldsid.schedule.wish import Wish
 
 KIND = {kind.name: kind for kind in KINDS}
 LIMIT = 0.35

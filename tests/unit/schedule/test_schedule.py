@@ -17,7 +17,6 @@ from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.laws.axis_laws import save_laws
 from fieldsid.plant.parameter_source import ParameterSource, load_parameter_source
 from fieldsid.schedule.controller import KINDS, Gains, closed_poles, least_damping
-from fieldsid.schedule.design import Wish, design_gains
 from fieldsid.schedule.flown.closed_loop_kernel import close_loop
 from fieldsid.schedule.flown.hull_kernel import close_hull_loop
 from fieldsid.schedule.flown.jit_warmup import compile_loops
@@ -35,8 +34,10 @@ from fieldsid.schedule.linear_plant import FinLimits, LinearPlant, not_counted, 
 from fieldsid.schedule.make import design_schedule
 from fieldsid.schedule.margins import control_margins, margins
 from fieldsid.schedule.record import load_schedule, save_schedule
+from fieldsid.schedule.search.design import design_gains
 from fieldsid.schedule.verdict import against_constant, lost
 from fieldsid.schedule.verify import checked_speeds, verify_schedule
+from fieldsid.schedule.wish import Wish
 
 
 def source_of(folder, rows, names):
@@ -278,7 +279,7 @@ def test_depth_through_pitch_settles_without_overshoot_to_speak_of(pitch):
 
 def test_the_depth_loop_keeps_its_phase_margin_by_python_control():
     own = replace(plant(stiffness=0.4, lag=0.3, delay=0.0), axis=Axis.PITCH)
-    found = design_gains(own, Wish(kind="pd", largest_error=0.175), 0.26)
+    found = design_gains(own, Wish(kind="pd", step=0.175), 0.26)
     kp, kd, ref = found.gains.kp, found.gains.kd, found.reference_gain
     pitch_loop = control.tf([-1.6 * (kp + ref)], [0.3, 1.0 + 0.3 * 1.2, 1.2 + 0.3 * 0.4 - 1.6 * kd, 0.4 - 1.6 * kp])
     _, phase, *_ = control.margin(pitch_loop * control.tf([found.depth_gain * own.speed], [1.0, 0.0]))
@@ -303,7 +304,9 @@ def test_where_one_constant_gain_is_better_it_is_said(yaw):
     rows = [replace(r, gains=r.gains.times(0.2) if i else r.gains) for i, r in enumerate(slow.rows)]
     checked = verify_schedule(replace(slow, rows=tuple(rows)), yaw, draws=4)
     assert checked.slowest[1] < checked.slowest[0]
-    assert against_constant(checked).startswith("one constant gain is better: the slowest step settles in ")
+    assert checked.worse == slow.speeds[1:]
+    assert against_constant(checked).startswith("one constant gain, kp ")
+    assert "is better at 1.36, 1.63, 1.92, 2.19 m/s: the slowest step settles in " in against_constant(checked)
     assert all(c.phase_least_deg >= 44.0 - 1.5 for c in checked.constant)
 
 

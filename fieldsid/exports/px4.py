@@ -1,0 +1,43 @@
+"""PX4 parameters of `uuv_att_control`: one set of gains, a line of MAV id, component, name, value and type for each.
+
+PX4 steers a torque of -1 .. 1 by P sin(reference - angle) - D rate, positive to starboard and nose up. Where its allocation gives
+the whole fin, +/- fin_limit, for a torque of one, P = |kp| / fin_limit (1/rad) and D = |kd| / fin_limit (s/rad): which way the
+fin turns is the allocation's. It has no integral, no feed-forward and no table over speed: the row of the highest speed is in
+force, whose fin is the strongest, the others stand as comments.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fieldsid.exports._target import Target, decimal, notes_of
+from fieldsid.schedule.record import Row, Schedule
+
+MAV, COMPONENT, REAL32 = 1, 1, 9
+LEFT_OUT = (
+    "UUV_TORQUE_SAT has to be 1.0, and a torque of one the fin at fin_limit_rad, the fin's sense in the allocation (CA_SV_CS*)",
+    "PX4 has no place for ki and reference_gain; feed_forward_rad / fin_limit_rad is the surface's trim (CA_SV_CS*_TRIM)",
+    "one set is in force, that of the highest speed: take another row's by `param set` where the vehicle goes slower for long",
+)
+
+
+def render(schedule: Schedule, node: str, template: Path | None) -> str:
+    """Return the parameter file, each name beginning with `node`."""
+    lines = [f"# {line}" for line in (*notes_of(schedule), *LEFT_OUT)]
+    last = len(schedule.rows) - 1
+    for i, row in enumerate(schedule.rows):
+        held = row.record()
+        lines.append("# row: " + ", ".join(f"{name} = {decimal(float(held[name]))}" for name in schedule.columns))
+        lines += [("" if i == last else "# ") + line for line in _parameters(schedule, row, node)]
+    return "\n".join(lines) + "\n"
+
+
+def _parameters(schedule: Schedule, row: Row, node: str) -> list[str]:
+    """Return a row's lines; both gains of a loop have the sign of the authority, and PX4's have none."""
+    way = -1.0 if row.gains.kp < 0.0 else 1.0
+    gains = {"P": row.gains.kp, "D": row.gains.kd}
+    name = f"{node}_{schedule.axis.value.upper()}"
+    return [f"{MAV}\t{COMPONENT}\t{name}_{k}\t{decimal(way * v / row.fin_limit)}\t{REAL32}" for k, v in gains.items()]
+
+
+EXPORT = Target(name="px4", says="PX4 .params of uuv_att_control, one set of gains", suffix=".params", render=render, node="UUV")

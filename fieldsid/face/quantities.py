@@ -1,0 +1,45 @@
+"""Times, shares, bandwidths and decibels as a user types them: `4s`, `10%`, `1rad/s`, `6dB`; a bare number has the first unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from fieldsid.errors import UsageError
+
+TIME = {"s": 1.0, "ms": 1e-3}
+SHARE = {"%": 0.01}
+BANDWIDTH = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
+DECIBEL = {"dB": 1.0}
+
+
+def parse_quantity(text: str, option: str, units: Mapping[str, float], example: str) -> float:
+    """Read a number with one of some units, in the unit of factor one; raises UsageError."""
+    word = text.strip()
+    named = [u for u in units if word.lower().endswith(u.lower())]
+    unit = max(named, key=len, default=next(iter(units)))
+    try:
+        value = float(word[: -len(unit)] if named else word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        known = " or ".join(f"`{u}`" for u in units)
+        raise UsageError(f"{word!r} is no number with {known}", found=f"{option} {word}", hint=f"write `{option} {example}`")
+    return value * units[unit]
+
+
+def parse_time(text: str, option: str, example: str = "4s") -> float:
+    """Read a time in s: `4s`, `400ms`, or a bare number, which is s."""
+    return parse_quantity(text, option, TIME, example)
+
+
+def parse_share(text: str, option: str) -> float:
+    """Read a share: `10%`, or a bare number, which is per cent; one that may have been meant as a share is refused."""
+    value = parse_quantity(text, option, SHARE, "10%")
+    if "%" not in text and 0.0 < value <= 0.01:
+        raise UsageError(
+            f"`{option} {text.strip()}` is {100.0 * value:g} % or {1e4 * value:g} %?",
+            found="a bare number is per cent",
+            hint=f"write `{option} {1e4 * value:g}%`, or `{100.0 * value:g}%` where that is meant",
+        )
+    return value

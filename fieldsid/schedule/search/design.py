@@ -1,0 +1,203 @@
+"""Gains at one speed for a chosen controller: by formula, with the bandwidth and damping that `search` finds.
+
+The estimate has the damping and phase margin asked; 95 % of the draws of its errors leave half of the margin and fly the step,
+with the fin's limits, the speed lost in the turn and the drag of the turning hull. P and PI have the largest gain that lets them,
+unless a time to settle or a bandwidth is asked. Feed-forward is -delta_r0 (-delta_s0 in pitch, plus c23/d2 of the reference).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fieldsid.errors import ModelError
+from fieldsid.models.axis import Axis
+from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.linear_plant import LinearPlant
+from fieldsid.schedule.margins import FREQUENCY_GRID_RAD_S, HELD_SHARE, margins, worst_of
+from fieldsid.schedule.search.binding import bound_by
+from fieldsid.schedule.search.formulas import bandwidth_of
+from fieldsid.schedule.search.objective import BETTER_SHARE, LACK_ROUNDING, Place, demand_of
+from fieldsid.schedule.search.optimum import Found, Search
+from fieldsid.schedule.wish import PROPORTIONAL, Wish
+
+LEAST_HELD = 0.5
+"""P and PI that hold fewer of the draws are refused: no proportional gain holds an unstable hull."""
+DEPTH_PHASE_MARGIN_DEG = 60.0
+"""Phase margin of the depth loop around the pitch loop: no overshoot to speak of beside what the pitch limit does."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sought:
+    """Gains found for a plant, by its draws or, where these allow none, by its estimate alone.
+
+    `binds` says what keeps them from more bandwidth; `slowed` is the bandwidth over that which the fin allows where it is lag,
+    delay, margin or the draws that do.
+    """
+
+    plant: LinearPlant
+    search: Search
+    found: Found
+    binds: str
+    slowed: float
+
+    @property
+    def settled(self) -> float:
+        """The time (s) in which the step settles, by the estimate and by 95 % of the draws it was sought by."""
+        return self.found.outcome.settled
+
+    @property
+    def bandwidth(self) -> float:
+        """The bandwidth (rad/s) of the formula's poles."""
+        return bandwidth_of(self.plant.one(), self.found.gains)
+
+    @property
+    def step(self) -> float:
+        """The step (rad) that was flown."""
+        return self.search.place.demand.step
+
+
+@dataclass(frozen=True, slots=True)
+class Designed:
+    """Gains with the loop's crossover (rad/s), the reference's and the depth's gain; what the draws do with them.
+
+    `held` is the share of the draws that come to rest from the step, `settling` (s) how long 95 % of them take.
+    """
+
+    gains: Gains
+    crossover: float
+    slowed: float
+    reference_gain: float
+    depth_gain: float
+    held: float
+    settling: float
+    binds: str
+
+
+def design_gains(plant: LinearPlant, wish: Wish, fin_limit: float) -> Designed:
+    """Return the gains of one speed alone, as quick as its fin and margins let them be; see `quickest`."""
+    return designed(quickest(plant, wish, fin_limit))
+
+
+def quickest(plant: LinearPlant, wish: Wish, fin_limit: float) -> Sought:
+    """Return the quickest gains that serve most of a plant's draws; raises ModelError where the estimate is not served.
+
+    P and PI that serve fewer than half of the draws are refused as well; with a rate, where no gains serve as many draws as they
+    have to, they are the estimate's: half-way between serves neither.
+    """
+    family = plant.distinct()
+    if wish.kind in PROPORTIONAL and family.slow_damping[0] <= 0:
+        raise _unstable(family, wish, fin_limit)
+    found, search = _found(family, wish, fin_limit), _search(family, wish, fin_limit)
+    if found is None:
+        raise _refusal(family, wish, fin_limit)
+    if search.place.held(found.gains)[0] < HELD_SHARE and (alone := _found(family.one(), wish, fin_limit)) is not None:
+        found, search = alone, _search(family.one(), wish, fin_limit)
+    return Sought(plant, search, found, bound_by(search, found), found.share)
+
+
+def answering(quick: Sought, answer: float, says: str) -> Sought:
+    """Return the gains of least fin that settle within `answer` s, bound by what `says`; the quickest where these hardly do."""
+    if quick.settled >= (1.0 - BETTER_SHARE) * answer:
+        return quick
+    search = replace(quick.search, place=quick.search.place.settled_within(answer))
+    found = search.least_fin(search.at(quick.found.share, quick.found.more))
+    return replace(quick, search=search, found=found, binds=says, slowed=1.0)
+
+
+def with_bandwidth(quick: Sought, bandwidth: float) -> Sought | None:
+    """Return the gains of a bandwidth (rad/s) with the damping that suits it best, None where they do not serve."""
+    search = replace(quick.search, place=quick.search.place.with_bandwidth(bandwidth))
+    found = search.damped(quick.found.share * bandwidth / quick.bandwidth)
+    if not found.outcome.serves:
+        return None
+    return replace(quick, search=search, found=found, binds=f"bandwidth {bandwidth:.3g} rad/s", slowed=1.0)
+
+
+def designed(sought: Sought) -> Designed:
+    """Return gains that were sought, with what the loop and the draws do with them."""
+    plant, gains = sought.plant, sought.found.gains
+    place = Place(plant.distinct(), sought.search.place.demand)
+    held, settling = place.held(gains)
+    crossover = float(np.nan_to_num(margins(plant.one(), gains).crossover[0]))
+    depth_gain = _depth_gain(place.plant, gains) if plant.axis is Axis.PITCH else 0.0
+    return Designed(gains, crossover, sought.slowed, _reference_gain(plant), depth_gain, held, settling, sought.binds)
+
+
+def _depth_gain(family: LinearPlant, gains: Gains) -> float:
+    """Return the gain from depth to pitch, rad/m: the cascade u k T/s keeps its phase margin with 95 % of the draws.
+
+    T is the closed pitch loop from its reference, so the crossover is where T lags by 90 deg less the margin.
+    """
+    omega = FREQUENCY_GRID_RAD_S
+    asked = gains.kp + gains.ki / (1j * omega) + _reference_gain(family)
+    hull = family.response(omega)
+    closed = hull * asked[None, :] / (1.0 + hull * gains.response(omega)[None, :])
+    phase = np.degrees(np.unwrap(np.angle(closed), axis=1))
+    first = np.argmax(phase <= DEPTH_PHASE_MARGIN_DEG - 90.0, axis=1)
+    reached = np.take_along_axis(np.abs(closed), first[:, None], axis=1)[:, 0]
+    return worst_of(omega[first] / (family.speed * reached), most=False)
+
+
+def _reference_gain(plant: LinearPlant) -> float:
+    return float(plant.stiffness[0]) / float(plant.slow_authority[0])
+
+
+def _search(family: LinearPlant, wish: Wish, fin_limit: float) -> Search:
+    return Search(Place(family, demand_of(family, wish, fin_limit)), wish)
+
+
+def _found(family: LinearPlant, wish: Wish, fin_limit: float) -> Found | None:
+    """Return the quickest gains; None where they do not serve the estimate, or with P and PI not half of the draws."""
+    search = _search(family, wish, fin_limit)
+    found = search.quickest()
+    if sum(found.outcome.own) > LACK_ROUNDING:
+        return None
+    return None if wish.kind in PROPORTIONAL and search.place.held(found.gains)[0] < LEAST_HELD else found
+
+
+def _unstable(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
+    growth = float(family.growth[0])
+    grows = f", a deviation doubles every {np.log(2) / growth:.2g} s" if growth > 0 else ""
+    return ModelError(
+        f"the plant is unstable at {family.speed:.3g} m/s, and a proportional gain alone cannot hold it",
+        found=f"damping {family.slow_damping[0]:.3g} 1/s{grows}{_of_draws(family)}",
+        hint=_remedy(family, wish, fin_limit),
+    )
+
+
+def _of_draws(family: LinearPlant) -> str:
+    unstable = int(np.count_nonzero(family.growth > 0.0))
+    return f"; unstable by {unstable} of {family.count} draws of the errors" if unstable and family.count > 1 else ""
+
+
+def _refusal(family: LinearPlant, wish: Wish, fin_limit: float) -> ModelError:
+    one = family.one()
+    whom = "" if family.count == 1 or wish.kind not in PROPORTIONAL else " for half of the draws of the models' errors"
+    found = f"damping {one.slow_damping[0]:.3g} 1/s, fin lag {one.lag[0]:.3g} s, delay {one.delay[0]:.3g} s"
+    return ModelError(
+        f"no {wish.kind} gain keeps damping {wish.damped:g} and {wish.phase_margin_deg:g} deg at {family.speed:.3g} m/s{whom}",
+        found=f"{found}{_of_draws(family)}",
+        hint=_remedy(family, wish, fin_limit),
+    )
+
+
+def _remedy(family: LinearPlant, wish: Wish, fin_limit: float) -> str:
+    """Return the option with which a gain is found at this speed after all; nothing where none of the usual ones does."""
+    others = {
+        **{f"--controller {kind}": replace(wish, kind=kind) for kind in ("pd", "pid", "lqr") if kind != wish.kind},
+        **{f"--damping {d:g}": replace(wish, damping=d) for d in (0.5, 0.3) if d < wish.damped},
+        **{f"--phase-margin {p:g}": replace(wish, phase_margin_deg=p) for p in (30.0, 20.0) if p < wish.phase_margin_deg},
+        **{
+            f"--controller {k} --damping 0.5 --phase-margin 30": replace(wish, kind=k, damping=0.5, phase_margin_deg=30.0)
+            for k in ("pd",)
+            if wish.damped > 0.5 and wish.phase_margin_deg > 30.0
+        },
+    }
+    for option, other in others.items():
+        if other.kind in PROPORTIONAL and family.slow_damping[0] <= 0:
+            continue
+        if _found(family, other, fin_limit) is not None:
+            return f"at this speed there is one with `{option}`"
+    return ""

@@ -1,0 +1,95 @@
+"""Gains of a chosen controller by formula, with two numbers left free: a share of a bandwidth and a multiple of the damping.
+
+Yaw P is the paper's: kp = a22^2 / (4 zeta^2 b2) puts the poles at damping zeta; with a fin's lag, delay or a sway state it is
+found as the largest gain whose poles keep that damping, which is the same number where there are none. PD: poles at a bandwidth
+and damping. PI, PID: an integral beside them. LQR: Bryson's weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+
+from fieldsid.schedule.controller import Gains
+from fieldsid.schedule.linear_plant import LinearPlant
+from fieldsid.schedule.margins import margins
+from fieldsid.schedule.wish import Wish
+
+INTEGRAL_SHARE = 0.1
+"""Integral corner over the proportional loop's crossover: a tenth costs six degrees of phase."""
+LEAST_STIFF = 1e-6
+"""Of the fin's stiffness, what is left of a hull that the whole fin hardly holds."""
+Formula = Callable[[float, float], Gains]
+"""Gains of a share of the bandwidth that uses the fin allowed, and of a multiple of the damping wished."""
+
+
+def formula_of(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
+    """Return the formula of a wish's controller for a plant's estimate whose fin may be asked for `fin` rad by the step."""
+    return _FORMULAS[wish.kind](plant.one(), wish, fin)
+
+
+def fin_bandwidth(plant: LinearPlant, fin: float, error: float) -> float:
+    """Return the bandwidth (rad/s) at which the formula's gain asks for a fin (rad) at an error (rad)."""
+    most = abs(float(plant.slow_authority[0])) * fin / error
+    return float(np.sqrt(max(most + min(float(plant.stiffness[0]), most), LEAST_STIFF * most)))
+
+
+def bandwidth_of(plant: LinearPlant, gains: Gains) -> float:
+    """Return the bandwidth (rad/s) whose formula has a plant's gain: the inverse of the formula."""
+    return fin_bandwidth(plant, abs(gains.kp), 1.0)
+
+
+def _proportional(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
+    a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
+    wished = (a * a / (4.0 * wish.damped**2) - k) / b
+    if k > 0 and wished * b <= 0:
+        wished = 0.5 * k / b  # stiff already beyond the wished damping: any gain lowers it, a modest one is left to the margins
+    most = min(abs(wished), fin / wish.step_of(plant.axis)) * float(np.sign(wished))
+    return lambda share, _: Gains(most * share**2)
+
+
+def _rate(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
+    a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
+    omega = fin_bandwidth(plant, fin, wish.step_of(plant.axis))
+
+    def gains(share: float, more: float) -> Gains:
+        w = omega * share
+        return Gains(kp=(w * w - min(k, 0.5 * w * w)) / b, kd=max(2.0 * wish.damped * more * w - a, 0.0) / b + 0.0)
+
+    return gains
+
+
+def _with_integral(trial: Formula, plant: LinearPlant) -> Formula:
+    def gains(share: float, more: float) -> Gains:
+        base = trial(share, more)
+        crossover = float(np.nan_to_num(margins(plant, base).crossover[0]))
+        return Gains(base.kp, base.kp * INTEGRAL_SHARE * max(crossover, 1e-3), base.kd)
+
+    return gains
+
+
+def _quadratic(plant: LinearPlant, wish: Wish, fin: float) -> Formula:
+    a, k, b = float(plant.slow_damping[0]), float(plant.stiffness[0]), float(plant.slow_authority[0])
+    system, drive = np.array([[0.0, 1.0], [-k, -a]]), np.array([[0.0], [b]])
+
+    def gains(share: float, _: float) -> Gains:
+        weight = np.diag([(share**2 / wish.step_of(plant.axis)) ** 2, 0.0])
+        cost = np.array([[1.0 / fin**2]])
+        gain = np.linalg.solve(cost, drive.T @ solve_continuous_are(system, drive, weight + 1e-12 * np.eye(2), cost))
+        return Gains(kp=float(gain[0, 0]), kd=float(gain[0, 1]))
+
+    return gains
+
+
+_FORMULAS: Mapping[str, Callable[[LinearPlant, Wish, float], Formula]] = MappingProxyType(
+    {
+        "p": _proportional,
+        "pd": _rate,
+        "pi": lambda plant, wish, fin: _with_integral(_proportional(plant, wish, fin), plant),
+        "pid": lambda plant, wish, fin: _with_integral(_rate(plant, wish, fin), plant),
+        "lqr": _quadratic,
+    }
+)
