@@ -29,7 +29,7 @@ def flown(speed: float, seed: int, fins: Fins = FINS) -> Run:
     return Run(f"pulses_{speed:.1f}", log.pop("time_s"), log)
 
 
-def schedule_from(folder, fins: Fins, kind: str = "pd", bandwidth: float | None = 0.9):
+def schedule_from(folder, fins: Fins, kind: str = "pd", bandwidth: float | None = 0.97):
     paths = []
     for i, speed in enumerate(KNOTS):
         (fit,) = identify([flown(speed, 20 + i, fins)], Axis.YAW, method="output_error")

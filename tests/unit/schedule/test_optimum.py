@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,10 @@ from fieldsid.models.axis import Axis
 from fieldsid.models.model import Model, Noise
 from fieldsid.models.speed_law import SpeedLaw
 from fieldsid.plant.parameter_source import source_of_models
+from fieldsid.schedule.linear_plant import FinLimits, plants_at
 from fieldsid.schedule.make import design_schedule
+from fieldsid.schedule.search.formulas import bandwidth_of, fin_bandwidth, formula_of
+from fieldsid.schedule.search.objective import smooth_settling
 from fieldsid.schedule.search.optimum import minimum
 from fieldsid.schedule.wish import Wish
 
@@ -48,3 +53,20 @@ def test_the_minimum_is_found_inside_and_at_an_end():
     assert minimum(lambda x: (x - 0.37) ** 2, -1.0, 2.0) == pytest.approx(0.37, abs=2e-3)
     assert minimum(lambda x: -x, -1.0, 2.0) == 2.0
     assert minimum(lambda x: abs(x - 1.1) + 0.1 * x, -1.0, 2.0) == pytest.approx(1.1, abs=5e-3)
+
+
+@pytest.mark.parametrize("stiffness", [-0.3, 0.0, 0.4, 5.0])
+def test_a_share_of_one_asks_for_the_fin_allowed_and_no_more(stiffness):
+    one = replace(plants_at(source_at(HULLS["quick fin"]), REFERENCE, FinLimits(), 1, 0)[0][0], stiffness=np.array([stiffness]))
+    gains = formula_of(one, Wish("pd", step=0.2), 0.26)(1.0, 1.0)
+    assert abs(gains.kp) * 0.2 == pytest.approx(0.26)
+    assert bandwidth_of(one, gains) == pytest.approx(fin_bandwidth(one, 0.26, 0.2))
+
+
+def test_of_steps_that_are_not_there_in_the_end_the_one_further_off_is_later():
+    time = np.linspace(0.0, 20.0, 1001)
+    steps = np.column_stack([1.0 - np.exp(-time / t) for t in (2.0, 8.0, 20.0, 80.0, 1e6)])
+    settled = smooth_settling(time, steps, 1.0)
+    assert settled[0] == pytest.approx(2.0 * np.log(20.0), rel=0.01)
+    assert np.all(np.diff(settled) > 0.0)
+    assert np.all(settled[1:] > 20.0)
