@@ -15,7 +15,8 @@ from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
-from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
+from fieldsid.logs.mapping.canonical_names import canonical, canonical_names
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import Reader, ReadOptions, reader_of
 from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run
 

@@ -12,7 +12,8 @@ import numpy as np
 from fieldsid.errors import DataError
 from fieldsid.logs.convert.units import UNITS, factor_to
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
-from fieldsid.logs.mapping.canonical_names import TIME, canonical
+from fieldsid.logs.mapping.canonical_names import canonical
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from fieldsid.logs.channels import ATTITUDE
-from fieldsid.logs.mapping.canonical_names import TIME, canonical, stated_unit, unit_in_name
-from fieldsid.logs.mapping.word_meaning import COMMANDED, LATITUDE, LONGITUDE, meaning_of, words_of
+from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_in_name, unit_of_field
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import COMMANDED, LATITUDE, LONGITUDE, TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
 
@@ -179,7 +181,7 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     found = meaning_of(f"{channel.name} {name}".strip())
     if found is None or found[0] in (TIME, LATITUDE, LONGITUDE) or _is_no_angle(found[0], info.first):
         return
-    unit = unit_in_name(info.path.rpartition(".")[2], found[0])
+    unit = unit_of_field(channel.name, info.path, found[0])
     unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit
     if unit is not None:
         item["unit"] = unit

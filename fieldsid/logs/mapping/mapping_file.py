@@ -15,7 +15,7 @@ from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
 from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
-from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import SIGNALS
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
@@ -176,7 +176,7 @@ def _time(time: _Time, place: str) -> Source:
     if time.columns:
         parts_of(time.unit, time.columns, place)
     elif time.unit is not None and time.unit not in FORMS:
-        found = find_unit(time.unit)
+        found = find_unit(time.unit, "time")
         if found is None or found.dimension != "time":
             known = [u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS)
             raise MappingError(
@@ -275,7 +275,7 @@ def _check_unit(signal: str, unit: str, place: str) -> None:
     if dimension is None or unit == COUNTS:
         return
     try:
-        picked = pick_unit(unit)
+        picked = pick_unit(unit, dimension)
     except FieldsidError as error:
         fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
         raise MappingError(f"{place}: `{signal}`: {error.what}", found=unit, hint=near(unit, fitting)) from error

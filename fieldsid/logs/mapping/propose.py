@@ -16,9 +16,10 @@ from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, ser
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps
 from fieldsid.logs.mapping.mend import mended
+from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.true_north import true_north
-from fieldsid.logs.mapping.word_meaning import LATITUDE, LONGITUDE, words_of
+from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
 from fieldsid.numerics.arrays import FloatArray

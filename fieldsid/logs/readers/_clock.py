@@ -14,8 +14,10 @@ from fieldsid.logs.channels import Source
 from fieldsid.logs.convert.conditioning import in_order
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
 from fieldsid.logs.convert.times.time_column import likely_time_unit
-from fieldsid.logs.mapping.canonical_names import TIME, unit_in_name
-from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
+from fieldsid.logs.mapping.canonical_names import unit_in_name
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
 from fieldsid.logs.readers._columns import Columns, is_counter, time_of

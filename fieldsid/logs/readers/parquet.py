@@ -11,7 +11,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
