@@ -69,6 +69,12 @@ def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Not
     return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
 
 
+def agrees_with_rate(run: Run, angle: str, rate: str) -> bool:
+    """Whether an angle changes as its rate says, in the units that both are taken in."""
+    changes = _changes(run, angle, rate)
+    return changes is not None and _is_rate_of(changes, TRUSTED)
+
+
 def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
     """An angle and a rate that are not each other's, where another signal is the one's."""
     own = _changes(run, angle, rate)

@@ -40,12 +40,13 @@ NOTHING = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A signal that a column or field may be, how sure that is, and how it is read."""
+    """A signal that a column or field may be, how sure that is, and how it is read; `defined` where a format says its unit."""
 
     signal: str
     sure: float
     item: dict[str, Any]
     count: int
+    defined: bool = False
 
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
@@ -134,7 +135,7 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             yield from _of_scalar(channel, info)
         elif not (signal == ATTITUDE and _is_nothing(channel, parent)):
             path = parent if signal == ATTITUDE else info.path
-            yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count)
+            yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count, defined=True)
 
 
 def _of_plane(channel: ChannelInfo, path: str, *, commanded: bool) -> Iterator[Guess]:
@@ -146,7 +147,7 @@ def _of_plane(channel: ChannelInfo, path: str, *, commanded: bool) -> Iterator[G
 
 
 def _of_format(channel: ChannelInfo, info: FieldInfo, signal: str, how: Mapping[str, Any]) -> Guess:
-    return Guess(signal, 9.0, {"topic": channel.name, "field": info.path, **how}, channel.count)
+    return Guess(signal, 9.0, {"topic": channel.name, "field": info.path, **how}, channel.count, defined=True)
 
 
 def _of_vector(channel: ChannelInfo, parent: str, last: str, *, commanded: bool) -> tuple[str | None, float]:

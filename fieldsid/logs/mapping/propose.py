@@ -14,11 +14,12 @@ from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
-from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps
+from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps, wraps_in_rad
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.true_north import true_north
+from fieldsid.logs.mapping.unit_evidence import assumed_units, said_of_assumed
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
@@ -62,7 +63,7 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
 
     A signal that the log does not give after all is left out, and the reason said: a mapping that is proposed can be imported.
     """
-    body, notes = _body(inventory)
+    body, notes, defined = _body(inventory)
     if inventory.no_clock is not None:
         _in_degrees_by_span(body["signals"], inventory)
         return Proposal(body, problem=inventory.no_clock[1], notes=tuple(notes))
@@ -70,7 +71,7 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
         if not body["signals"]:
             break
         try:
-            done = _tried(inventory, reader, options, body)
+            done = _tried(inventory, reader, options, body, defined)
         except FieldsidError as error:
             signal = _at_fault(error, body)
             if signal is None:
@@ -104,7 +105,8 @@ def _label(item: dict[str, Any]) -> str:
     return f"topic `{item['topic']}`" if "topic" in item else f"column `{item.get('column', item.get('columns'))}`"
 
 
-def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
+def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note], frozenset[str]]:
+    """Return a mapping's body, why it is that, and the signals whose unit the format defines."""
     if inventory.by_topic:
         return _of_topics(inventory)
     guesses: list[Guess] = []
@@ -133,7 +135,7 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
         notes += [] if "frame" in body else true_north(samples, names, signals)
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
-    return body, notes
+    return body, notes, frozenset({"x_m", "y_m"} if POSITION in signals else ())
 
 
 def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
@@ -167,7 +169,7 @@ def _place(inventory: Inventory, column: str | int | None) -> str | int | None:
     return int(column) if isinstance(column, str) and inventory.table and not inventory.table.header else column
 
 
-def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
+def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note], frozenset[str]]:
     best, notes = _best(g for c in inventory.channels for g in of_topic(c))
     if ATTITUDE in best:
         for angle in ANGLES:
@@ -176,7 +178,9 @@ def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note]]:
     frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
     signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
     notes += [] if set(FINS) & signals.keys() else _which_output(inventory)
-    return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes
+    defined = {s for s in signals if best[s].defined}
+    defined |= set(ANGLES) if ATTITUDE in signals else {"x_m", "y_m"} if POSITION in signals else set()
+    return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes, frozenset(defined)
 
 
 def _which_output(inventory: Inventory) -> list[Note]:
@@ -267,7 +271,7 @@ def _as_others(values: FloatArray, servos: list[Servo]) -> Servo | None:
     return next((s for s in servos if whole and s.least <= seen.min() and seen.max() <= s.largest), None)
 
 
-def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dict[str, Any]) -> Proposal:
+def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     """Read the log with the proposal, and set degrees where the numbers say so."""
     from fieldsid.logs.convert.assemble import assemble
     from fieldsid.logs.doctor.examine import examine
@@ -293,6 +297,10 @@ def _tried(inventory: Inventory, reader: Reader, options: ReadOptions, body: dic
             break
     if "yaw_rad" in by_size and "unit" in body["signals"]["yaw_rad"]:
         why += heading_in_doubt(raw.series["yaw_rad"].values, body["signals"])
+    stated = stated_by(mapping, raw).units.keys()
+    turned = {"yaw_rad"} if "yaw_rad" in raw.series and wraps_in_rad(raw.series["yaw_rad"].values) else set()
+    assumed = assumed_units(run, {*defined, *stated, *turned, *(ANGLES if ATTITUDE in body["signals"] else ())})
+    why += said_of_assumed(assumed, body["signals"])
     return Proposal(body, Run(run.name, run.time, run.signals, inventory.path, (*run.notes, *notes)), notes=tuple(why))
 
 

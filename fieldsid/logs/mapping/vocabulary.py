@@ -74,8 +74,8 @@ RULES = (
     Rule(TIME, "time, timestamp, stamp, utc, seconds, datetime, epoch, zeit, uhrzeit, datenum, elapsed"),
     Rule(
         "yaw_rate_rad_s",
-        "yaw rate, yaw rt, heading rate, head rate, hdg rate, turn rate, rate turn, rot, gyro z, gyr z, gyroscope z, gz, omega z, "
-        "wz, psidot, psi dot, yaw dot, yaw speed, yaw velocity, yaw vel, angular velocity z, ang vel z",
+        "yaw rate, yaw rt, heading rate, head rate, hdg rate, turn rate, rate turn, rot, gyro z, gyr z, gyroscope z, gz, "
+        "omega z, wz, psidot, psi dot, yaw dot, yaw speed, yaw velocity, yaw vel, angular velocity z, ang vel z",
     ),
     Rule(
         "pitch_rate_rad_s",

@@ -54,7 +54,9 @@ def test_words_beside_a_unit_may_still_name_another_thing(name):
     assert meaning_of(name) is None
 
 
-@pytest.mark.parametrize(("name", "signal"), [("heading_deg_s", "yaw_rad"), ("depth_in", "depth_m"), ("rudder_rev", "rudder_rad")])
+@pytest.mark.parametrize(
+    ("name", "signal"), [("heading_deg_s", "yaw_rad"), ("depth_in", "depth_m"), ("rudder_rev", "rudder_rad")]
+)
 def test_a_unit_that_does_not_fit_is_none(name, signal):
     assert unit_in_name(name, signal) is None
 
