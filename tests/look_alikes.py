@@ -5,8 +5,11 @@ import numpy as np
 A22, B2, SPEED = 0.8, 0.7, 1.5
 
 
-def truth(seconds=120.0, rate_hz=10.0, noise=1.0, seed=4):
-    """Return signals by canonical name, (n,) each: exact steps of the held fin, white noise on what sensors measure."""
+def truth(seconds=120.0, rate_hz=10.0, noise=1.0, seed=4, slide_s=0.0):
+    """Return signals by canonical name, (n,) each: exact steps of the held fin, white noise on what sensors measure.
+
+    The course of x and y is the heading less `slide_s` times its rate.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * rate_hz)) / rate_hz
     step = 1.0 / rate_hz
@@ -19,7 +22,8 @@ def truth(seconds=120.0, rate_hz=10.0, noise=1.0, seed=4):
         yaw[k + 1] = yaw[k] + steady * step + (rate[k] - steady) * (1 - decay) / A22
     pitch = 0.15 * np.sin(2 * np.pi * time / 40.0)
     depth = 10.0 - np.cumsum(SPEED * np.sin(pitch)) * step
-    north, east = np.cumsum(SPEED * np.cos(yaw)) * step, np.cumsum(SPEED * np.sin(yaw)) * step
+    course = yaw - slide_s * rate
+    north, east = np.cumsum(SPEED * np.cos(course)) * step, np.cumsum(SPEED * np.sin(course)) * step
 
     def sensed(values, std):
         return values + noise * std * rng.standard_normal(time.size)
@@ -32,6 +36,7 @@ def truth(seconds=120.0, rate_hz=10.0, noise=1.0, seed=4):
         "surge_m_s": sensed(SPEED + 0.0 * time, 0.01),
         "x_m": sensed(north, 0.02),
         "y_m": sensed(east, 0.02),
+        "course_rad": sensed(course, 0.003),
         "pitch_rad": sensed(pitch, 0.002),
         "pitch_rate_rad_s": sensed(np.gradient(pitch, time), 0.002),
         "depth_m": sensed(depth, 0.01),

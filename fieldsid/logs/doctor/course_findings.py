@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from fieldsid.logs.convert.units import factor_to
-from fieldsid.logs.doctor.pair_findings import SPEEDS, UNIT_LIMIT
+from fieldsid.logs.doctor.pair_findings import SPEEDS, UNIT_LIMIT, goes_with_way
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
@@ -100,7 +100,7 @@ def _dive_unit(slope: float, stated: Stated) -> list[Note]:
     if not may:
         return []
     (signal, unit), is_one = may[0], len(may) == 1
-    advice = f"set `unit: {unit}` at {signal}" if is_one else f"is it {' or '.join(f'{s} in {u}' for s, u in may)}?"
+    advice = f"set {', or '.join(f'`unit: {u}` at {s}' for s, u in may)}"
     message = (
         f"depth_m changes {slope:.3g} times as fast as surge_m_s and pitch_rad say (limits {LEAST_DIVE:g} and {MOST_DIVE:g}): "
         f"{advice}"
@@ -160,7 +160,8 @@ def _dive(run: Run, stated: Stated) -> list[Note]:
         return []
     trust, slope = found
     if trust > TRUSTED and not LEAST_DIVE < slope < MOST_DIVE:
-        return _dive_unit(slope, stated)
+        is_known_wrong = all(run.has(s) for s in ("x_m", "y_m")) and not goes_with_way(run)
+        return [] if is_known_wrong else _dive_unit(slope, stated)
     if trust > -TRUSTED:
         return []
     message = (

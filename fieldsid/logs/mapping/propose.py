@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,11 +18,13 @@ from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps,
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
+from fieldsid.logs.mapping.true_heading import better_heading
 from fieldsid.logs.mapping.true_north import true_north
 from fieldsid.logs.mapping.unit_evidence import assumed_units, said_of_assumed
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Samples, Series
 from fieldsid.logs.run import GOALS, SIGNALS, Note, Run
+from fieldsid.logs.several.sifting import attempt
 from fieldsid.numerics.arrays import FloatArray
 
 REP103 = "ENU/FLU"
@@ -44,6 +46,8 @@ _OUTPUT = re.compile(r"^(value|servo\d+_raw|C\d+|(output|control|position)\[\d+\
 SHOWN = 8
 """Outputs that a message names."""
 TRIES = 6
+OTHER_HEADINGS = 4
+"""Headings beside the surest that are tried."""
 MENDS = 6
 """Readings of the log with what the last one's findings have set: a unit, a frame and the signs of two rates come in turn."""
 
@@ -63,7 +67,8 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
 
     A signal that the log does not give after all is left out, and the reason said: a mapping that is proposed can be imported.
     """
-    body, notes, defined = _body(inventory)
+    draft = _body(inventory)
+    body, notes = draft.body, draft.notes
     if inventory.no_clock is not None:
         _in_degrees_by_span(body["signals"], inventory)
         return Proposal(body, problem=inventory.no_clock[1], notes=tuple(notes))
@@ -71,7 +76,7 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
         if not body["signals"]:
             break
         try:
-            done = _tried(inventory, reader, options, body, defined)
+            done = _with_own_heading(inventory, reader, options, draft)
         except FieldsidError as error:
             signal = _at_fault(error, body)
             if signal is None:
@@ -105,8 +110,17 @@ def _label(item: dict[str, Any]) -> str:
     return f"topic `{item['topic']}`" if "topic" in item else f"column `{item.get('column', item.get('columns'))}`"
 
 
-def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note], frozenset[str]]:
-    """Return a mapping's body, why it is that, and the signals whose unit the format defines."""
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """A mapping's body, why it is that, the signals whose unit the format defines, and lines of other headings."""
+
+    body: dict[str, Any]
+    notes: list[Note]
+    defined: frozenset[str]
+    headings: tuple[dict[str, Any], ...] = ()
+
+
+def _body(inventory: Inventory) -> _Draft:
     if inventory.by_topic:
         return _of_topics(inventory)
     guesses: list[Guess] = []
@@ -135,7 +149,8 @@ def _body(inventory: Inventory) -> tuple[dict[str, Any], list[Note], frozenset[s
         notes += [] if "frame" in body else true_north(samples, names, signals)
         _as_counts(samples, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
-    return body, notes, frozenset({"x_m", "y_m"} if POSITION in signals else ())
+    defined = frozenset({"x_m", "y_m"} if POSITION in signals else ())
+    return _Draft(body, notes, defined, _other_headings(guesses, signals))
 
 
 def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
@@ -169,8 +184,9 @@ def _place(inventory: Inventory, column: str | int | None) -> str | int | None:
     return int(column) if isinstance(column, str) and inventory.table and not inventory.table.header else column
 
 
-def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note], frozenset[str]]:
-    best, notes = _best(g for c in inventory.channels for g in of_topic(c))
+def _of_topics(inventory: Inventory) -> _Draft:
+    guesses = [g for c in inventory.channels for g in of_topic(c)]
+    best, notes = _best(guesses)
     if ATTITUDE in best:
         for angle in ANGLES:
             best.pop(angle, None)
@@ -180,7 +196,32 @@ def _of_topics(inventory: Inventory) -> tuple[dict[str, Any], list[Note], frozen
     notes += [] if set(FINS) & signals.keys() else _which_output(inventory)
     defined = {s for s in signals if best[s].defined}
     defined |= set(ANGLES) if ATTITUDE in signals else {"x_m", "y_m"} if POSITION in signals else set()
-    return {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}, notes, frozenset(defined)
+    body = {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}
+    return _Draft(body, notes, frozenset(defined), _other_headings(guesses, signals))
+
+
+def _other_headings(guesses: Iterable[Guess], signals: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
+    """Return the lines of what may also be the heading, beside one column or field that is taken for it."""
+    if "yaw_rad" not in signals:
+        return ()
+    others = sorted((g for g in guesses if g.signal == "yaw_rad" and g.item != signals["yaw_rad"]), key=lambda g: -g.sure)
+    return tuple(g.item for g in others[:OTHER_HEADINGS])
+
+
+def _with_own_heading(inventory: Inventory, reader: Reader, options: ReadOptions, draft: _Draft) -> Proposal:
+    """Return the proposal as it was tried, with the heading that the numbers show to be the vehicle's, of several."""
+    done = _tried(inventory, reader, options, draft.body, draft.defined)
+    if done.run is None or not draft.headings:
+        return done
+    signals = draft.body["signals"]
+    bodies = [draft.body | {"signals": signals | {"yaw_rad": dict(item)}} for item in draft.headings]
+    others = [attempt(lambda body: _tried(inventory, reader, options, body, draft.defined), body) for body in bodies]
+    tried = [done, *(p for p in others if isinstance(p, Proposal) and p.run is not None)]
+    found = better_heading([p.run for p in tried if p.run is not None], [_label(p.body["signals"]["yaw_rad"]) for p in tried])
+    if found is None:
+        return done
+    best, why = found
+    return replace(tried[best], notes=(why, *tried[best].notes))
 
 
 def _which_output(inventory: Inventory) -> list[Note]:

@@ -30,7 +30,7 @@ OF_ANOTHER = _words(
     "wind air variation status mode enabled count"
 )
 """Words that make a name one of something else than the signal it also names."""
-OVER_GROUND = _words("gps gnss course cog sog ground track")
+OVER_GROUND = _words("gps gnss course cog sog vtg ground track")
 """Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
 that hears nothing under water, beside a position that was estimated."""
 OF_SPEED = _words("v vel velocity speed acceleration accel acc")
