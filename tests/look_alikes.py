@@ -48,3 +48,28 @@ def write_table(path, columns, separator=",", head=""):
     rows = "\n".join(separator.join(f"{v:.10g}" for v in row) for row in zip(*columns.values(), strict=True))
     path.write_text(head + separator.join(columns) + "\n" + rows + "\n")
     return path
+
+
+def write_dataflash_text(path, run, parameters=(), outputs=14, rudder=3, per_rad=800.0):
+    """Write a run as ArduPilot's text log: attitude, gyros, and the pulses of outputs, of which the n-th moves the rudder."""
+    names = [f"C{k + 1}" for k in range(outputs)]
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        "FMT, 15, 27, ATT, QccC, TimeUS,Roll,Pitch,Yaw",
+        f"FMT, 16, 40, RCOU, Q{'H' * outputs}, TimeUS,{','.join(names)}",
+        "FMT, 17, 40, IMU, QBfff, TimeUS,I,GyrX,GyrY,GyrZ",
+        "FMT, 19, 40, PARM, QNf, TimeUS,Name,Value",
+        *(f"PARM, 1000, {name}, {value}" for name, value in parameters),
+    ]
+    rng = np.random.default_rng(8)
+    idle = np.round(1500 + 20 * rng.standard_normal((run["time_s"].size, outputs)))
+    for k, t in enumerate(run["time_s"]):
+        pulses = [f"{v:.0f}" for v in idle[k]]
+        pulses[0] = "1600"
+        pulses[rudder - 1] = f"{1500 + per_rad * run['rudder_rad'][k]:.0f}"
+        stamp = round(5e6 + 1e6 * t)
+        lines.append(f"RCOU, {stamp}, {', '.join(pulses)}")
+        lines.append(f"ATT, {stamp}, 0.0, 0.0, {np.degrees(run['yaw_rad'][k]) % 360:.4f}")
+        lines += [f"IMU, {stamp}, {i}, 0.0, 0.0, {run['yaw_rate_rad_s'][k] + 1e-4 * i:.6f}" for i in (0, 1)]
+    path.write_text("\n".join(lines) + "\n")
+    return path

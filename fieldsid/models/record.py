@@ -12,6 +12,7 @@ import numpy.typing as npt
 from fieldsid.display import Brief
 from fieldsid.errors import DataError, EffectError
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
+from fieldsid.logs.doctor.fin_findings import refuse_no_angle
 from fieldsid.logs.doctor.holes import JITTER, hole_notes, is_usual, unbroken
 from fieldsid.logs.doctor.spikes import spikes_of
 from fieldsid.logs.run import Note, Run
@@ -194,6 +195,7 @@ def record_of(run: Run, axis: Axis, *, fin: str = "auto") -> Record:
     measured = column == names.fin_measured
     if not run.has(column):
         raise no_fin(run, axis.value, column)
+    refuse_no_angle(run, column)
     run = unbroken(run, column)
     if not run.has(names.angle) and not run.has(names.rate):
         raise DataError(

@@ -16,7 +16,7 @@ from fieldsid.logs.convert.conditioning import MAX_GAP_S, in_order, possible, re
 from fieldsid.logs.convert.frames import SWAPPED_BY_WORLD, angles_of_quaternion, to_ned_frd
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
+from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
 from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
 from fieldsid.logs.run import SIGNALS, Note, Run
@@ -103,8 +103,9 @@ def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note],
     refuse_impossible_steps(picked.time, label)
     with np.errstate(over="ignore", invalid="ignore"):
         given = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
-        if signal in COUNTED and source.unit == COUNTS:
-            angles, found = turned_from_counts(signal, picked.values, source.centre, source.scale)
+        counted = counts_unit(signal, source.unit or series.unit)
+        if counted is not None:
+            angles, found = turned_from_counts(signal, picked.values, counted, source.centre, source.scale)
             picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None)
             notes += found
         values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}

@@ -159,8 +159,8 @@ def find_unit(name: str, dimension: str | None = None) -> Unit | None:
 
 
 def dimension_of(signal: str) -> str | None:
-    """Return the dimension of a canonical signal; None for `thrust`, which may be in any unit."""
-    return _DIMENSION_OF.get(SIGNALS[signal])
+    """Return the dimension of a canonical signal; None for `thrust`, which may be in any unit, and what is none."""
+    return _DIMENSION_OF.get(SIGNALS.get(signal, ""))
 
 
 def factor_to(signal: str, unit: str) -> float:

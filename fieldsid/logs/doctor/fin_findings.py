@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from fieldsid.errors import DataError
+from fieldsid.logs.convert.servo_counts import servo_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -34,13 +36,28 @@ def fin_findings(run: Run) -> list[Note]:
     return [*found, *(_roll(run) if run.has("roll_rad") else [])]
 
 
+def refuse_no_angle(run: Run, fin: str) -> None:
+    """Raise DataError where a fin's numbers are no angle: half a turn and more, as those of a servo or of degrees are."""
+    values = run[fin][np.isfinite(run[fin])]
+    largest = float(np.percentile(np.abs(values), 99)) if values.size else 0.0
+    if largest <= math.pi:
+        return
+    servo = servo_of(values)
+    unit = "deg" if servo is None else f"counts, centre: {servo.centre:g}"
+    raise DataError(
+        f"`{fin}` of run {run.name!r} is no angle in rad: it reaches {largest:.4g}",
+        found=f"{values.min():.5g} .. {values.max():.5g}",
+        hint=f"set its unit in the mapping, probably `unit: {unit}`",
+    )
+
+
 def _range(run: Run, fin: str) -> list[Note]:
     largest = float(np.nanpercentile(np.abs(run[fin]), 99))
     if not WIDEST < largest <= 1.6:
         return []
     message = (
         f"{fin} reaches {largest:.3g} rad, {math.degrees(largest):.0f} deg (limit {WIDEST:g} rad): no fin does; where -1 .. 1 is "
-        "its whole range, set `unit: counts` with `centre: 0` and its largest angle in rad as `scale`"
+        "its whole range, set `unit: 1`, with its largest angle in rad as `scale`"
     )
     return [Note("fin_range", message, {"signal": fin, "value": largest, "limit": WIDEST})]
 

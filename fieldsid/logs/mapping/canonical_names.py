@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from fieldsid.logs.convert.servo_counts import BY_UNIT, FINS
 from fieldsid.logs.convert.units import SPELLINGS, dimension_of, find_unit
 from fieldsid.logs.mapping.name_words import ALL_UNITS, unit_said
 from fieldsid.logs.mapping.vocabulary import TIME
@@ -80,8 +81,8 @@ def unit_in_name(name: str, signal: str) -> str | None:
     A rate named with the unit of its angle, or a speed with that of its way, is one by a second.
     """
     dimensions = fitting(signal)
-    found = unit_said(name, dimensions)
-    if found is not None:
+    found = unit_said(name, dimensions) or (unit_said(name, ("time",)) if signal in FINS else None)
+    if found is not None and (found.dimension in dimensions or found.name in BY_UNIT):
         return "rad/s" if found.name == "rev/s" and signal != "propeller_rpm" else found.name
     whole = unit_said(name, (OF_CHANGES[dimensions[0]],)) if dimensions and dimensions[0] in OF_CHANGES else None
     by_second = None if whole is None else find_unit(f"{whole.name}/s")

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
 from fieldsid.logs.convert.frames import Body, Frame, World
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, counts_unit
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
 from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
@@ -22,6 +22,7 @@ from fieldsid.strict import StrictModel, read_model, validated
 
 SCHEMA = "fieldsid/mapping/1"
 Column = Annotated[int, Field(ge=0)] | str
+OF_FINS = "; `us` for a servo's pulses, `1` where -1 .. 1 is the whole range, `counts` for others"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -31,7 +32,7 @@ class _Source(StrictModel):
     order: Literal["xyzw", "wxyz"] = "xyzw"
     topic: str | None = None
     field: str = ""
-    unit: str | None = None
+    unit: Annotated[str | None, BeforeValidator(lambda unit: "1" if unit == 1 else unit)] = None
     sign: Literal[1, -1] = 1
     offset: Finite = 0.0
     frame: str | None = None
@@ -260,7 +261,7 @@ def _check_columns(signal: str, item: _Source, place: str) -> None:
 def _check_counts(signal: str, item: _Source, place: str) -> None:
     """A centre and a scale are those of counts, and counts those of a servo or a motor."""
     extra = [n for n, v in (("centre", item.centre), ("scale", item.scale)) if v is not None]
-    if extra and item.unit != COUNTS:
+    if extra and counts_unit(signal, item.unit) is None:
         hint = f"write `unit: {COUNTS}` beside it"
         raise MappingError(f"{place}: `{signal}` has a `{extra[0]}` without counts", found=f"unit: {item.unit}", hint=hint)
     if item.unit == COUNTS and signal not in COUNTED:
@@ -272,7 +273,7 @@ def _check_counts(signal: str, item: _Source, place: str) -> None:
 def _check_unit(signal: str, unit: str, place: str) -> None:
     """The unit is one, and of the signal's dimension; a depth may be a pressure."""
     dimension = dimension_of(signal) if signal not in COMBINED else None
-    if dimension is None or unit == COUNTS:
+    if dimension is None or unit == COUNTS or counts_unit(signal, unit) is not None:
         return
     try:
         picked = pick_unit(unit, dimension)
@@ -283,5 +284,5 @@ def _check_unit(signal: str, unit: str, place: str) -> None:
         raise MappingError(
             f"{place}: `{signal}` cannot be in {unit!r}",
             found=f"a unit of {picked.dimension}",
-            hint=f"use a unit of {dimension}, such as `{SIGNALS[signal]}`",
+            hint=f"use a unit of {dimension}, such as `{SIGNALS[signal]}`{OF_FINS if signal in FINS else ''}",
         )

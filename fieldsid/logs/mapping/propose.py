@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion
 from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps, wraps_in_rad
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.outputs import outputs_of, rudder_among, which_output
 from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
 from fieldsid.logs.mapping.true_heading import better_heading
 from fieldsid.logs.mapping.true_north import true_north
@@ -39,12 +39,6 @@ _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borient
 """What columns are called that were written from messages, which are in the frames of REP 103."""
 PERCENT = frozenset({"percent", "percentage", "pct", "perc"})
 """Words of a fin that is told in shares of its range, whose angle is not known."""
-OUTPUTS = frozenset({"servo", "servomotor", "actuator", "rcou", "outputs", "controls"})
-"""Words of what a vehicle's servos are told or say."""
-_OUTPUT = re.compile(r"^(value|servo\d+_raw|C\d+|(output|control|position)\[\d+\])$")
-"""Fields of these that are an angle or a pulse."""
-SHOWN = 8
-"""Outputs that a message names."""
 TRIES = 6
 OTHER_HEADINGS = 4
 """Headings beside the surest that are tried."""
@@ -77,6 +71,7 @@ def propose(inventory: Inventory, reader: Reader, options: ReadOptions) -> Propo
             break
         try:
             done = _with_own_heading(inventory, reader, options, draft)
+            done = _with_rudder(inventory, reader, options, done, draft.defined)
         except FieldsidError as error:
             signal = _at_fault(error, body)
             if signal is None:
@@ -153,6 +148,20 @@ def _body(inventory: Inventory) -> _Draft:
     return _Draft(body, notes, defined, _other_headings(guesses, signals))
 
 
+def _with_rudder(inventory: Inventory, reader: Reader, options: ReadOptions, done: Proposal, defined: frozenset[str]) -> Proposal:
+    """Return a proposal with the output that is the rudder by the motion, where no name says it; else with those there are."""
+    outputs = outputs_of(inventory) if inventory.by_topic and not set(FINS) & done.body["signals"].keys() else []
+    if not outputs or done.run is None:
+        return done
+    fin = rudder_among(done.run, outputs, inventory.path, reader, ReadOptions(options.msg_path, salvage=True))
+    if fin is None:
+        return replace(done, notes=(*done.notes, which_output(outputs)))
+    topic, path = outputs[int(fin.column)]
+    done.body["signals"]["rudder_rad"] = {"topic": topic, "field": path, **fin.item}
+    why = Note("evidence", f"rudder_rad is {topic} {path}: {fin.why}", {"signal": "rudder_rad", "outputs": len(outputs)})
+    return replace(_tried(inventory, reader, options, done.body, defined), notes=(*done.notes, why))
+
+
 def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
     """Return a time as a mapping has it: one column or several, its unit, and the columns of its days or weeks."""
     date = [_place(inventory, c) for c in source.date]
@@ -193,7 +202,6 @@ def _of_topics(inventory: Inventory) -> _Draft:
     named = " ".join(c.name + c.kind for c in inventory.channels).lower()
     frame = inventory.frame or ("NED/FRD" if "ned" in words_of(named) else REP103)
     signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
-    notes += [] if set(FINS) & signals.keys() else _which_output(inventory)
     defined = {s for s in signals if best[s].defined}
     defined |= set(ANGLES) if ATTITUDE in signals else {"x_m", "y_m"} if POSITION in signals else set()
     body = {"schema": "fieldsid/mapping/1", "frame": frame, "signals": signals}
@@ -222,21 +230,6 @@ def _with_own_heading(inventory: Inventory, reader: Reader, options: ReadOptions
         return done
     best, why = found
     return replace(tried[best], notes=(why, *tried[best].notes))
-
-
-def _which_output(inventory: Inventory) -> list[Note]:
-    """Say which outputs of a log's servos there are, and the line that is missing: which one moves which fin is the vehicle's."""
-    found = [(c.name, f.path) for c in inventory.channels for f in c.fields if OUTPUTS & set(words_of(f"{c.name} {f.path}"))]
-    found = [(topic, path) for topic, path in found if _OUTPUT.search(path)]
-    if not found:
-        return []
-    shown = ", ".join(f"{topic} {path}" for topic, path in found[:SHOWN]) + (", ..." if len(found) > SHOWN else "")
-    topic, path = found[0]
-    message = (
-        f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{topic: {json.dumps(topic)}, "
-        f"field: {json.dumps(path)}}}`, of: {shown}"
-    )
-    return [Note("which_output", message, {"signal": "rudder_rad", "others": [f"{t} {p}" for t, p in found]})]
 
 
 def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:

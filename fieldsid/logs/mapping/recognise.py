@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.convert.servo_counts import COUNTS, servo_of
 from fieldsid.logs.convert.units import KNOT
 from fieldsid.logs.reader import Samples
 from fieldsid.numerics.arrays import FloatArray
@@ -240,7 +241,8 @@ def _fin(scene: _Scene, known: Mapping[str, str | int], free: list[str | int], b
         return
     grows = scene.changes(rate) / scene.passed
     middle = rate[scene.width // 2 :][: grows.size]
-    means = {c: _mean(scene, c) for c in free if _about_zero(scene, c)}
+    deflected = {c: v for c in free if (v := _deflected(scene.samples.columns[c])) is not None}
+    means = {c: _mean(scene, v) for c, (v, _) in deflected.items()}
     shares = sorted(((_explained(grows, [middle], v), c) for c, v in means.items()), key=lambda s: -s[0])
     if not shares or shares[0][0] < EXPLAINS:
         return
@@ -250,11 +252,9 @@ def _fin(scene: _Scene, known: Mapping[str, str | int], free: list[str | int], b
     rival = max(others, key=lambda c: own[c], default=None)
     if rival is not None and own[column] < CLEARLY * own[rival]:
         return
-    largest = float(np.nanmax(np.abs(scene.samples.columns[column])))
-    unit = "deg" if largest > 1.6 else "rad"
     beside = "" if rival is None else f", {own[column] / max(own[rival], 1e-9):.3g} times what column {rival} adds to the others"
     why = f"it explains {100 * share:.0f} % of what the yaw rate's change has beside the rate's own{beside}"
-    yield Recognised("rudder_rad", column, {"unit": unit}, why)
+    yield Recognised("rudder_rad", column, deflected[column][1], why)
 
 
 def _turning(scene: _Scene, known: Mapping[str, str | int], before: list[Recognised]) -> FloatArray | None:
@@ -266,16 +266,35 @@ def _turning(scene: _Scene, known: Mapping[str, str | int], before: list[Recogni
     return np.gradient(yaw, np.nan_to_num(scene.samples.time) + 1e-9 * np.arange(yaw.size))
 
 
-def _mean(scene: _Scene, column: str | int) -> FloatArray:
-    """Return a column's mean (n,) over each window: what turns a rate over it."""
-    total = np.cumsum(np.nan_to_num(scene.samples.columns[column]))
-    return scene.changes(total) / scene.width
+def _mean(scene: _Scene, values: FloatArray) -> FloatArray:
+    """Return the mean (n,) of numbers over each window: what turns a rate over it."""
+    return scene.changes(np.cumsum(np.nan_to_num(values))) / scene.width
 
 
-def _about_zero(scene: _Scene, column: str | int) -> bool:
-    values = scene.samples.columns[column]
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    return low < 0.0 < high and min(-low, high) > 0.2 * max(-low, high) and high < 90.0
+def _deflected(values: FloatArray) -> tuple[FloatArray, dict[str, Any]] | None:
+    """Return numbers (n,) of both sides of zero, or of a servo's centre, with how they are read; None where they are neither."""
+    servo = servo_of(values)
+    centred = values if servo is None else values - servo.centre
+    low, high = float(np.nanmin(centred)), float(np.nanmax(centred))
+    if not (low < 0.0 < high and min(-low, high) > 0.2 * max(-low, high) and (high < 90.0 or servo is not None)):
+        return None
+    if servo is not None:
+        return centred, {"unit": COUNTS, "centre": servo.centre}
+    return centred, {"unit": "deg" if high > 1.6 else "rad"}
+
+
+def moving_fin(samples: Samples, known: Mapping[str, str | int], outputs: list[str | int]) -> Recognised | None:
+    """Return which of some outputs the yaw rate follows, where one does clearly; `known` has the yaw rate, or the heading."""
+    usual = np.diff(samples.time)
+    if usual.size < 50:
+        return None
+    moving = [c for c in outputs if _moves(samples.columns[c])]
+    found = [
+        fin
+        for window in WINDOWS_S
+        for fin in _fin(_Scene(samples, max(1, round(window / float(np.median(usual)))), moving), known, moving, [])
+    ]
+    return found[0] if found else None
 
 
 def _explained_alone(

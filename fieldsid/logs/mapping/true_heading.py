@@ -56,8 +56,8 @@ def better_heading(runs: Sequence[Run], names: Sequence[str]) -> tuple[int, Note
         return None
     best, own = max(leads.items(), key=lambda found: found[1].seconds)
     why = (
-        f"in turns it is {own.seconds:.2f} +/- {own.error:.2f} s ahead of the course of x_m and y_m, as of a hull that slides; the"
-        f" other is that course ({other.seconds:.2f} +/- {other.error:.2f} s)"
+        f"in turns it is {own.seconds:.2f} +/- {own.error:.2f} s ahead of the course of x_m and y_m, as a hull that slides is; "
+        f"the other is that course ({other.seconds:.2f} +/- {other.error:.2f} s)"
     )
     return best, _taken(names, best, why)
 

@@ -25,7 +25,8 @@ def degrees(signal):
 
 def alog(folder):
     return write_alog(folder / "boat.alog", {
-        "DESIRED_RUDDER": np.degrees(SLIDING["rudder_rad"]), "NAV_X": SLIDING["y_m"], "NAV_Y": SLIDING["x_m"], "NAV_HEADING": degrees("course_rad"),
+        "DESIRED_RUDDER": np.degrees(SLIDING["rudder_rad"]), "NAV_X": SLIDING["y_m"], "NAV_Y": SLIDING["x_m"],
+        "NAV_HEADING": degrees("course_rad"),
         "COMPASS_HEADING": degrees("yaw_rad"),
         })  # fmt: skip
 
