@@ -51,6 +51,11 @@ class Source:
         return tuple(c for c in (self.column, *self.columns, *self.date, self.week) if c is not None)
 
     @property
+    def counts_rows(self) -> bool:
+        """Whether this is a time without a column: the rows themselves, so many a second."""
+        return self.scale is not None and not self.places and self.topic is None
+
+    @property
     def label(self) -> str:
         """The source in words, for messages and notes."""
         if self.topic is not None:

@@ -15,7 +15,8 @@ from fieldsid.display import Brief
 from fieldsid.errors import MappingError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN
-from fieldsid.logs.mapping.propose import Proposal, propose
+from fieldsid.logs.mapping.propose import propose
+from fieldsid.logs.mapping.trial import Proposal
 from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.way_in import WayIn, way_in
@@ -29,6 +30,7 @@ _COLUMN_EXAMPLE = """# columns are counted from 0:
 _TOPIC_EXAMPLE = (
     "# signals:\n#   yaw_rad: {topic: /heading, field: data, unit: deg}\n#   rudder_rad: {topic: /rudder_cmd, field: data}\n"
 )
+NO_TIME = "# No column is a time; say how many rows there are a second:\n# time: {rate: 10}\n"
 SHORT = 120
 """Letters up to which a finding tells what was found beside what is wrong."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
@@ -52,6 +54,8 @@ class Inspection(Brief):
         head += "# Check units, signs and frame before you trust it.\n"
         body = dict(self.proposal.body)
         signals = body.pop("signals")
+        if "time" not in body and not self.inventory.by_topic:
+            head += NO_TIME
         if signals:
             return head + to_yaml(body) + "signals:\n" + "".join(f"  {name}: {_line(item)}\n" for name, item in signals.items())
         return head + to_yaml(body) + "signals: {}\n" + (_TOPIC_EXAMPLE if self.inventory.by_topic else _COLUMN_EXAMPLE)

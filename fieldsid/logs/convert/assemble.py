@@ -50,7 +50,10 @@ def assemble(
         for name, track in _tracks(signal, series, mapping, notes, options).items():
             if name in tracks:
                 raise MappingError(
-                    f"two sources give `{name}`", found=f"{tracks[name].label} and {track.label}", hint=f"map `{name}` once"
+                    f"two sources give `{name}`",
+                    found=f"{tracks[name].label} and {track.label}",
+                    hint=f"map `{name}` once",
+                    signal=name,
                 )
             tracks[name] = track
     if not tracks:
@@ -144,6 +147,7 @@ def _check_swap(signal: str, source: Source, mapping: ChannelMap) -> None:
             f"`{signal}` is in ENU and becomes `{partner}`, which is not mapped beside it",
             found=source.label,
             hint=f"map both `x_m` and `y_m` in ENU, or write `frame: NED` at `{signal}`",
+            signal=signal,
         )
 
 
@@ -152,7 +156,7 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
     angles = dict(zip(ANGLES, angles_of_quaternion(xyzw, source.frame or mapping.frame), strict=True))
     wanted = ANGLES if signal == ATTITUDE else (signal,)
     if signal != ATTITUDE and signal not in ANGLES:
-        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number")
+        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number", signal=signal)
     return {n: angles[n] + source.offset if source.offset and n == "yaw_rad" else angles[n] for n in wanted}
 
 

@@ -161,18 +161,18 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
 
 
 def _time(time: _Time, place: str) -> Source:
-    """The unit of a time is one of time, or says how a clock is written; one that counts samples has a rate, and no unit."""
-    if (time.column is None) == (not time.columns):
+    """The unit of a time is one of time, or says how a clock is written; one that counts samples or rows has a rate, and none."""
+    if (time.column is None) == (not time.columns) and (time.columns or time.rate is None):
         raise MappingError(
-            f"{place}: `time` needs one of `column`, `columns`",
+            f"{place}: `time` needs one of `column`, `columns`, `rate`",
             found="both" if time.columns else "none of them",
-            hint="name one with `column`, or those that make it up with `columns`",
+            hint="name one with `column`, those that make it up with `columns`, or give the rows a second with `rate`",
         )
     if time.rate is not None and (time.unit, time.date, time.week, time.columns) != (None, None, None, None):
         raise MappingError(
             f"{place}: a time with a `rate` counts samples, and has no unit, date or week",
             found=f"rate {time.rate:g}",
-            hint=f"write `time: {{column: {time.column or 'NAME'}, rate: {time.rate:g}}}`",
+            hint=f"write `time: {{rate: {time.rate:g}}}`",
         )
     if time.columns:
         parts_of(time.unit, time.columns, place)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,8 @@ from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.recognise import Recognised, moving_fin
-from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Samples, Series
+from fieldsid.logs.mapping.trial import Log
+from fieldsid.logs.reader import Inventory, Samples, Series
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
@@ -39,14 +39,14 @@ def outputs_of(inventory: Inventory) -> list[Output]:
     return [(topic, path) for topic, path in fields if OUTPUTS & set(words_of(f"{topic} {path}")) and _OUTPUT.search(path)]
 
 
-def rudder_among(run: Run, outputs: list[Output], path: Path, reader: Reader, options: ReadOptions) -> Recognised | None:
+def rudder_among(run: Run, outputs: list[Output], log: Log) -> Recognised | None:
     """Return the output that is the rudder by what the motion of a run follows; None where none stands out."""
     signal = next((s for s in ("yaw_rate_rad_s", "yaw_rad") if run.has(s)), None)
     if signal is None:
         return None
     sources = {str(i): Source(topic=topic, path=field) for i, (topic, field) in enumerate(outputs)}
     try:
-        raw = reader.read(path, ChannelMap(sources), options)
+        raw = log.read(ChannelMap(sources))
     except (LogError, MappingError):  # an output that cannot be read is no fin
         return None
     time = run.time + _origin_s(run.notes) - _origin_s(raw.notes)

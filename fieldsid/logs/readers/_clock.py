@@ -63,6 +63,8 @@ class Clock:
 
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     """Return the clock of a table, by its mapping or by the names of its columns; None where no column goes on like time."""
+    if known is not None and known.counts_rows:
+        return Clock((known.scale or 1.0) * np.arange(columns.take(0).size, dtype=np.float64), known)
     if known is not None and known.places:
         return _tried(columns, known)
     named = (_tried(columns, source) for source in _named(columns))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
-from fieldsid.logs.readers._cells import cells, is_row, is_word
+from fieldsid.logs.readers._cells import SENTENCE, cells, is_row, is_word
 from fieldsid.logs.readers._header import behind_sizes, header_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
 
@@ -31,6 +31,8 @@ class Form:
     width: int
     names: tuple[str, ...]
     units: tuple[str, ...] = ()
+
+    is_sentences: bool = False
 
     def label(self, index: int) -> str:
         """The name of a column, or its index where there is no header."""
@@ -77,6 +79,7 @@ def _try(lines: list[str], first: int, separator: str, asked: TableForm) -> tupl
             score = (agreeing, sum(not is_word(c, decimal) for c in row) / len(row), len(row))
             if score > best[1]:
                 names, units = header_of(lines, at, first, separator, len(row), asked=asked.header)
-                best = Form(separator, decimal, behind_sizes(lines, at, names), len(row), names, units), score
+                said = SENTENCE.match(lines[at].encode()) is not None
+                best = Form(separator, decimal, behind_sizes(lines, at, names), len(row), names, units, said), score
             break
     return best

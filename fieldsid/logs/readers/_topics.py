@@ -106,12 +106,14 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
             f"`{signal}` is mapped to a {source.label}, but `{path}` is a log of topics",
             found=source.label,
             hint="name a `topic` and a `field`",
+            signal=signal,
         )
     if source.topic not in topics:
         raise MappingError(
             f"`{path}` has no topic `{source.topic}` for `{signal}`",
             found=", ".join(sorted(topics)[:12]),
             hint=near(source.topic, list(topics)),
+            signal=signal,
         )
     topic = topics[source.topic]
     fields = [part.strip() for part in (source.path or DATA).split(",")]
@@ -121,6 +123,7 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
                 f"topic `{source.topic}` has no field `{name}` for `{signal}`",
                 found=", ".join(topic.fields),
                 hint=near(name, list(topic.fields)),
+                signal=signal,
             )
     values = [topic.fields[name] for name in fields]
     label = f"{source.topic}.{source.path}" if source.path else source.topic

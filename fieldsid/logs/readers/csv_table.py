@@ -16,7 +16,7 @@ import numpy.typing as npt
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._cells import ERRORS, MISSING, cells, has_number, is_word
+from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
 from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
@@ -135,9 +135,11 @@ class _Table:
 
     def _cells(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
         """Return the cells (n,) of the wanted columns; lines of words that do not fit the columns are left out."""
-        with TemporaryFile() as blanked, TemporaryFile() as plain:
-            if self.text.holds(ERRORS, self.begin, self.end):
+        with TemporaryFile() as blanked, TemporaryFile() as own, TemporaryFile() as plain:
+            if self.text.holds(ERRORS, b"#", self.begin, self.end):
                 self._without_errors(blanked)
+            if self.text.holds(SENTENCE, b"$", self.begin, self.end):
+                self._without_sentences(own)
             try:
                 return self._parsed(wanted)
             except LogError:
@@ -156,6 +158,21 @@ class _Table:
         self._turn_to(plain)
         message = f"cells that say there is no number, as {first.decode()!r}, taken as missing: {count}"
         self.notes.append(Note("error_cells", message, {"count": count}))
+
+    def _without_sentences(self, plain: IO[bytes]) -> None:
+        """Copy the rows, with an empty line for each sentence of NMEA among them; a log of nothing else stays as it is."""
+        found: list[bytes] = []
+        with self.text.between(self.begin, self.end) as rows:
+            for raw in rows:
+                is_sentence = SENTENCE.match(raw) is not None
+                found += [raw] if is_sentence else []
+                plain.write(b"\n" if is_sentence else raw)
+        if self.form.is_sentences:
+            return
+        self._turn_to(plain)
+        first = found[0].decode("latin-1").strip()[:60]
+        message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
+        self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
 
     def _turn_to(self, plain: IO[bytes]) -> None:
         """Read the rows from a copy of them."""

@@ -132,6 +132,7 @@ class TopicDecoding:
                     f"`{path}` of topic `{connection.topic}` is beyond the end, or never a number",
                     found=f"{values[signal].size} messages",
                     hint=f"map `{signal}` to another element",
+                    signal=signal,
                 )
 
 
@@ -174,10 +175,14 @@ def field_of(connection: Connection, layout: Layout, signal: str, path: str) -> 
             f"`{ATTITUDE}` needs a quaternion, not `{path}` of `{connection.topic}`",
             found=f"quaternions: {', '.join(quaternions_in(layout)) or 'none'}",
             hint="give the field that holds x, y, z, w",
+            signal=signal,
         )
     if len(places) == 4 and signal not in (ATTITUDE, "yaw_rad", "pitch_rad", "roll_rad"):
         raise MappingError(
-            f"`{signal}` cannot come from a quaternion", found=f"{connection.topic}.{path}", hint=f"name one number: `{path}.x`"
+            f"`{signal}` cannot come from a quaternion",
+            found=f"{connection.topic}.{path}",
+            hint=f"name one number: `{path}.x`",
+            signal=signal,
         )
     return path
 
