@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,14 @@ from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
 from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
-from fieldsid.logs.mapping.canonical_names import canonical, canonical_names
+from fieldsid.logs.mapping.canonical_names import canonical
 from fieldsid.logs.mapping.vocabulary import TIME
-from fieldsid.logs.reader import Reader, ReadOptions, reader_of
+from fieldsid.logs.reader import Inventory, Reader, ReadOptions, reader_of
 from fieldsid.logs.run import OF_LIMITS, READ_WITH, Note, Run
 
 MAPPING_FILE = "mapping.yaml"
+NEAR_SHOWN = 4
+"""Columns of which a message says what they may be."""
 
 
 def load_run(
@@ -125,21 +126,21 @@ def _unmapped(path: Path, reader: Reader, options: ReadOptions) -> MappingError:
     if found.by_topic:
         what = "bag" if found.form.endswith("bag") else "log of topics"
         return MappingError(f"`{path}` is a {what} and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
-    close = _near_names(names)
+    close = _near_names(found)
     hint += f"; {close}" if close else ""
     if not any((said := canonical(n)) is not None and said.signal == TIME for n in names):
         return MappingError(f"`{path}` has no column `{TIME}`", found=f"columns {shown}", hint=hint)
     return MappingError(f"`{path}` has no column of a signal that is known by its name", found=f"columns {shown}", hint=hint)
 
 
-def _near_names(names: Sequence[str]) -> str:
-    """Say which canonical name a column that is none may mean."""
-    pairs = []
-    for name in names:
-        match = difflib.get_close_matches(name.lower(), canonical_names(), n=1, cutoff=0.55)
-        if match and canonical(name) is None:
-            pairs.append(f"`{name}` may be `{match[0]}`")
-    return ", ".join(pairs[:4])
+def _near_names(found: Inventory) -> str:
+    """Say which signals columns that are none by their names probably are, as `sysid inspect` does."""
+    from fieldsid.logs.mapping.draft import draft_of, place_of
+
+    body = draft_of(found).body
+    lines = ({TIME: body["time"]} if "time" in body else {}) | body["signals"]
+    pairs = [f"`{place_of(item)}` may be `{signal}`" for signal, item in lines.items() if canonical(place_of(item)) is None]
+    return ", ".join(pairs[:NEAR_SHOWN])
 
 
 def _from_stdin(mapping: ChannelMap | Path | None, **more: Any) -> Run:

@@ -60,6 +60,13 @@ def label_of(item: Mapping[str, Any]) -> str:
     return f"topic `{item['topic']}`" if "topic" in item else f"column `{item.get('column', item.get('columns'))}`"
 
 
+def place_of(item: Mapping[str, Any]) -> str:
+    """Return where a mapping's line says that a signal is: its column, or its topic and field."""
+    if "topic" in item:
+        return f"{item['topic']} {item['field']}".strip() if item.get("field") not in (None, "", "data") else str(item["topic"])
+    return ", ".join(map(str, item["columns"])) if "columns" in item else str(item.get("column", ""))
+
+
 def unit_by_size(signal: str, largest: float) -> str | None:
     """Return degrees where numbers of such a size are none in rad."""
     return None if largest <= LARGEST.get(signal, np.inf) else "deg/s" if signal.endswith("_s") else "deg"
@@ -148,7 +155,7 @@ def _combined(best: dict[str, Guess], names: list[str], samples: Samples | None)
     attitude = None if samples is None else quaternion_of(names, samples.columns)
     if attitude is not None:
         signals = {s: item for s, item in signals.items() if s not in ANGLES}
-        signals[ATTITUDE] = {"columns": list(attitude)}
+        signals[ATTITUDE] = attitude
     return signals
 
 

@@ -51,7 +51,7 @@ class Guess:
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
     """Yield what a column may be; one of words is no signal."""
-    found = _of_message_path(channel.name) or meaning_of(channel.name)
+    found = _of_message_path(channel.name) or meaning_of(channel.name, channel.fields[0].span)
     if found is None or channel.count == 0 or channel.kind != "number" or found[0] == TIME:
         return
     signal, sure = found
@@ -81,26 +81,36 @@ def _of_message_path(name: str) -> tuple[str, float] | None:
     return _VECTORS[vector]["xyz".index(last)], 8.0
 
 
-_PARTS_OF_QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>[xyzw])(?P<end>_?\d*)$", re.IGNORECASE)
+_PARTS_OF_QUATERNION = (
+    re.compile(r"(?P<stem>.*?)(?P<part>[xyzw])(?P<end>_?\d*)$", re.IGNORECASE),
+    re.compile(r"(?P<stem>.*?q(?:uat|uaternion)?s?[_.]?[\[(]?)(?P<part>[0-4])(?P<end>[\])]?)$", re.IGNORECASE),
+)
+"""How the parts of a quaternion are called: by their letters, or counted behind a `q` as in `q[0]` and `quat_1`."""
 UNIT_LENGTH = 0.02
 """How far the length of a quaternion's four numbers may be from one."""
 
 
-def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> tuple[str, ...] | None:
-    """Return the four columns x, y, z, w of an attitude: alike in name but for the part, together of length one; or None."""
+def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> dict[str, Any] | None:
+    """Return the four columns of an attitude: alike in name but for the part, together of length one; None where there are none.
+
+    Of parts that are counted the real one is first or last: a vehicle is upright more often than on its side, so that the two
+    that are no turn about the vertical are small.
+    """
     stems: dict[tuple[str, str], dict[str, str]] = {}
-    for name in names:
-        found = _PARTS_OF_QUATERNION.match(name.strip())
-        if found and name in columns and not COMMANDED & set(words_of(name)):
-            stems.setdefault((found["stem"], found["end"]), {})[found["part"].lower()] = name
+    for pattern in _PARTS_OF_QUATERNION:
+        for name in names:
+            found = pattern.match(name.strip())
+            if found and name in columns and not (COMMANDED | {"d", "delta"}) & set(words_of(name)):
+                stems.setdefault((found["stem"], found["end"]), {})[found["part"].lower()] = name
     for parts in stems.values():
-        if parts.keys() != set("xyzw"):
-            continue
-        picked = tuple(parts[p] for p in "xyzw")
-        lengths = np.linalg.norm(np.stack([columns[c] for c in picked]), axis=0)
+        picked = [parts[part] for part in ("xyzw" if "x" in parts else sorted(parts)) if part in parts]
+        numbers = np.stack([columns[c] for c in picked])
+        lengths = np.linalg.norm(numbers, axis=0)
         seen = lengths[np.isfinite(lengths)]
-        if seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
-            return picked
+        if len(picked) == 4 and seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
+            size = np.nanmean(numbers**2, axis=1)
+            is_real_first = "x" not in parts and size[1] + size[2] <= size[0] + size[1]
+            return {"columns": picked} | ({"order": "wxyz"} if is_real_first else {})
     return None
 
 
@@ -127,6 +137,9 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             continue
         if channel.kind == DEFINED or last in _COUNTERS or "covariance" in info.path or "[" in parent:
             continue
+        if info.path == "q[0]" and {"q[1]", "q[2]", "q[3]"} <= paths and not commanded:
+            # the messages of PX4 have the real part first
+            yield Guess(ATTITUDE, 8.0, {"topic": channel.name, "field": "q", "order": "wxyz"}, channel.count, defined=True)
         if planar and info.path in _PLANAR:
             yield from _of_plane(channel, info.path, commanded=commanded)
             continue

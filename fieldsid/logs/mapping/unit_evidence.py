@@ -13,6 +13,7 @@ from typing import Any
 from fieldsid.logs.doctor.angle_and_rate import PAIRS, agrees_with_rate
 from fieldsid.logs.doctor.course_findings import goes_along_course, goes_with_depth
 from fieldsid.logs.doctor.pair_findings import goes_with_way
+from fieldsid.logs.mapping.draft import place_of
 from fieldsid.logs.run import SIGNALS, Note, Run
 
 NEEDS_NONE = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
@@ -44,10 +45,3 @@ def said_of_assumed(assumed: Collection[str], signals: Mapping[str, Any]) -> lis
     shown = ", ".join(f"{s} from `{place_of(signals.get(s, {}))}` in {SIGNALS[s]}" for s in assumed)
     message = f"no name and no other signal tells the unit of what is taken as it is: {shown}; write `unit:` where it is another"
     return [Note("unit_assumed", message, {"signals": list(assumed)})]
-
-
-def place_of(item: Mapping[str, Any]) -> str:
-    """Return where a mapping's line says that a signal is: its column, or its topic and field."""
-    if "topic" in item:
-        return f"{item['topic']} {item['field']}".strip() if item.get("field") not in (None, "", "data") else str(item["topic"])
-    return ", ".join(map(str, item["columns"])) if "columns" in item else str(item.get("column", ""))
