@@ -75,6 +75,7 @@ class Importer:
     max_gap_s: float = 2.0
     salvage: bool = False
     whole: bool = False
+    recognise: bool = False
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
         """Return the file each log becomes; raises before anything is read what would be the same for all logs.
@@ -129,6 +130,7 @@ class Importer:
             part=part,
             fin_max_rad=fin_max_rad,
             progress=progress,
+            recognise=self.recognise,
         )
 
     def write(self, run: Run, path: Path, *, force: bool = False) -> Imported:
