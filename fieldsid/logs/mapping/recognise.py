@@ -30,6 +30,7 @@ TURNS_ALONG = 0.6
 MOST_SLIP = 3.0
 """How many times as far a heading may turn as its course, or the course as the heading: sideslip lies between them."""
 MOST_WAYS = 30
+BEYOND_TILTS_DEG = 90.0
 FOLLOWS = 0.95
 """Correlation from which on one column is the derivative of another."""
 EXPLAINS = 0.3
@@ -134,7 +135,22 @@ def _ways(scene: _Scene, known: Mapping[str, str | int]) -> list[list[Recognised
             if heading not in (x, y):
                 middle = np.nan_to_num(scene.samples.columns[heading][scene.width // 2 :][: made.size])
                 found += _pointing(heading, (x, y), middle, way[x] + 1j * way[y])
-    return [way for _, way in sorted(found, key=lambda f: -f[0])[:MOST_WAYS]] or [[]]
+    ways = [way for _, way in sorted(found, key=lambda f: -f[0])[:MOST_WAYS]]
+    return ways or [[heading] for heading in _going_round(scene)] or [[]]
+
+
+def _going_round(scene: _Scene) -> list[Recognised]:
+    """Return the columns that may be a heading though no way is logged: they go beyond what tilts do, and have a derivative."""
+    found = []
+    for column in scene.free:
+        largest = float(np.nanmax(np.abs(scene.samples.columns[column])))
+        turned = scene.changes(np.unwrap(np.radians(np.nan_to_num(scene.samples.columns[column]))))
+        pairs = [(_alike(turned, _swept(scene, c)), c) for c in scene.free if c != column and largest > BEYOND_TILTS_DEG]
+        (trust, slope), rate = max(pairs, key=lambda p: p[0][0], default=((0.0, 0.0), ""))
+        if _is_rate(trust, slope):
+            why = f"it goes to {largest:.4g}, beyond tilts, and column {rate} is its derivative, correlation {trust:.3f}"
+            found.append(Recognised("yaw_rad", column, {"unit": "deg"}, why, trust))
+    return found
 
 
 def _with_rates(scene: _Scene) -> list[str | int]:

@@ -111,11 +111,11 @@ def _source(columns: Columns, index: int) -> Source:
         date = dates_beside(columns, (index,)) if clock is not None and clock.period_s == DAY_S else ()
         if date:
             return Source(column=place, date=tuple(map(columns.place, date)))
-    unit = columns.unit(index, TIME) or _unit_by_size(cells)
+    unit = columns.unit(index, TIME) or unit_by_size(cells)
     return Source(column=place, unit=unit)
 
 
-def _unit_by_size(cells: npt.NDArray[Any]) -> str | None:
+def unit_by_size(cells: npt.NDArray[Any]) -> str | None:
     if cells.dtype.kind not in "iuf" or not cells.size:
         return None
     steps = np.diff(cells[np.isfinite(cells)].astype(np.float64))
@@ -129,7 +129,7 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
     cells = columns.take(first)
     if not cells.size:
         return None
-    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or _unit_by_size(cells)
+    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or unit_by_size(cells)
     try:
         time, _ = time_of(columns, source, unit, ReadOptions(salvage=True))
     except FieldsidError:  # what is no time is not taken for one
@@ -148,7 +148,7 @@ def _by_numbers(columns: Columns) -> Clock | None:
             continue
         if is_counter(name) and cells.dtype.kind != "M":
             continue
-        clock = _tried(columns, Source(column=columns.place(i), unit=_unit_by_size(cells)))
+        clock = _tried(columns, Source(column=columns.place(i), unit=unit_by_size(cells)))
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])

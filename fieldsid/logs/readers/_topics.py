@@ -16,7 +16,7 @@ import numpy as np
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source
 from fieldsid.logs.mapping.canonical_names import stated_unit, unit_of_field
-from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo, Inventory, RawLog, Series
+from fieldsid.logs.reader import DEFINED, ChannelInfo, FieldInfo, Inventory, RawLog, Series, span_of
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -76,7 +76,9 @@ def inventory_of(
 def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
     bare = name.partition("[")[0]
     several = {p: m for key, m in means.items() if (p := key.removeprefix(f"{bare}.")) != key and ", " in p}
-    fields = [FieldInfo(p, "number", tuple(v[:3].tolist()), None, means.get(f"{bare}.{p}")) for p, v in topic.fields.items()]
+    fields = [
+        FieldInfo(p, "number", tuple(v[:3].tolist()), span_of(v), means.get(f"{bare}.{p}")) for p, v in topic.fields.items()
+    ]
     fields += [
         FieldInfo(p, "numbers", (), None, m) for p, m in several.items() if all(part in topic.fields for part in p.split(", "))
     ]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
 from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
 from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
@@ -43,7 +43,7 @@ def sniff(path: Path) -> bool:
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers, the table's rate and the first values."""
-    with _opened(path, form, options) as table:
+    with opened(path, form, options) as table:
         columns = table.columns(range(table.form.width))
         clock = clock_of(columns, options.clock)
         channels = tuple(_channel(columns, i, clock) for i in range(table.form.width))
@@ -60,7 +60,7 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped columns; raises MappingError for a column that is not there, LogError for cells that are no numbers."""
-    with _opened(path, mapping.table, options) as table:
+    with opened(path, mapping.table, options) as table:
         columns = table.columns(used_by(mapping, table.form.names, table.form.width))
         return series_of(path, columns, mapping, tuple(table.notes), options)
 
@@ -81,7 +81,8 @@ def _head_of(path: Path, text: PlainText) -> str:
 
 
 @contextmanager
-def _opened(path: Path, asked: TableForm, options: ReadOptions) -> Iterator[_Table]:
+def opened(path: Path, asked: TableForm, options: ReadOptions) -> Iterator[_Table]:
+    """Yield the table of a file, its text and the form in which it is written."""
     with plain_text(path, asked.encoding) as text:
         yield _Table(path, text, asked, options)
 
@@ -268,7 +269,7 @@ def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
     seen = np.isfinite(values.astype(float)) if numeric else ~np.asarray(pd.isna(values))
     first: Sequence[Any] = values[seen][:3].tolist()
     kind = "number" if numeric else "text"
-    span = (float(values[seen].min()), float(values[seen].max())) if numeric and seen.any() else None
+    span = span_of(values) if numeric else None
     rate = clock.rate_hz(values) if clock else float("nan")
     unit = columns.units[index] if columns.units else None
     return ChannelInfo(columns.name(index), kind, int(seen.sum()), rate, (FieldInfo("", kind, tuple(first), span),), unit)
