@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
@@ -26,53 +27,91 @@ OF_FINS = "; `us` for a servo's pulses, `1` where -1 .. 1 is the whole range, `c
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
+def _key(says: str, example: str, default: Any = None) -> Any:
+    """Return the field of a key: what it is for, and an example that the guide shows."""
+    return Field(default, description=says, examples=[example])
+
+
 class _Source(StrictModel):
-    column: Column | None = None
-    columns: list[Column] | None = None
-    order: Literal["xyzw", "wxyz"] = "xyzw"
-    topic: str | None = None
-    field: str = ""
-    unit: Annotated[str | None, BeforeValidator(lambda unit: "1" if unit == 1 else unit)] = None
-    sign: Literal[1, -1] = 1
-    offset: Finite = 0.0
-    frame: str | None = None
-    stamp: Literal["header", "receive"] | None = None
-    centre: Finite | None = None
-    scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    column: Column | None = _key("the column of a table, by its name or by its place from 0", "yaw_rad: {column: Heading}")
+    columns: list[Column] | None = _key(
+        "several columns that give one line: the four of a quaternion, or latitude and longitude",
+        "attitude: {columns: [qx, qy, qz, qw]}",
+    )
+    order: Literal["xyzw", "wxyz"] = _key(
+        "the order of a quaternion's numbers", 'attitude: {columns: ["q[0]", "q[1]", "q[2]", "q[3]"], order: wxyz}', "xyzw"
+    )
+    topic: str | None = _key("the topic of a bag, or what else has a clock of its own", "depth_m: {topic: /depth, field: data}")
+    field: str = _key("the path of a number in the messages", "surge_m_s: {topic: /odom, field: twist.twist.linear.x}", "")
+    unit: Annotated[str | None, BeforeValidator(lambda unit: "1" if unit == 1 else unit)] = _key(
+        "the unit of the numbers, where the name does not say it; on a fin also `us` (pulses), `1` (-1 .. 1), `%` and `counts`",
+        "rudder_rad: {column: rudder_cmd, unit: deg}",
+    )
+    sign: Literal[1, -1] = _key("-1 turns a signal that counts the other way", "rudder_rad: {column: fin, sign: -1}", 1)
+    offset: Finite = _key("what is added last, in SI", "yaw_rad: {column: compass, unit: deg, offset: 0.0349}", 0.0)
+    frame: str | None = _key("the frames of this signal only", "yaw_rad: {column: yaw, frame: ENU}")
+    stamp: Literal["header", "receive"] | None = _key(
+        "which stamps this signal has", "rudder_rad: {topic: /rudder, field: data, stamp: receive}"
+    )
+    centre: Finite | None = _key("the count of a servo in the middle", "rudder_rad: {column: servo1, unit: counts, centre: 1500}")
+    scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = _key(
+        "the rad that one count of a servo is worth", "rudder_rad: {column: servo1, unit: us, scale: 0.0013}"
+    )
 
 
 class _Time(StrictModel):
-    column: Column | None = None
-    columns: list[Column] | None = None
-    unit: str | None = None
-    date: Column | Annotated[list[Column], Field(min_length=1, max_length=3)] | None = None
-    week: Column | None = None
-    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    column: Column | None = _key("the column of the time, by its name or by its place from 0", "time: {column: stamp, unit: s}")
+    columns: list[Column] | None = _key(
+        "the columns whose sum the time is", "time: {columns: [hour, minute, second], unit: hh+mm+ss}"
+    )
+    unit: str | None = _key("the unit of the time, how a clock is written, or its parts", "time: {column: millis, unit: ms}")
+    date: Column | Annotated[list[Column], Field(min_length=1, max_length=3)] | None = _key(
+        "the columns of the days, where the time is that of a day", 'time: {column: clock, unit: "hhmmss", date: day}'
+    )
+    week: Column | None = _key("the column of the GPS weeks beside a time of the week", "time: {column: tow, week: wn}")
+    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = _key(
+        "how many samples a second a column counts, or how many rows a second there are where no column is a time",
+        "time: {rate: 10}",
+    )
 
 
 class _Pressure(StrictModel):
-    density: Annotated[float, Field(gt=0.0)] = 1025.0
-    surface_pa: Annotated[float, Field(ge=0.0)] = 101325.0
+    density: Annotated[float, Field(gt=0.0)] = _key("the water's, in kg/m^3", "pressure: {density: 1000.0}", 1025.0)
+    surface_pa: Annotated[float, Field(ge=0.0)] = _key(
+        "the pressure at the surface in Pa, 0 for a gauge", "pressure: {surface_pa: 0.0}", 101325.0
+    )
 
 
 class _Table(StrictModel):
-    separator: str | None = None
-    header: bool | None = None
-    skip: Annotated[int, Field(ge=0)] | None = None
-    encoding: str | None = None
-    decimal: Literal[".", ","] | None = None
+    separator: str | None = _key("what stands between two cells, or `whitespace`", 'table: {separator: ";"}')
+    header: bool | None = _key("whether the columns have names", "table: {header: false}")
+    skip: Annotated[int, Field(ge=0)] | None = _key("lines above the table", "table: {skip: 4}")
+    encoding: str | None = _key("the encoding of the text", "table: {encoding: cp1252}")
+    decimal: Literal[".", ","] | None = _key("the decimal sign", 'table: {decimal: ","}')
 
 
 class _File(StrictModel):
-    schema_: Literal["fieldsid/mapping/1"] = Field(default="fieldsid/mapping/1", alias="schema")
-    frame: str | None = None
-    stamp: Literal["header", "receive"] | None = None
-    clock: str | None = None
-    gap_factor: Annotated[float, Field(ge=1.0, le=1000.0)] = 2.5
-    time: _Time | None = None
-    pressure: _Pressure = _Pressure()
-    table: _Table = _Table()
-    signals: dict[str, _Source | str | int]
+    schema_: Literal["fieldsid/mapping/1"] = Field(
+        default="fieldsid/mapping/1", alias="schema", description="the kind of the file", examples=["schema: fieldsid/mapping/1"]
+    )
+    frame: str | None = _key("the frames of the log: the world's (NED, ENU) and the body's (FRD, FLU)", "frame: ENU/FLU")
+    stamp: Literal["header", "receive"] | None = _key("which stamps every topic has", "stamp: receive")
+    clock: str | None = _key("the signal whose samples give the clock, else the fastest angle or rate", "clock: yaw_rad")
+    gap_factor: Annotated[float, Field(ge=1.0, le=1000.0)] = _key(
+        "over how many of its periods a measurement is interpolated at most", "gap_factor: 4.0", 2.5
+    )
+    time: _Time | None = _key("the time of a table", "time: {column: Time, unit: s}")
+    pressure: _Pressure = _key("what turns a pressure into a depth", "pressure: {density: 1000.0, surface_pa: 0.0}", _Pressure())
+    table: _Table = _key("how a table is written, where that is not found by itself", 'table: {separator: ";"}', _Table())
+    signals: dict[str, _Source | str | int] = Field(
+        description="a line for each signal: where it is and how it is read", examples=["yaw_rad: {column: Heading, unit: deg}"]
+    )
+
+
+KEYS: Mapping[str, type[StrictModel]] = MappingProxyType(
+    {"": _File, "a line of `signals`": _Source, "`time`": _Time, "`pressure`": _Pressure, "`table`": _Table}
+)
+"""The keys of a mapping by where they stand, as the guide lists them."""
 
 
 def load_mapping(path: Path) -> ChannelMap:
