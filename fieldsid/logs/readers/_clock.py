@@ -13,7 +13,7 @@ from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import Source
 from fieldsid.logs.convert.conditioning import in_order
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
-from fieldsid.logs.convert.times.time_column import likely_time_unit
+from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
 from fieldsid.logs.mapping.canonical_names import unit_in_name
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.vocabulary import TIME
@@ -152,7 +152,9 @@ def _by_numbers(columns: Columns) -> Clock | None:
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])
-        if float(np.std(steps)) < REGULAR * float(np.mean(steps)):
+        # seconds since 1970 are a time however long the logger paused
+        is_epoch = cells.dtype.kind in "iuf" and bool(((cells > YEARS_S[0]) & (cells < YEARS_S[1])).all())
+        if is_epoch or float(np.std(steps)) < REGULAR * float(np.mean(steps)):
             return replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
     return None
 

@@ -25,9 +25,18 @@ def header_of(
     lines: list[str], at: int, first: int, separator: str, width: int, *, asked: bool | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names and the units of the columns; a row of units stands below one of names."""
-    units: tuple[str, ...] = ()
     if asked is False:
         return (), ()
+    names, units = _above(lines, at, first, separator, width)
+    if not names and width > 2 and cells(lines[at], separator)[-1] == "":
+        # rows that end in a separator have a cell more than there are names
+        names, units = _above(lines, at, first, separator, width - 1)
+        return (*names, "") if names else (), (*units, "") if units else ()
+    return names, units
+
+
+def _above(lines: list[str], at: int, first: int, separator: str, width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    units: tuple[str, ...] = ()
     for i in range(at - 1, max(first, 0) - 1, -1):
         if not lines[i].strip() or _RULE.match(lines[i]):
             continue

@@ -247,7 +247,8 @@ class _Table:
 
     def _count_bad_rows(self, kept: int) -> None:
         with self.text.between(self.begin, self.end) as rows:
-            lines = (line.strip() for line in rows)
+            # a quote that closes on a line of its own ends a cell, and is no row
+            lines = (line.strip(b"\"' \t\r\n") for line in rows)
             left_out = sum(1 for line in lines if line and not line.startswith(b"#")) - kept
         if left_out > 0:
             self.notes.append(

@@ -64,3 +64,18 @@ def test_a_log_of_sentences_alone_keeps_its_rows(tmp_path):
     found = inspect_log(log)
     assert {c.count for c in found.inventory.channels} == {80}
     assert "nmea_lines" not in {n.code for n in found.notes}
+
+
+def test_seconds_since_1970_are_a_time_without_a_name_though_the_logger_paused(tmp_path):
+    stamps = 1.7e9 + np.where(np.arange(400) < 200, 0.0, 3000.0) + 0.1 * np.arange(400)
+    log = tmp_path / "log.csv"
+    log.write_text("".join(f'{t:.3f},-121.748,38.537,{k % 90},"{0.01 * k:.2f}\n"\n' for k, t in enumerate(stamps)))
+    found = inspect_log(log)
+    assert found.proposal.body["time"] == {"column": 0, "unit": "s"}
+    assert "bad_rows" not in {n.code for n in found.notes}
+
+
+def test_rows_that_end_in_a_separator_keep_their_names(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time,heading,rudder\n" + "".join(f"{0.1 * k:.1f},{k},{k % 7},\n" for k in range(80)))
+    assert [c.name for c in inspect_log(log).inventory.channels][:3] == ["time", "heading", "rudder"]
