@@ -73,7 +73,7 @@ _PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
         "h": (3600.0, "hr hrs hour hours"),
         "d": (86400.0, "day days datenum"),
     },
-    "ratio": {"1": (1.0, "- ratio"), "%": (1e-2, "percent pct")},
+    "ratio": {"1": (1.0, "- ratio"), "%": (1e-2, "percent percentage pct perc")},
     "force": {"N": (1.0, "newton newtons"), "kN": (1e3, ""), "kgf": (9.80665, "")},
 }
 """Units by dimension: the factor to SI, and how else they are spelled."""

@@ -81,7 +81,7 @@ def unit_in_name(name: str, signal: str) -> str | None:
     A rate named with the unit of its angle, or a speed with that of its way, is one by a second.
     """
     dimensions = fitting(signal)
-    found = unit_said(name, dimensions) or (unit_said(name, ("time",)) if signal in FINS else None)
+    found = unit_said(name, dimensions) or (unit_said(name, ("time", "ratio")) if signal in FINS else None)
     if found is not None and (found.dimension in dimensions or found.name in BY_UNIT):
         return "rad/s" if found.name == "rev/s" and signal != "propeller_rpm" else found.name
     whole = unit_said(name, (OF_CHANGES[dimensions[0]],)) if dimensions and dimensions[0] in OF_CHANGES else None

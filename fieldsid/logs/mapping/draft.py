@@ -29,8 +29,6 @@ _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borient
 """What columns are called that were written from messages, which are in the frames of REP 103."""
 NORTH_EAST_DOWN = ("ned", "px")
 """Words of topics whose frames are others: of one called so, and of PX4's."""
-PERCENT = frozenset({"percent", "percentage", "pct", "perc"})
-"""Words of a fin that is told in shares of its range, whose angle is not known."""
 OTHER_HEADINGS = 4
 """Headings beside the surest that are tried."""
 LARGEST = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s": 4.0, "pitch_rate_rad_s": 4.0,
@@ -181,7 +179,9 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
     for signal, several in by_signal.items():
         ordered = sorted(several, key=lambda g: (-g.sure, -g.count))
         best[signal] = ordered[0]
-        others = [label_of(g.item) for g in ordered[1:4] if g.sure > 0.5 * ordered[0].sure]
+        # of two that a format defines to be one signal both are it
+        open_ones = [g for g in ordered[1:4] if g.sure > 0.5 * ordered[0].sure and not (g.defined and ordered[0].defined)]
+        others = [label_of(g.item) for g in open_ones]
         if others and signal in SIGNALS:
             message = f"{signal} is taken from {label_of(ordered[0].item)}; it may also be {', '.join(others)}"
             notes.append(Note("alternatives", message, {"signal": signal, "others": others}))
@@ -225,8 +225,6 @@ def _as_counts(samples: Samples, signals: dict[str, Any]) -> None:
     for signal in COUNTED:
         item = signals.get(signal, {})
         values = samples.columns.get(item.get("column", ""))
-        if signal in FINS and "unit" not in item and PERCENT & set(words_of(str(item.get("column", "")))):
-            item["unit"], item["centre"] = COUNTS, 0
         servo = None if values is None or "unit" in item else servo_of(values) or _as_others(values, servos)
         if servo is not None:
             item["unit"], item["centre"] = COUNTS, servo.centre

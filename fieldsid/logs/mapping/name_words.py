@@ -17,7 +17,7 @@ OF_NAMES = ("angle", "angle rate", "speed", "length", "pressure", "time")
 """Dimensions whose units stand in names."""
 NEVER = frozenset({"in", "mi", "rev", "revs", "d"})
 """Spellings that are other words in names: input, middle, reverse, down."""
-ALL_UNITS = frozenset(text for d in OF_NAMES for text in SPELLINGS[d]) - NEVER
+ALL_UNITS = frozenset(text for d in OF_NAMES for text in SPELLINGS[d]) - NEVER | {"percent", "pct", "perc"}
 LONGEST = 3
 """Words of a unit: `deg_per_sec`, of which `per` is none."""
 SHORTEST = 3

@@ -67,11 +67,22 @@ def _held(series: Series, time: FloatArray) -> FloatArray:
     return np.where(before >= 0, series.values[np.maximum(before, 0)], np.nan)
 
 
-def which_output(outputs: list[Output]) -> Note:
+def _unit_by_span(span: tuple[float, float] | None) -> str:
+    """Return the unit of an output by its least and largest, as a mapping has it: pulses, or shares of its range."""
+    if span is None or span == (0.0, 0.0):
+        return ""
+    if max(map(abs, span)) <= 1.0:
+        return ', unit: "1"'
+    servo = next((s for s in SERVOS[1:] if s.least <= span[0] and span[1] <= s.largest), None)
+    return "" if servo is None else f", unit: {COUNTS}, centre: {servo.centre:g}"
+
+
+def which_output(outputs: list[Output], inventory: Inventory) -> Note:
     """Return the note that names the outputs, and the line that is missing."""
     shown = ", ".join(f"{topic} {path}" for topic, path in outputs[:SHOWN]) + (", ..." if len(outputs) > SHOWN else "")
     topic, path = outputs[0]
-    unit = "" if path == "value" else f", unit: {COUNTS}, centre: {SERVOS[1].centre:g}"
+    spans = {(c.name, f.path): f.span for c in inventory.channels for f in c.fields}
+    unit = _unit_by_span(spans.get((topic, path)))
     message = (
         f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{topic: {json.dumps(topic)}, "
         f"field: {json.dumps(path)}{unit}}}`, of: {shown}"

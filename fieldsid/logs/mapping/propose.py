@@ -70,7 +70,7 @@ def _with_rudder(log: Log, done: Proposal, defined: frozenset[str]) -> Proposal:
         return done
     fin = rudder_among(done.run, outputs, log)
     if fin is None:
-        return replace(done, notes=(*done.notes, which_output(outputs)))
+        return replace(done, notes=(*done.notes, which_output(outputs, log.inventory)))
     topic, path = outputs[int(fin.column)]
     signals["rudder_rad"] = {"topic": topic, "field": path, **fin.item}
     why = Note("evidence", f"rudder_rad is {topic} {path}: {fin.why}", {"signal": "rudder_rad", "outputs": len(outputs)})

@@ -73,3 +73,13 @@ def test_a_fin_of_more_than_half_a_turn_is_refused_with_its_unit(tmp_path, value
     with pytest.raises(DataError, match="no angle in rad") as error:
         record_of(run, Axis.YAW)
     assert f"`unit: {unit}`" in error.value.hint
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Rudder Cmd (%)", "%"), ("rudder_pct", "%"), ("servo_rudder_us", "us")])
+def test_a_name_may_say_that_a_fin_is_in_percent_or_in_pulses(tmp_path, name, unit):
+    centre, per_rad = (1500.0, 800.0) if unit == "us" else (0.0, 300.0)
+    columns = {"t": TRUTH["time_s"], "heading_deg": np.degrees(TRUTH["yaw_rad"]), name: centre + per_rad * TRUTH["rudder_rad"]}
+    found = inspect_log(write_table(tmp_path / "log.csv", columns))
+    assert found.proposal.body["signals"]["rudder_rad"]["unit"] == unit
+    assert np.corrcoef(found.run["rudder_rad"], TRUTH["rudder_rad"])[0, 1] > 0.999
+    assert "counts" in {n.code for n in found.run.notes}
