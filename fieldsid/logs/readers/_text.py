@@ -9,7 +9,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
 from fieldsid.logs.readers._cells import SENTENCE, cells, is_row, is_word
 from fieldsid.logs.readers._header import behind_sizes, header_of
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN, known_text
 
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 LOOKED_AT = 400
@@ -50,6 +50,8 @@ def form_of(text: str, asked: TableForm, path: Path) -> Form:
         form, score = _try(lines, first, separator, asked)
         if form is not None and score > best_score:
             best, best_score = form, score
+    if best is None and (known := known_text(path, lines)) is not None:
+        raise known
     if best is None:
         shown = next((line for line in lines if line.strip()), "")[:80]
         if sum(bool(line.strip()) for line in lines) == 1:

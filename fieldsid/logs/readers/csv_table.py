@@ -21,10 +21,10 @@ from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
-from fieldsid.logs.readers._text import Form, form_of
+from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, refuse_endless
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, is_text
+from fieldsid.logs.unknown_file import COPY_AGAIN, is_text, known_text
 
 _LINE = re.compile(r"line (\d+)")
 BLOCK_ROWS = 100_000
@@ -239,7 +239,7 @@ class _Table:
         }
 
     def _misfit(self, error: Exception) -> LogError:
-        return LogError(
+        return known_text(self.path, self.text.head().splitlines()[:LOOKED_AT]) or LogError(
             f"`{self.path}` has a row that does not fit its {self.form.width} columns",
             found=_LINE.sub(lambda m: f"line {int(m[1]) + self.form.start}", str(error).strip().rpartition("error: ")[2]),
             hint=f"mend the line, or leave such rows out: {self.options.with_option('--salvage')}",
