@@ -96,6 +96,7 @@ def _of_columns(inventory: Inventory) -> Draft:
             guesses += of_column(channel, channel.name if names.count(channel.name) == 1 else i)
     best, notes = _best(guesses)
     _plane_pose(best)
+    _single_speed(best)
     body: dict[str, Any] = {"schema": SCHEMA}
     samples = inventory.samples
     source = samples.source if samples is not None else inventory.no_clock[0] if inventory.no_clock is not None else None
@@ -195,6 +196,13 @@ def _plane_pose(best: dict[str, Guess]) -> None:
         return
     if "theta" in words_of(str(pitch.item["column"])):
         best["yaw_rad"] = replace(best.pop("pitch_rad"), signal="yaw_rad")
+
+
+def _single_speed(best: dict[str, Guess]) -> None:
+    """A `v` without a `u` beside it is the speed, and no sway."""
+    sway = best.get("sway_m_s")
+    if sway is not None and "surge_m_s" not in best and words_of(str(sway.item["column"])) == ["v"]:
+        best["surge_m_s"] = replace(best.pop("sway_m_s"), signal="surge_m_s")
 
 
 def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory) -> list[Note]:

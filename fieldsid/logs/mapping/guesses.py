@@ -24,7 +24,6 @@ _VECTORS = {
     "position": ("x_m", "y_m", "depth_m"),
 }
 _EULER = {"rpy", "euler", "attitude", "orientation", "angles"}
-_TILTS = {"pitch_rad", "roll_rad", "pitch_goal_rad"}
 _COUNTERS = {"seq", "sec", "nanosec", "secs", "nsecs"}
 _PLANAR = {
     "theta": "yaw_rad", "angular_velocity": "yaw_rate_rad_s", "linear_velocity": "surge_m_s", "x": "x_m", "y": "y_m",
@@ -32,8 +31,8 @@ _PLANAR = {
 """Fields of a pose in the plane, which has an x, a y and one angle."""
 _FRAMED = {"ned", "enu", "local"}
 """Words of a pose whose x and y are metres: others are in degrees of latitude and longitude."""
-STEEPEST_DEG = 360.0
-"""A pitch or roll is less in any unit: a larger number is none, as the port or the error code that a constant may be."""
+STANDARD = 8.0
+"""What a part of a standard message is as sure as, whose unit is that of the standard: SI."""
 NOTHING = 0.1
 """What a column that never changes is as sure as, beside one that does."""
 
@@ -56,20 +55,12 @@ def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
         return
     signal, sure = found
     span = channel.fields[0].span
-    if _is_no_angle(signal, span or ()):
-        return
-    if signal in (LATITUDE, LONGITUDE):
-        if span is None or max(map(abs, span)) <= (90.0 if signal == LATITUDE else 360.0):
-            yield Guess(signal, _weighed(sure, span), {"column": place}, channel.count)
-        return
+    sure = sure if span is None or span[0] < span[1] else NOTHING
     said = canonical(channel.name)
-    unit = said.unit if said is not None else unit_in_name(channel.name, signal)
-    item: dict[str, Any] = {"column": place}
-    if unit is None and channel.unit:
+    unit = said.unit if said is not None else None if signal in (LATITUDE, LONGITUDE) else unit_in_name(channel.name, signal)
+    if unit is None and channel.unit and signal not in (LATITUDE, LONGITUDE):
         unit = stated_unit(channel.unit, signal)
-    if unit not in (None, "1"):
-        item["unit"] = unit
-    yield Guess(signal, _weighed(sure, span), item, channel.count)
+    yield Guess(signal, sure, {"column": place} | ({"unit": unit} if unit not in (None, "1") else {}), channel.count)
 
 
 def _of_message_path(name: str) -> tuple[str, float] | None:
@@ -114,16 +105,6 @@ def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray])
     return None
 
 
-def _is_no_angle(signal: str, seen: tuple[Any, ...]) -> bool:
-    """Whether numbers that were seen are too large for the pitch or roll they are named."""
-    numbers = [abs(v) for v in seen if isinstance(v, (int, float))]
-    return signal in _TILTS and max(numbers, default=0.0) > STEEPEST_DEG
-
-
-def _weighed(sure: float, span: tuple[float, float] | None) -> float:
-    return sure if span is None or span[0] < span[1] else NOTHING
-
-
 def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
     """Yield what the fields of a topic may be."""
     commanded = bool(COMMANDED & set(words_of(channel.name)))
@@ -148,7 +129,7 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             yield from _of_scalar(channel, info)
         elif not (signal == ATTITUDE and _is_nothing(channel, parent)):
             path = parent if signal == ATTITUDE else info.path
-            yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count, defined=True)
+            yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count, defined=sure == STANDARD)
 
 
 def _of_plane(channel: ChannelInfo, path: str, *, commanded: bool) -> Iterator[Guess]:
@@ -169,11 +150,11 @@ def _of_vector(channel: ChannelInfo, parent: str, last: str, *, commanded: bool)
     if commanded:
         return None, 0.0
     if last == "w" and {f.path for f in channel.fields} >= {f"{parent}.{p}" if parent else p for p in "xyz"}:
-        return ATTITUDE, 8.0
+        return ATTITUDE, STANDARD
     if last not in ("x", "y", "z"):
         return None, 0.0
     if name in _VECTORS:
-        return _VECTORS[name]["xyz".index(last)], 8.0
+        return _VECTORS[name]["xyz".index(last)], STANDARD
     if name == "vector" and _EULER & set(words_of(channel.name)):
         return ("roll_rad", "pitch_rad", "yaw_rad")["xyz".index(last)], 6.0
     return None, 0.0
@@ -192,8 +173,10 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     if info.path.startswith(("velocity[", "effort[")) or info.path.rpartition(".")[2] in ("x", "y", "z", "w"):
         return
     name = info.path if info.path not in ("data", "vector", "position[0]") else ""
-    found = meaning_of(f"{channel.name} {name}".strip())
-    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE) or _is_no_angle(found[0], info.first):
+    first = [float(v) for v in info.first if isinstance(v, (int, float))]
+    seen = info.span or ((min(first), max(first)) if first else None)
+    found = meaning_of(f"{channel.name} {name}".strip(), seen)
+    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE):
         return
     unit = unit_of_field(channel.name, info.path, found[0])
     unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit

@@ -74,10 +74,10 @@ def unit_said(name: str, dimensions: tuple[str, ...]) -> Unit | None:
 
     A name that states a unit by another states none of the two: `heading_deg_s` is not in `deg`.
     """
-    for inside in reversed(_BRACKET.findall(name)):
+    for inside in (text for text in reversed(_BRACKET.findall(name)) if not text.isdigit()):
         units = [u for d in dimensions if (u := find_unit(inside, d)) is not None]
         fitting = next((u for u in units if u.dimension in dimensions), None)
-        if fitting is not None or (units and not inside.isdigit()):
+        if fitting is not None or units:
             return fitting
     tokens = tokens_of(name)
     for size in range(LONGEST, 0, -1):
