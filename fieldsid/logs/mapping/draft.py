@@ -80,7 +80,7 @@ def with_units_by_span(draft: Draft, inventory: Inventory) -> None:
         servo = servo_of(np.array(span)) if signal in COUNTED else None
         unit = unit_by_size(signal, max(map(abs, span)))
         if servo is not None:
-            item |= {"unit": COUNTS, "centre": servo.centre}
+            item |= {"unit": COUNTS, "centre": round(servo.centre)}
         elif unit is not None:
             item["unit"] = unit
 
@@ -235,7 +235,7 @@ def _as_counts(samples: Samples, signals: dict[str, Any]) -> None:
         values = samples.columns.get(item.get("column", ""))
         servo = None if values is None or "unit" in item else servo_of(values) or _as_others(values, servos)
         if servo is not None:
-            item["unit"], item["centre"] = COUNTS, servo.centre
+            item["unit"], item["centre"] = COUNTS, round(servo.centre)
 
 
 def _as_others(values: FloatArray, servos: list[Servo]) -> Servo | None:

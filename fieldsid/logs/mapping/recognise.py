@@ -295,7 +295,7 @@ def _deflected(values: FloatArray) -> tuple[FloatArray, dict[str, Any]] | None:
     if not (low < 0.0 < high and min(-low, high) > 0.2 * max(-low, high) and (high < 90.0 or servo is not None)):
         return None
     if servo is not None:
-        return centred, {"unit": COUNTS, "centre": servo.centre}
+        return centred, {"unit": COUNTS, "centre": round(servo.centre)}
     return centred, {"unit": "deg" if high > 1.6 else "rad"}
 
 
