@@ -74,7 +74,14 @@ def as_lsf(folder):
     )
 
 
+def as_key_value(folder):
+    lines = [f"{t!r},{name},{float(v[k])!r}\n" for k, t in enumerate(map(float, TIME)) for name, v in SIGNALS.items()]
+    (folder / "log.csv").write_text("Timestamp,Key,Value\n" + "".join(lines))
+    return folder / "log.csv", by_topic({n: (n, "data") for n in SIGNALS})
+
+
 MADE = {
+    "key_value": as_key_value,
     "csv_table": as_csv,
     "parquet": as_parquet,
     "rosbag": as_bag,
@@ -87,6 +94,7 @@ MADE = {
 }
 
 
+TEXT = ("csv_table", "key_value")
 MISSPELT = {
     "rosbag": Source(topic="/rudder_cm", path="data"),
     "alog": Source(topic="rudder_rd", path="data"),
@@ -94,6 +102,7 @@ MISSPELT = {
     "ardupilot": Source(topic="TRI", path="S33"),
     "slocum": Source(topic="rudder_rd", path="data"),
     "lsf": Source(topic="EstimatedState", path="rudder_rd"),
+    "key_value": Source(topic="rudder_rd", path="data"),
 }
 """Sources of logs of topics that are not there; all others are tables."""
 
@@ -193,7 +202,7 @@ def test_a_log_cut_in_half_is_an_error_or_what_is_left_with_a_note(reader, log):
         parts = (error.what, error.found, error.hint)
     else:
         # Text cut at the end of a line cannot be told from a whole file; every other cut is noted.
-        parts = (10 < len(run) < 200, reader.name == "csv_table" or "truncated" in {n.code for n in run.notes})
+        parts = (10 < len(run) < 200, reader.name in TEXT or "truncated" in {n.code for n in run.notes})
     assert all(parts)
 
 
