@@ -13,8 +13,8 @@ from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.recognise import recognised, unit_of_heading
-from fieldsid.logs.mapping.true_north import true_north
+from fieldsid.logs.mapping.numbers.recognise import recognised, unit_of_heading
+from fieldsid.logs.mapping.numbers.true_north import true_north
 from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Inventory, Samples

@@ -15,7 +15,7 @@ import numpy as np
 from fieldsid.logs.channels import POSITION
 from fieldsid.logs.doctor.fin_findings import WIDEST
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.true_north import GEOGRAPHIC
+from fieldsid.logs.mapping.numbers.true_north import GEOGRAPHIC
 from fieldsid.logs.run import Note, Run
 
 ANGLES_BESIDE = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad", "pitch_rad", "roll_rad")

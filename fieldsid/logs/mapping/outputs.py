@@ -15,7 +15,7 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.mapping.name_words import words_of
-from fieldsid.logs.mapping.recognise import Recognised, moving_fin
+from fieldsid.logs.mapping.numbers.recognise import Recognised, moving_fin
 from fieldsid.logs.mapping.trial import Log
 from fieldsid.logs.reader import Inventory, Samples, Series
 from fieldsid.logs.run import Note, Run

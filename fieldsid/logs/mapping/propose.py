@@ -8,10 +8,10 @@ from typing import Any
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.convert.servo_counts import FINS
 from fieldsid.logs.mapping.draft import Draft, draft_of, label_of, with_units_by_span
+from fieldsid.logs.mapping.numbers.row_rate import ASSUMED_HZ, rate_by_turning
+from fieldsid.logs.mapping.numbers.true_heading import better_heading
 from fieldsid.logs.mapping.outputs import outputs_of, rudder_among, which_output
-from fieldsid.logs.mapping.row_rate import ASSUMED_HZ, rate_by_turning
 from fieldsid.logs.mapping.trial import Log, Proposal, tried
-from fieldsid.logs.mapping.true_heading import better_heading
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.several.sifting import attempt

@@ -11,9 +11,9 @@ import numpy as np
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.channels import ChannelMap
 from fieldsid.logs.mapping.draft import unit_by_size
-from fieldsid.logs.mapping.heading_units import heading_in_doubt, unit_of_wraps, wraps_in_rad
 from fieldsid.logs.mapping.mend import mended
-from fieldsid.logs.mapping.unit_evidence import assumed_units, said_of_assumed
+from fieldsid.logs.mapping.numbers.heading_units import heading_in_doubt, unit_of_wraps, wraps_in_rad
+from fieldsid.logs.mapping.numbers.unit_evidence import assumed_units, said_of_assumed
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Series
 from fieldsid.logs.run import GOALS, Note, Run
 

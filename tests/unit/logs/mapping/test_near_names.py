@@ -49,6 +49,6 @@ def test_a_th_that_goes_round_is_a_heading_and_one_that_does_not_a_theta(tmp_pat
 
 @pytest.mark.parametrize(("names", "signal"), [(("v",), "surge_m_s"), (("u", "v"), "sway_m_s")])
 def test_a_v_alone_is_the_speed_and_beside_a_u_the_sway(tmp_path, names, signal):
-    columns = {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]), **{n: TRUTH["surge_m_s"] for n in names}}
+    columns = {"time": TRUTH["time_s"], "heading": np.degrees(TRUTH["yaw_rad"]), **dict.fromkeys(names, TRUTH["surge_m_s"])}
     signals = inspect_log(write_table(tmp_path / "log.csv", columns)).proposal.body["signals"]
     assert signals[signal]["column"] == "v"
