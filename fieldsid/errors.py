@@ -18,13 +18,17 @@ def shortened(value: object) -> str:
 
 
 class FieldsidError(Exception):
-    """Base of every error this package raises on purpose; the command line turns it into exit code 2."""
+    """Base of every error this package raises on purpose; the command line turns it into exit code 2.
 
-    def __init__(self, what: str, *, found: str = "", hint: str = "") -> None:
+    `signal` is the one whose line of a mapping, or whose cells, it is about; empty where it is about none, or about all.
+    """
+
+    def __init__(self, what: str, *, found: str = "", hint: str = "", signal: str = "") -> None:
         super().__init__(what)
         self.what = what
         self.found = found
         self.hint = hint
+        self.signal = signal
 
     @property
     def shown(self) -> tuple[str, str, str]:

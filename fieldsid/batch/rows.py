@@ -90,7 +90,7 @@ def _read(task: Task) -> tuple[list[Run], str]:
     settings, path = task.settings, Path(task.log)
     vehicle = _vehicle(settings.vehicle)
     limits = {} if vehicle is None else _limits(vehicle)
-    runs = Importer(_mapping(settings.mapping), whole=settings.whole).read(path, limits)
+    runs = Importer(_mapping(settings.mapping), whole=settings.whole, recognise=True).read(path, limits)
     return runs, sha256_of(path)
 
 

@@ -73,8 +73,20 @@ def read_groups(
     kept = [sifted(group, islice(outcomes, len(group)), refused) for group in groups]
     used, runs = [path for group in kept for path, _ in group], [run for group in kept for _, run in group]
     refuse_twice(runs, used)
+    _say_how_read(runs, several=len(paths) > 1)
     named = iter(_apart(runs, used, paths))
     return [list(islice(named, len(group))) for group in kept]
+
+
+def _say_how_read(runs: Sequence[Run], *, several: bool) -> None:
+    """Say how logs that came without a mapping were read."""
+    from fieldsid.cli.console import say
+    from fieldsid.logs.run import READ_AS
+
+    for run in runs:
+        for note in run.notes:
+            if note.code == READ_AS:
+                say(f"{run.name}: {note.message}" if several else note.message)
 
 
 def _apart(runs: Sequence[Run], used: Sequence[Path], paths: Sequence[Path]) -> list[Run]:
@@ -146,7 +158,7 @@ def between(start: float | None, end: float | None) -> tuple[float, float]:
 def _read(path: Path, mapping: ChannelMap | None, part: tuple[float, float]) -> Run:
     from fieldsid.logs import load_run
 
-    return load_run(path, mapping, part=part)
+    return load_run(path, mapping, part=part, recognise=True)
 
 
 def _read_in_worker(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +17,18 @@ POSITION = "position"
 """Two signals: latitude and longitude mapped to it give x and y, in m north and east of the first fix."""
 COMBINED = (ATTITUDE, POSITION)
 ANGLES = ("yaw_rad", "pitch_rad", "roll_rad")
+
+
+AXES = ((("yaw_rad", "yaw_rate_rad_s"), ("rudder_rad", "rudder_measured_rad")),
+        (("pitch_rad", "pitch_rate_rad_s"), ("elevator_rad", "elevator_measured_rad")))  # fmt: skip
+"""What each axis needs: one of its motion, and one of its fins."""
+
+
+def is_enough(signals: Iterable[str]) -> bool:
+    """Whether some signals are all that one axis needs."""
+    known = set(signals)
+    known |= set(ANGLES) if ATTITUDE in known else set()
+    return any(known & set(motion) and known & set(fins) for motion, fins in AXES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +62,11 @@ class Source:
     def places(self) -> tuple[str | int, ...]:
         """Every column that is read."""
         return tuple(c for c in (self.column, *self.columns, *self.date, self.week) if c is not None)
+
+    @property
+    def counts_rows(self) -> bool:
+        """Whether this is a time without a column: the rows themselves, so many a second."""
+        return self.scale is not None and not self.places and self.topic is None
 
     @property
     def label(self) -> str:

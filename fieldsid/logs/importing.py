@@ -76,6 +76,7 @@ class Importer:
     salvage: bool = False
     whole: bool = False
     joined: tuple[Path, ...] = ()
+    recognise: bool = False
 
     def targets(self, logs: Sequence[Path], output: Path, form: str, *, force: bool = False) -> list[Path]:
         """Return the file each log becomes; raises before anything is read what would be the same for all logs.
@@ -132,6 +133,7 @@ class Importer:
             part=part,
             fin_max_rad=fin_max_rad,
             progress=progress,
+            recognise=self.recognise,
         )
 
     def write(self, run: Run, path: Path, *, force: bool = False) -> Imported:

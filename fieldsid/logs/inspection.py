@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,24 +17,25 @@ from fieldsid.logs.channels import TableForm
 from fieldsid.logs.convert.conditioning import MAIN
 from fieldsid.logs.convert.servo_counts import FINS
 from fieldsid.logs.importing import Importer
-from fieldsid.logs.mapping.propose import Proposal, propose
-from fieldsid.logs.reader import ChannelInfo, Inventory, ReadOptions, reader_of
+from fieldsid.logs.mapping.propose import propose
+from fieldsid.logs.mapping.trial import Proposal
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, ReadOptions, reader_of
 from fieldsid.logs.readers._tables_of_run import tables_beside
 from fieldsid.logs.run import Note, Run
 from fieldsid.logs.way_in import WayIn, way_in
 from fieldsid.text.one_line import one_line
 
 SCHEMA = "fieldsid/inspection/1"
-_COLUMN_EXAMPLE = """# columns are counted from 0:
-# signals:
-#   yaw_rad: {column: 1, unit: deg}
-#   rudder_rad: {column: 2, unit: deg}
-"""
+_EXAMPLE = "# Nothing was recognised. A line for each signal is missing, with its own place and unit, of this form:\n"
+_COLUMN_EXAMPLE = _EXAMPLE + "#   yaw_rad: {column: NAME_OR_PLACE_FROM_0, unit: UNIT}\n#   rudder_rad: {column: ..., unit: ...}\n"
 _TOPIC_EXAMPLE = (
-    "# signals:\n#   yaw_rad: {topic: /heading, field: data, unit: deg}\n#   rudder_rad: {topic: /rudder_cmd, field: data}\n"
+    _EXAMPLE + "#   yaw_rad: {topic: TOPIC, field: FIELD, unit: UNIT}\n#   rudder_rad: {topic: ..., field: ..., unit: ...}\n"
 )
 LISTED = 100
 """Channels that are listed; of more, how many there are."""
+NO_TIME = "# No column is a time; say how many rows there are a second:\n# time: {rate: 10}\n"
+FIELDS_SHOWN = 12
+"""Fields of a topic that the page lists."""
 SHORT = 120
 """Letters up to which a finding tells what was found beside what is wrong."""
 _PLAIN = re.compile(r"^[A-Za-z/_][\w/.]*$")
@@ -59,6 +60,8 @@ class Inspection(Brief):
         head += "# Check units, signs and frame before you trust it.\n"
         body = dict(self.proposal.body)
         signals = body.pop("signals")
+        if "time" not in body and not self.inventory.by_topic:
+            head += NO_TIME
         if signals:
             return head + to_yaml(body) + "signals:\n" + "".join(f"  {name}: {_line(item)}\n" for name, item in signals.items())
         return head + to_yaml(body) + "signals: {}\n" + (_TOPIC_EXAMPLE if self.inventory.by_topic else _COLUMN_EXAMPLE)
@@ -75,7 +78,7 @@ class Inspection(Brief):
             "span": span,
             "duration_s": duration,
             "channels": [_channel(c) for c in inventory.channels[:LISTED]],
-            "shown": [_shown(c) for c in inventory.channels[:LISTED]],
+            "shown": [row for c in inventory.channels[:LISTED] for row in _shown(c)],
             "more_channels": max(len(inventory.channels) - LISTED, 0) + inventory.more,
             "mapping_needed": not self.needs_none,
             "mapping": plain(self.proposal.body),
@@ -174,15 +177,21 @@ def _channel(channel: ChannelInfo) -> dict[str, Any]:
     return {"name": channel.name, "type": channel.kind, "count": channel.count, "rate_hz": channel.rate_hz, "fields": fields}
 
 
-def _shown(channel: ChannelInfo) -> dict[str, Any]:
+def _shown(channel: ChannelInfo) -> Iterator[dict[str, Any]]:
+    """Yield the line of a column or a topic, and one for each of its fields where it has several."""
     rate = f"{channel.rate_hz:.4g}" if math.isfinite(channel.rate_hz) else "-"
-    if len(channel.fields) == 1 and not channel.fields[0].path:
-        info = channel.fields[0]
-        first = ", ".join(_short(v) for v in info.first) if info.span is None else " .. ".join(_short(v) for v in info.span)
-    else:
-        names = [f.path for f in channel.fields if "covariance" not in f.path and not f.path.startswith("header.")]
-        first = ", ".join(names[:2]) + (f" +{len(names) - 2}" if len(names) > 2 else "")
-    return {"name": channel.name, "type": channel.kind, "count": channel.count, "rate": rate, "holds": first}
+    fields = [f for f in channel.fields if "covariance" not in f.path and not f.path.startswith("header.")]
+    holds = _range(fields[0]) if len(fields) == 1 else ""
+    yield {"name": channel.name, "type": channel.kind, "count": channel.count, "rate": rate, "holds": holds}
+    for info in fields[:FIELDS_SHOWN] if len(fields) > 1 else ():
+        yield {"name": f"  {info.path}", "type": "", "count": "", "rate": "", "holds": _range(info)}
+    if len(fields) > FIELDS_SHOWN:
+        yield {"name": f"  +{len(fields) - FIELDS_SHOWN} more: --json", "type": "", "count": "", "rate": "", "holds": ""}
+
+
+def _range(info: FieldInfo) -> str:
+    """Return the least and the largest of a number, its first values where there are none."""
+    return ", ".join(map(_short, info.first)) if info.span is None else " .. ".join(map(_short, info.span))
 
 
 def _short(value: Any) -> str:

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-import difflib
 import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fieldsid.errors import FieldsidError, MappingError
-from fieldsid.logs.channels import ChannelMap, Source, TableForm
+from fieldsid.logs.channels import ChannelMap, Source, TableForm, is_enough
 from fieldsid.logs.convert.assemble import WHOLE, assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
-from fieldsid.logs.mapping.canonical_names import TIME, canonical, canonical_names
-from fieldsid.logs.reader import JOINED, Reader, ReadOptions, reader_of
+from fieldsid.logs.mapping.canonical_names import canonical
+from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.reader import JOINED, Inventory, Reader, ReadOptions, reader_of
 from fieldsid.logs.run import OF_LIMITS, READ_WITH, STEP_LINES, Note, Run, signal_of
 
+if TYPE_CHECKING:
+    from fieldsid.logs.mapping.certain import Certain
+
 MAPPING_FILE = "mapping.yaml"
+NEAR_SHOWN = 4
+"""Columns of which a message says what they may be."""
 
 
 def load_run(
@@ -34,6 +39,7 @@ def load_run(
     part: tuple[float, float] = WHOLE,
     fin_max_rad: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
+    recognise: bool = False,
 ) -> Run:
     """Read a log file or bag folder as a Run, with the doctor's findings as notes; `-` reads standard input.
 
@@ -41,14 +47,16 @@ def load_run(
     working folder, else in the log's. channels: sources that count more than the mapping's. joined: the other tables of a run of
     which the log is one. salvage: take what is left of a damaged log. max_gap_s: longest gap allowed in a main signal. part: the
     times in s between which the log is taken and judged. fin_max_rad: fin limits by signal, for the finding of saturation.
-    progress: given the share of the log that has been read, now and then. Raises LogError or MappingError, and DataError where
-    the part is empty.
+    progress: given the share of the log that has been read, now and then. recognise: read a log without a mapping by what
+    `inspect` proposes, where nothing an axis needs is in doubt. Raises LogError or MappingError, and DataError where the part is
+    empty.
     """
     if str(path) == "-":
-        return _from_stdin(mapping, channels=channels, salvage=salvage, max_gap_s=max_gap_s, part=part, fin_max_rad=fin_max_rad)
+        more = {"channels": channels, "salvage": salvage, "max_gap_s": max_gap_s, "part": part, "fin_max_rad": fin_max_rad}
+        return _from_stdin(mapping, **more, recognise=recognise)
     path = Path(path)
     reader, options = reader_of(path, joined), ReadOptions(msg_path, salvage, joined=tuple(joined))
-    chosen, notes = map_for(path, reader, options, mapping, channels or {})
+    chosen, notes = map_for(path, reader, options, mapping, channels or {}, recognise=recognise)
     command = _command(path, chosen, channels or {}, options)
     options = replace(options, command=command, progress=progress or options.progress)
     raw = reader.read(path, chosen, options)
@@ -84,17 +92,32 @@ def _command(path: Path, mapping: ChannelMap, channels: Mapping[str, Source], op
 
 
 def map_for(
-    path: Path, reader: Reader, options: ReadOptions, mapping: ChannelMap | Path | None, channels: Mapping[str, Source]
+    path: Path,
+    reader: Reader,
+    options: ReadOptions,
+    mapping: ChannelMap | Path | None,
+    channels: Mapping[str, Source],
+    *,
+    recognise: bool = False,
 ) -> tuple[ChannelMap, list[Note]]:
-    """Return the mapping a log is read with, and a note where a file was picked up; raises MappingError when there is none."""
+    """Return the mapping a log is read with, and a note where a file was picked up, or the log recognised.
+
+    Raises MappingError when there is none.
+    """
     notes: list[Note] = []
     chosen = _loaded(mapping) if mapping is not None else reader.own_map(path, options)
     if chosen is None:
         file = next((f for f in (Path(MAPPING_FILE), path.parent / MAPPING_FILE) if f.is_file()), None)
         chosen = None if file is None else _loaded(file)
     complete = chosen_map(None, chosen, channels)
-    if complete is None:
-        raise _unmapped(path, reader, options)
+    is_open = mapping is None and not channels and (chosen is None or chosen.origin is None)
+    if complete is None or (recognise and is_open and not is_enough(complete.sources)):
+        found = reader.inventory(path, options, TableForm())
+        certain = _recognised(found, reader, options) if recognise and is_open else None
+        if certain is not None and certain.mapping is not None and certain.note is not None:
+            return certain.mapping, [certain.note]
+        if complete is None:
+            raise _unmapped(path, reader, options, found, {} if certain is None else certain.doubts)
     if complete.origin is not None:
         notes.append(Note(READ_WITH, f"read with `{complete.origin}`", {"path": str(complete.origin)}))
     return complete, notes
@@ -120,30 +143,39 @@ def _loaded(mapping: ChannelMap | Path) -> ChannelMap:
     return load_mapping(mapping)
 
 
-def _unmapped(path: Path, reader: Reader, options: ReadOptions) -> MappingError:
-    found = reader.inventory(path, options, TableForm())
+def _recognised(found: Inventory, reader: Reader, options: ReadOptions) -> Certain:
+    from fieldsid.logs.mapping.certain import certain_of
+    from fieldsid.logs.mapping.propose import propose
+
+    return certain_of(propose(found, reader, options))
+
+
+def _unmapped(
+    path: Path, reader: Reader, options: ReadOptions, found: Inventory, doubts: Mapping[str, str]
+) -> MappingError:  # fmt: skip
     names = [c.name for c in found.channels]
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     files = shlex.join([*(["--join"] if options.joined else []), str(path), *map(str, options.joined)])
     hint = f"write a mapping: `sysid inspect {files} --write-mapping {MAPPING_FILE}`"
+    hint += f"; in doubt: {', '.join(f'{signal} ({why})' for signal, why in doubts.items())}" if doubts else ""
     if found.by_topic:
         what = "bag" if found.form.endswith("bag") else "run in several tables" if reader.name == JOINED else "log of topics"
         return MappingError(f"`{path}` is a {what} and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
-    close = _near_names(names)
+    close = _near_names(found)
     hint += f"; {close}" if close else ""
     if not any((said := canonical(n)) is not None and said.signal == TIME for n in names):
         return MappingError(f"`{path}` has no column `{TIME}`", found=f"columns {shown}", hint=hint)
     return MappingError(f"`{path}` has no column of a signal that is known by its name", found=f"columns {shown}", hint=hint)
 
 
-def _near_names(names: Sequence[str]) -> str:
-    """Say which canonical name a column that is none may mean."""
-    pairs = []
-    for name in names:
-        match = difflib.get_close_matches(name.lower(), canonical_names(), n=1, cutoff=0.55)
-        if match and canonical(name) is None:
-            pairs.append(f"`{name}` may be `{match[0]}`")
-    return ", ".join(pairs[:4])
+def _near_names(found: Inventory) -> str:
+    """Say which signals columns that are none by their names probably are, as `sysid inspect` does."""
+    from fieldsid.logs.mapping.draft import draft_of, place_of
+
+    body = draft_of(found).body
+    lines = ({TIME: body["time"]} if "time" in body else {}) | body["signals"]
+    pairs = [f"`{place_of(item)}` may be `{signal}`" for signal, item in lines.items() if canonical(place_of(item)) is None]
+    return ", ".join(pairs[:NEAR_SHOWN])
 
 
 def _from_stdin(mapping: ChannelMap | Path | None, **more: Any) -> Run:

@@ -11,7 +11,7 @@ from fieldsid.logs.channels import ChannelMap, Source
 from fieldsid.logs.convert.assemble import assemble
 from fieldsid.logs.convert.conditioning import MAX_GAP_S
 from fieldsid.logs.load import chosen_map
-from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._columns import Columns, own_map_of, series_of
 from fieldsid.logs.run import Run

@@ -10,6 +10,9 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from fieldsid.display import Brief
 from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import ChannelMap, Source, TableForm
@@ -62,7 +65,7 @@ class RawLog:
 
 @dataclass(frozen=True, slots=True)
 class FieldInfo:
-    """One number inside a channel: its path (empty for a column), its type, first values, least and largest (a column's).
+    """One number inside a channel: its path (empty for a column), its type, first values, least and largest.
 
     `means` is the signal that it is by the definition of the format itself, with what a mapping must say to read it.
     """
@@ -72,6 +75,14 @@ class FieldInfo:
     first: tuple[Any, ...]
     span: tuple[float, float] | None = None
     means: tuple[str, Mapping[str, Any]] | None = None
+
+
+def span_of(values: npt.NDArray[Any]) -> tuple[float, float] | None:
+    """Return the least and the largest of numbers, those that are none left out; None where there are none."""
+    if values.dtype.kind not in "fiub":
+        return None
+    seen = values[np.isfinite(values)]
+    return (float(seen.min()), float(seen.max())) if seen.size else None
 
 
 @dataclass(frozen=True, slots=True)

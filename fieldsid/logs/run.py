@@ -83,7 +83,9 @@ SIMULATED = "simulated"
 """Code of the note of a run that a model made."""
 READ_WITH = "mapping"
 """Code of the note that names the mapping file which a log was read with, under `path`."""
-EXPLAINING = frozenset({"time_origin", "clock", READ_WITH, "ignored_columns", "joined"})
+READ_AS = "read_as"
+"""Code of the note that says how a log without a mapping was read, where nothing of it was in doubt."""
+EXPLAINING = frozenset({"time_origin", "clock", READ_WITH, READ_AS, "ignored_columns", "joined"})
 """Codes of the notes that explain rather than warn."""
 OF_LIMITS = ("saturated", "fin_limit")
 """Codes of the notes that hang on the fin limits: a run keeps those of its import, and is judged by the limits of the day."""

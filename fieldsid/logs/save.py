@@ -11,7 +11,7 @@ from typing import IO
 from fieldsid._version import __version__
 from fieldsid.artifacts import plain, replacing
 from fieldsid.errors import UsageError
-from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import READ_WITH, Run
 from fieldsid.records.named_inputs import sha256_of
 

@@ -31,6 +31,14 @@ FOREIGN: Mapping[bytes, tuple[str, str]] = MappingProxyType(
 )
 """Binary formats by their signature: what they are, and how to make a log of them where there is a way."""
 NO_LOG = MappingProxyType({b"\x89PNG": "a picture", b"%PDF": "a document", b"\x7fELF": "a program"})
+TABLE = "write a table from it, a column for each signal"
+TEXTS: tuple[tuple[re.Pattern[str], str, str], ...] = (
+    (re.compile(r"^[$!][A-Z]{2,}[A-Z0-9]*,"), "a log of NMEA 0183 sentences", TABLE),
+    (re.compile(r"^\s*[{\[]\s*[\"{\[]"), "JSON, an object a line", "give it to `sysid live -`, or " + TABLE),
+    (re.compile(r"^\s*<[?!\w]"), "XML, as GPX and KML are", TABLE),
+    (re.compile(r"^\s*\(\d+\.\d+\)\s+\w+\s+[0-9A-F]+#"), "a log of a CAN bus, as NMEA 2000 is", "decode it first, and " + TABLE),
+)
+"""Text that is no table, by how its lines begin: what it is, and how to make a log of it."""
 READ_ELSEWHERE = (ULOG, DATAFLASH, b"MATLAB ", b"PAR1", b"SQLite format", b"\x89MCAP", b"#ROSBAG")
 """How files start that another reader takes."""
 
@@ -46,6 +54,15 @@ def is_text(path: Path) -> bool:
     if head.startswith((*FOREIGN, *NO_LOG)) or _is_read_elsewhere(head) or _OWN.search(head):
         return False
     return b"\x00" not in head[:512] or head[:512].count(b"\x00") > len(head[:512]) // 4
+
+
+def known_text(path: Path, lines: Sequence[str]) -> LogError | None:
+    """Return the error of a text that is of a known kind and no table, by its lines; None where it is of none."""
+    seen = [line for line in lines if line.strip()]
+    for begins, what, way in TEXTS:
+        if seen and 2 * sum(begins.match(line) is not None for line in seen) > len(seen):
+            return LogError(f"`{path}` is {what}, and no table", found=f"first line: {seen[0][:60]!r}", hint=way)
+    return None
 
 
 def is_glider_log(head: bytes) -> bool:

@@ -12,7 +12,8 @@ from fieldsid.errors import DataError
 from fieldsid.logs.convert.units import UNITS, factor_to
 from fieldsid.logs.doctor.angle_and_rate import refuse_contradiction
 from fieldsid.logs.doctor.fin_findings import refuse_no_angle
-from fieldsid.logs.mapping.canonical_names import TIME, canonical
+from fieldsid.logs.mapping.canonical_names import canonical
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import STEP_LINES, Run
 from fieldsid.logs.segments import no_fin
 from fieldsid.models.axis import NAMES, Axis
@@ -59,6 +60,7 @@ def samples_of(run: Run, axis: Axis, after: float = -np.inf) -> Iterator[Sample]
     if not run.has(names.angle) and not run.has(names.rate):
         found = ", ".join(s for s in run.signals if run.has(s))
         raise DataError(f"run {run.name!r} has neither `{names.angle}` nor `{names.rate}`", found=found, hint="map one of them")
+    refuse_no_angle(run, column)
     refuse_contradiction(run, names.angle, names.rate)
     nothing = np.full(len(run), nan)
     wanted = (column, names.angle, names.rate, SURGE)

@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 
 from fieldsid.errors import DataError, FieldsidError
-from fieldsid.logs.mapping.canonical_names import TIME, canonical
+from fieldsid.logs.mapping.canonical_names import canonical
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.wrong_file import if_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.points import Point

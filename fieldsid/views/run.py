@@ -73,7 +73,7 @@ def read(frame: DataFrame, name: str) -> Run:
 def _signals(run: Run) -> DataFrame:
     import pandas as pd
 
-    from fieldsid.logs.mapping.canonical_names import TIME
+    from fieldsid.logs.mapping.vocabulary import TIME
 
     made = pd.DataFrame(dict(run.signals), index=pd.Index(run.time, name=TIME))
     made.attrs["name"] = run.name

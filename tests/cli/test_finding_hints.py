@@ -79,7 +79,7 @@ BAD_LINES = {
     "x in ENU alone": {"x_m": {"column": "a", "frame": "ENU"}},
     "a centre without counts": {"rudder_rad": {"column": "a", "centre": 128}},
     "a key misspelt": {"yaw_rad": {"colum": "a"}},
-    "a unit misspelt": {"yaw_rad": {"column": "a", "unit": "degs"}},
+    "a unit misspelt": {"yaw_rad": {"column": "a", "unit": "degg"}},
     "a unit of something else": {"yaw_rad": {"column": "a", "unit": "kn"}},
     "a column misspelt": {"yaw_rad": {"column": "aa"}},
     "a field without a topic": {"yaw_rad": {"column": "a", "field": "x"}},

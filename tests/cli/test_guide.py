@@ -83,7 +83,7 @@ def test_what_commands_print_keeps_its_columns(run_cli, topic):
 
 def test_the_pages_are_in_the_order_of_reading_and_every_effect_is_among_them():
     topics = list(all_pages())
-    assert topics[:4] == ["index", "trial", "theory", "effects"]
+    assert topics[:5] == ["index", "trial", "mapping", "theory", "effects"]
     assert [t for t in topics if t.startswith("effects/")] == [f"effects/{n}" for n in sorted(all_effects())]
 
 

@@ -83,7 +83,14 @@ def as_tables(folder):
     return place, by_topic({n: ("fins" if n == "rudder_rad" else "motion", n) for n in SIGNALS})
 
 
+def as_key_value(folder):
+    lines = [f"{t!r},{name},{float(v[k])!r}\n" for k, t in enumerate(map(float, TIME)) for name, v in SIGNALS.items()]
+    (folder / "log.csv").write_text("Timestamp,Key,Value\n" + "".join(lines))
+    return folder / "log.csv", by_topic({n: (n, "data") for n in SIGNALS})
+
+
 MADE = {
+    "key_value": as_key_value,
     "csv_table": as_csv,
     "parquet": as_parquet,
     "rosbag": as_bag,
@@ -97,6 +104,7 @@ MADE = {
 }
 
 
+TEXT = ("csv_table", "key_value")
 MISSPELT = {
     "rosbag": Source(topic="/rudder_cm", path="data"),
     "alog": Source(topic="rudder_rd", path="data"),
@@ -105,6 +113,7 @@ MISSPELT = {
     "slocum": Source(topic="rudder_rd", path="data"),
     "lsf": Source(topic="EstimatedState", path="rudder_rd"),
     "several_tables": Source(topic="fins", path="rudder_rd"),
+    "key_value": Source(topic="rudder_rd", path="data"),
 }
 """Sources of logs of topics that are not there; all others are tables."""
 
@@ -204,7 +213,7 @@ def test_a_log_cut_in_half_is_an_error_or_what_is_left_with_a_note(reader, log):
         parts = (error.what, error.found, error.hint)
     else:
         # Text cut at the end of a line cannot be told from a whole file; every other cut is noted.
-        parts = (10 < len(run) < 200, reader.name == "csv_table" or "truncated" in {n.code for n in run.notes})
+        parts = (10 < len(run) < 200, reader.name in TEXT or "truncated" in {n.code for n in run.notes})
     assert all(parts)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from guide import command_pages, effect_pages, schema_pages
+from guide import command_pages, effect_pages, reference_pages, schema_pages
 from guide.blocks import YAML_FILE, filled
 from guide.examples import EXAMPLES, MORE
 from guide.pictures import WHOLE, alike, part_of
@@ -52,7 +52,8 @@ def generated(session: Session) -> dict[str, str | bytes]:
         "schemas": schema_pages.pages(),
         "figures": pictures(session),
     }
-    return {f"{folder}/{name}": body for folder, files in folders.items() for name, body in files.items()}
+    made = {f"{folder}/{name}": body for folder, files in folders.items() for name, body in files.items()}
+    return made | dict(reference_pages.pages())
 
 
 def pictures(session: Session) -> dict[str, bytes]:
@@ -69,7 +70,7 @@ def picture(name: str, session: Session) -> bytes:
 def write(session: Session) -> None:
     """Write the generated files, take away those that are generated no more, and fill in the pages written by hand."""
     made = generated(session)
-    for folder in {name.partition("/")[0] for name in made}:
+    for folder in {name.partition("/")[0] for name in made if "/" in name}:
         for old in (GUIDE / folder).glob("*"):
             if f"{folder}/{old.name}" not in made:
                 old.unlink()

@@ -7,17 +7,19 @@ import re
 from pathlib import Path
 
 import pytest
-from guide import command_pages, effect_pages, make, schema_pages
+from guide import command_pages, effect_pages, make, reference_pages, schema_pages
 from guide.blocks import commands_of, filled
 from guide.make import GUIDE, WRITTEN
 from guide.pictures import LARGEST, alike
 from guide.sameness import difference, same
 from guide.schema_pages import SHAPES
 from guide.session import TOUR
+from ruamel.yaml import YAML
 
 from fieldsid.cli.help.catalogue import entries
 from fieldsid.effects import all_effects
 from fieldsid.guide import all_pages
+from fieldsid.logs.mapping.mapping_file import KEYS, mapping_of
 from fieldsid.logs.run import SIGNALS
 
 LINK = re.compile(r"!?\[[^\]\n]+\]\(([^)\s]+)\)")
@@ -131,6 +133,27 @@ def test_nothing_lies_in_the_generated_folders_that_is_not_generated(guide_sessi
 def test_a_commands_page_is_what_the_command_says(name, guide_session):
     was, now = (GUIDE / "commands" / f"{name}.md").read_text(), command_pages.page(name, guide_session)
     assert same(was, now), difference(was, now)
+
+
+@pytest.mark.parametrize("name", ["mapping.md", "codes.md", "parameters.md"])
+def test_a_page_of_reference_is_what_the_code_says(name):
+    was, now = (GUIDE / name).read_text(), reference_pages.pages()[name]
+    assert was == now, difference(was, now)
+
+
+@pytest.mark.parametrize("name", ["coarse", "ignored_delay", "unit_assumed", "a22", "d2", "delta_r0"])
+def test_a_code_and_a_parameter_have_a_section_of_their_own(run_cli, name):
+    answer = run_cli("guide", name)
+    assert (answer.code, answer.err) == (0, "")
+    assert answer.out.startswith(f"{name}\n")
+
+
+def test_every_example_of_a_mapping_is_taken():
+    for where, model in KEYS.items():
+        for field in model.model_fields.values():
+            body = YAML(typ="safe").load(field.examples[0])
+            is_line = where.startswith("a line") or set(body) <= SIGNALS.keys()
+            assert mapping_of({"signals": {"yaw_rad": "a"}} | ({"signals": body} if is_line else body)).sources
 
 
 def test_the_list_of_commands_is_that_of_the_program():

@@ -30,8 +30,8 @@ Topic = Annotated[
 def command(topic: Topic = None, as_json: JsonFlag = False) -> Mapping[str, Any]:
     """Show a page of the guide: on a terminal in a pager, else as text.
 
-    The pages are Markdown files that are installed with the program, so that no network is needed. An effect or a command can be
-    asked for by its name alone. `--json` gives the list of topics, or the text of one.
+    The pages are Markdown files that are installed with the program, so that no network is needed. An effect, a command, the code
+    of a warning and a parameter can be asked for by its name alone. `--json` gives the list of topics, or the text of one.
 
     Example: sysid guide effects/servo_lag
     """

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from fieldsid.logs.run import Note
+from fieldsid.logs.run import READ_AS, READ_WITH, Note
 from fieldsid.models.axis import NAMES, Axis
 
 METHOD_CHOSEN = "method_chosen"
 """Code of the note that says why `auto` took a method."""
-NO_WARNING = ("mapping", "noise_model", "fin_measured_used", METHOD_CHOSEN)
+NO_WARNING = (READ_WITH, READ_AS, "noise_model", "fin_measured_used", METHOD_CHOSEN)
 """Codes of notes that tell how it went."""
 
 

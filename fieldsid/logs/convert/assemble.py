@@ -18,7 +18,7 @@ from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.convert.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.readings import by_reading
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, turned_from_counts
+from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
 from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
 from fieldsid.logs.run import COLUMNS, PART, Note, Run, signal_of
@@ -53,7 +53,10 @@ def assemble(
         for name, track in _tracks(signal, series, mapping, notes, options).items():
             if name in tracks:
                 raise MappingError(
-                    f"two sources give `{name}`", found=f"{tracks[name].label} and {track.label}", hint=f"map `{name}` once"
+                    f"two sources give `{name}`",
+                    found=f"{tracks[name].label} and {track.label}",
+                    hint=f"map `{name}` once",
+                    signal=name,
                 )
             tracks[name] = track
     tracks = summed(tracks, mapping.gap_factor)
@@ -108,8 +111,9 @@ def _tracks(signal: str, series: Series, mapping: ChannelMap, notes: list[Note],
     refuse_impossible_steps(picked.time, label)
     with np.errstate(over="ignore", invalid="ignore"):
         given = _position if signal == POSITION else _quaternion if picked.values.ndim == 2 else _scalar
-        if signal_of(signal) in COUNTED and source.unit == COUNTS:
-            angles, found = turned_from_counts(signal, picked.values, source.centre, source.scale)
+        counted = counts_unit(signal, source.unit or series.unit)
+        if counted is not None:
+            angles, found = turned_from_counts(signal, picked.values, counted, source.centre, source.scale)
             picked, source = replace(picked, values=angles, unit=None), replace(source, unit=None, scale=None)
             notes += found
         values = {name: possible(name, v) for name, v in given(signal, picked, source, mapping).items()}
@@ -152,6 +156,7 @@ def _check_swap(signal: str, source: Source, mapping: ChannelMap) -> None:
             f"`{signal}` is in ENU and becomes `{partner}`, which is not mapped beside it",
             found=source.label,
             hint=f"map both `x_m` and `y_m` in ENU, or write `frame: NED` at `{signal}`",
+            signal=signal,
         )
 
 
@@ -160,7 +165,7 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
     angles = dict(zip(ANGLES, angles_of_quaternion(xyzw, source.frame or mapping.frame), strict=True))
     wanted = ANGLES if signal == ATTITUDE else (signal,)
     if signal != ATTITUDE and signal not in ANGLES:
-        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number")
+        raise MappingError(f"`{signal}` cannot come from a quaternion", found=series.label, hint="map one number", signal=signal)
     return {n: angles[n] + source.offset if source.offset and n == "yaw_rad" else angles[n] for n in wanted}
 
 

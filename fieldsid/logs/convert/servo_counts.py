@@ -8,10 +8,13 @@ heading, rates, time constants and what follows from them do not depend on it.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
+from fieldsid.logs.convert.units import find_unit
 from fieldsid.logs.run import Note, signal_of
 from fieldsid.numerics.arrays import FloatArray
 
@@ -36,6 +39,21 @@ class Servo:
 
 
 SERVOS = (Servo("a byte", 128.0, 127.0, 0.0, 255.0), Servo("pulses in us", 1500.0, 400.0, 800.0, 2200.0))
+BY_UNIT: Mapping[str, Servo] = MappingProxyType({
+    "us": SERVOS[1],
+    "%": Servo("percent of its range", 0.0, 100.0, -100.0, 100.0),
+    "1": Servo("shares of its range", 0.0, 1.0, -1.0, 1.0),
+})  # fmt: skip
+"""What the units of a pulse, and those of a share, are on a fin."""
+
+
+def counts_unit(signal: str, unit: str | None) -> str | None:
+    """Return the unit of a servo that is meant at a signal: `counts`, on a fin also `us`, `1` and `%`; None for any other."""
+    signal = signal_of(signal)
+    if unit is None or signal not in COUNTED or unit == COUNTS:
+        return unit if signal in COUNTED else None
+    found = (find_unit(unit, dimension) for dimension in ("time", "ratio")) if signal in FINS else ()
+    return next((u.name for u in found if u is not None and u.name in BY_UNIT), None)
 
 
 def servo_of(values: FloatArray) -> Servo | None:
@@ -55,10 +73,10 @@ def servo_of(values: FloatArray) -> Servo | None:
 
 
 def turned_from_counts(
-    signal: str, values: FloatArray, centre: float | None, scale: float | None
+    signal: str, values: FloatArray, unit: str, centre: float | None, scale: float | None
 ) -> tuple[FloatArray, list[Note]]:
     """Return the angle (n,) in rad of a fin's counts, or a motor's counts from its centre, and a note on what was taken."""
-    servo = next((s for s in SERVOS if s.centre == centre), None) or servo_of(values)
+    servo = BY_UNIT.get(unit) or next((s for s in SERVOS if s.centre == centre), None) or servo_of(values)
     middle = centre if centre is not None else servo.centre if servo is not None else 0.0
     if signal_of(signal) not in FINS:
         return (values - middle) * (scale or 1.0), []
@@ -67,7 +85,11 @@ def turned_from_counts(
     travel = servo.travel if servo is not None else max(float(np.nanmax(np.abs(values - middle), initial=0.0)), 1.0)
     taken = FULL_RAD / travel
     message = (
-        f"{signal} is in counts about {middle:g}, and what one is worth is not known: taken as {math.degrees(taken):.3g} deg; "
+        f"{signal} is in {_called(unit, middle)}, and what one is worth is not known: taken as {math.degrees(taken):.3g} deg; "
         "the fin's authority is per count then: set `scale`, in rad a count, from the servo's range"
     )
     return (values - middle) * taken, [Note(COUNTS, message, {"signal": signal, "centre": middle, "scale": taken})]
+
+
+def _called(unit: str, middle: float) -> str:
+    return f"counts about {middle:g}" if unit == COUNTS else f"{BY_UNIT[unit].says}"

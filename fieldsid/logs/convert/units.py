@@ -7,7 +7,8 @@ A unit is a dimension and a factor: value in SI = factor x value. Column names m
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -31,72 +32,135 @@ class Unit:
     factor: float
 
 
-_BY_DIMENSION: dict[str, dict[str, float]] = {
+_PLAIN: Mapping[str, Mapping[str, tuple[float, str]]] = {
     "angle": {
-        "rad": 1.0,
-        "deg": DEGREE,
-        "mrad": 1e-3,
-        "rev": 2 * math.pi,
-        "ddeg": DEGREE / 10,
-        "cdeg": DEGREE / 100,
-        "gon": math.pi / 200,
+        "rad": (1.0, "radian radians rads"),
+        "deg": (DEGREE, "degree degrees degs grad"),
+        "mrad": (1e-3, "mrads milliradian milliradians millirad"),
+        "rev": (2 * math.pi, "revs revolution revolutions"),
+        "ddeg": (DEGREE / 10, "decideg decidegs decidegree decidegrees"),
+        "cdeg": (DEGREE / 100, "cdegs cd centideg centidegs centidegree centidegrees"),
+        "mdeg": (DEGREE / 1000, "mdegs millideg millidegs millidegree millidegrees"),
+        "gon": (math.pi / 200, "gons gradian gradians"),
     },
-    "angle rate": {
-        "rad/s": 1.0,
-        "deg/s": DEGREE,
-        "mrad/s": 1e-3,
-        "deg/min": DEGREE / 60,
-        "rev/s": 2 * math.pi,
-        "rpm": math.pi / 30,
+    "length": {
+        "m": (1.0, "meter meters metre metres mtr mtrs msw"),
+        "cm": (1e-2, "cms centimeter centimeters centimetre centimetres"),
+        "mm": (1e-3, "mms millimeter millimeters millimetre millimetres"),
+        "km": (1e3, "kms kilometer kilometers kilometre kilometres"),
+        "ft": (0.3048, "feet foot fsw"),
+        "in": (0.0254, "inch inches"),
+        "yd": (0.9144, "yds yard yards"),
+        "fathom": (1.8288, "fathoms fath fth fthm fthms ftm"),
+        "mi": (1609.344, "mile miles"),
+        "nmi": (1852.0, "nm nauticalmile nauticalmiles"),
     },
-    "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1 / 3.6, "kn": KNOT, "ft/s": 0.3048},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
-    "pressure": {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "mbar": 1e2, "dbar": 1e4, "bar": 1e5, "psi": 6894.757293168},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0},
-    "ratio": {"1": 1.0, "%": 1e-2},
-    "force": {"N": 1.0, "kN": 1e3, "kgf": 9.80665},
+    "pressure": {
+        "Pa": (1.0, "pascal pascals"),
+        "hPa": (1e2, "hectopascal hectopascals"),
+        "kPa": (1e3, "kilopascal kilopascals"),
+        "mbar": (1e2, "millibar millibars mb"),
+        "dbar": (1e4, "decibar decibars"),
+        "bar": (1e5, "bars"),
+        "psi": (6894.757293168, "psia"),
+    },
+    "time": {
+        "s": (1.0, "sec secs second seconds"),
+        "ms": (1e-3, "msec msecs millis millisec millisecs millisecond milliseconds"),
+        "us": (1e-6, "usec usecs micros microsec microsecs microsecond microseconds"),
+        "ns": (1e-9, "nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds"),
+        "min": (60.0, "mins minute minutes"),
+        "h": (3600.0, "hr hrs hour hours"),
+        "d": (86400.0, "day days datenum"),
+    },
+    "ratio": {"1": (1.0, "- ratio"), "%": (1e-2, "percent percentage pct perc")},
+    "force": {"N": (1.0, "newton newtons"), "kN": (1e3, ""), "kgf": (9.80665, "")},
 }
-
-_ALIASES = {
-    "radian": "rad", "radians": "rad", "degree": "deg", "degrees": "deg", "grad": "deg", "°": "deg", "rads": "rad/s",
-    "rps": "rev/s", "°/s": "deg/s", "dps": "deg/s", "deg/sec": "deg/s", "rad/sec": "rad/s", "1/min": "rpm", "rev/min": "rpm",
-    "1/s": "rev/s",
-    "mps": "m/s", "m/sec": "m/s", "knot": "kn", "knots": "kn", "kt": "kn", "kts": "kn", "kmh": "km/h", "kph": "km/h",
-    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "feet": "ft", "pascal": "Pa", "millibar": "mbar",
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us", "nsec": "ns",
-    "minute": "min", "minutes": "min", "day": "d", "days": "d", "datenum": "d",
-    "percent": "%", "-": "1", "ratio": "1", "newton": "N",
+"""Units by dimension: the factor to SI, and how else they are spelled."""
+_QUOTIENTS: Mapping[str, Mapping[str, str]] = {
+    "angle rate": {
+        "rad/s": "", "deg/s": "dps", "mrad/s": "", "mdeg/s": "mdps", "cdeg/s": "", "deg/min": "dpm", "deg/h": "dph",
+        "rev/s": "rps 1/s",
+    },
+    "speed": {
+        "m/s": "", "cm/s": "", "mm/s": "", "km/h": "kph", "ft/s": "fps", "ft/min": "fpm", "m/min": "",
+    },
 }  # fmt: skip
+"""Units that are one by a time; their spellings are those of both, with `/`, `p`, `per` or nothing between."""
+_NAMED: Mapping[str, Mapping[str, tuple[float, str]]] = {
+    "angle rate": {"rpm": (math.pi / 30, "1/min rev/min revs/min rpms")},
+    "speed": {"kn": (KNOT, "kt kts kns knot knots nmi/h"), "mph": (1609.344 / 3600.0, "mi/h mile/h miles/h")},
+}
+_ORDER = ("angle", "angle rate", "speed", "length", "pressure", "time", "ratio", "force")
 
-UNITS: Mapping[str, Unit] = MappingProxyType(
-    {name: Unit(name, dimension, factor) for dimension, names in _BY_DIMENSION.items() for name, factor in names.items()}
-)
+
+def _spelled() -> Iterator[tuple[Unit, set[str]]]:
+    """Yield every unit with its spellings, folded."""
+    plain = {name: (*of, dimension) for dimension, units in _PLAIN.items() for name, of in units.items()}
+    for dimension in _ORDER:
+        for name, (factor, others) in {**_PLAIN.get(dimension, {}), **_NAMED.get(dimension, {})}.items():
+            yield Unit(name, dimension, factor), {folded(name), *others.split()}
+        for name, others in _QUOTIENTS.get(dimension, {}).items():
+            above, below = (plain[part] for part in name.split("/"))
+            over, under = ({part, *of[1].split()} for part, of in zip(name.split("/"), (above, below), strict=True))
+            made = {f"{a}{by}{b}" for a in over for b in under for by in ("/", "", "p")}
+            yield Unit(name, dimension, above[0] / below[0]), made | set(others.split())
+
+
+_MARKS = (("°", "deg"), ("º", "deg"), ("µ", "u"), ("μ", "u"), ("⁻¹", "-1"))
+_PER = re.compile(r"[\s_]*(?:/|\bper\b|_per_)[\s_]*")
+_INVERSE = re.compile(r"[\s_.·*]+([a-z]+)\^?\(?-1\)?$")
+_BLANK = re.compile(r"\^?-1$|[\s_.·*]")
+_MULTIPLE = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*[*x·]?\s*(?P<unit>\D.*)")
+
+
+def folded(text: str) -> str:
+    """Return a unit's spelling without what writers differ in: case, blanks, `per`, `^-1`, degree sign and micro."""
+    plain = text.strip().lower()
+    for mark, word in _MARKS:
+        plain = plain.replace(mark, word)
+    return _BLANK.sub("", _INVERSE.sub(r"/\1", _PER.sub("/", plain))) if len(plain) > 1 else plain
+
+
+_ALL = tuple(_spelled())
+UNITS: Mapping[str, Unit] = MappingProxyType({unit.name: unit for unit, _ in _ALL})
 """Every unit by its name; pick_unit also takes common spellings."""
+SPELLINGS: Mapping[str, Mapping[str, Unit]] = MappingProxyType(
+    {d: MappingProxyType({text: u for u, texts in _ALL if u.dimension == d for text in texts}) for d in _ORDER}
+)
+"""Units by dimension and folded spelling: `ms` is of a time what it is not of a speed."""
 
 _DIMENSION_OF = {"rad": "angle", "rad/s": "angle rate", "m": "length", "m/s": "speed", "1": "ratio", "1/min": "angle rate"}
 
 
-def pick_unit(name: str) -> Unit:
-    """Return a unit by name or common spelling (`degrees`, `°/s`, `knots`); raises MappingError with the near matches."""
-    found = find_unit(name)
+def pick_unit(name: str, dimension: str | None = None) -> Unit:
+    """Return a unit by name or common spelling (`degrees`, `°/s`, `knots`), of a dimension where it is of several.
+
+    Raises MappingError with the near matches.
+    """
+    found = find_unit(name, dimension)
     if found is None:
         raise MappingError(f"there is no unit {name!r}", found=", ".join(UNITS), hint=near(name, UNITS))
     return found
 
 
-def find_unit(name: str) -> Unit | None:
-    """Return a unit by name or common spelling, or None."""
-    plain = name.strip().replace(" ", "").replace("^-1", "").replace("·", "")
-    for candidate in (plain, _ALIASES.get(plain, ""), _ALIASES.get(plain.lower(), ""), plain.lower()):
-        if candidate in UNITS:
-            return UNITS[candidate]
-    folded = {u.lower(): u for u in UNITS}
-    return UNITS[folded[plain.lower()]] if plain.lower() in folded else None
+def find_unit(name: str, dimension: str | None = None) -> Unit | None:
+    """Return a unit by name or common spelling, or a multiple of one, as `0.1 deg`; None where it is none.
+
+    Of a spelling that several dimensions have, as `ms`, that of the one given is taken.
+    """
+    plain, spelling = name.strip(), folded(name)
+    if dimension is not None and spelling in SPELLINGS[dimension]:
+        return SPELLINGS[dimension][spelling]
+    found = UNITS.get(plain) or next((known[spelling] for known in SPELLINGS.values() if spelling in known), None)
+    several = _MULTIPLE.fullmatch(plain) if found is None else None
+    base = find_unit(several["unit"], dimension) if several else None
+    return found if base is None or several is None else Unit(plain, base.dimension, float(several["number"]) * base.factor)
 
 
 def dimension_of(signal: str) -> str | None:
-    """Return the dimension of a canonical signal, or an entry of its sum; None for `thrust`, which may be in any unit."""
-    return _DIMENSION_OF.get(COLUMNS[signal_of(signal)])
+    """Return the dimension of a canonical signal, or an entry of its sum; None for `thrust`, of any unit, and what is none."""
+    return _DIMENSION_OF.get(COLUMNS.get(signal_of(signal), ""))
 
 
 def factor_to(signal: str, unit: str) -> float:
@@ -107,7 +171,7 @@ def factor_to(signal: str, unit: str) -> float:
     dimension = dimension_of(signal)
     if dimension is None:
         return 1.0
-    picked = pick_unit(unit)
+    picked = pick_unit(unit, dimension)
     if picked.dimension != dimension:
         fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
         raise MappingError(

@@ -59,7 +59,7 @@ def angle_findings(run: Run, stated: Stated, faulty: Container[str] = ()) -> lis
 
 def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Note]:
     in_degrees = _turned_in_degrees(run, angle, rate, stated) if angle == "yaw_rad" else []
-    changes = _changes(run, angle, rate)
+    changes = changes_of(run, angle, rate)
     if changes is None or in_degrees:
         return in_degrees
     a, b, step = changes
@@ -69,14 +69,20 @@ def _angle_and_rate(run: Run, angle: str, rate: str, stated: Stated) -> list[Not
     return [*_of_slope(angle, rate, slope, stated), *_of_lag(angle, rate, a, b, step, stated)]
 
 
+def agrees_with_rate(run: Run, angle: str, rate: str) -> bool:
+    """Whether an angle changes as its rate says, in the units that both are taken in."""
+    changes = changes_of(run, angle, rate)
+    return changes is not None and _is_rate_of(changes, TRUSTED)
+
+
 def _swapped(run: Run, angle: str, rate: str) -> list[Note]:
     """An angle and a rate that are not each other's, where another signal is the one's."""
-    own = _changes(run, angle, rate)
+    own = changes_of(run, angle, rate)
     if own is not None and _is_rate_of(own, WEAK):
         return []
     others = [s for s, unit in SIGNALS.items() if s not in (angle, rate) and unit in ("rad", "rad/s") and run.has(s)]
     asked = [(rate, angle), *((angle, s) for s in others), *((s, rate) for s in others)]
-    pairs = ((one, of) for one, of in asked if (c := _changes(run, one, of)) is not None and _is_rate_of(c, STRONG))
+    pairs = ((one, of) for one, of in asked if (c := changes_of(run, one, of)) is not None and _is_rate_of(c, STRONG))
     one, of = next(pairs, ("", ""))
     if not one:
         return []
@@ -124,9 +130,9 @@ def _is_rate_of(changes: tuple[FloatArray, FloatArray, float], least: float) -> 
 
 def _unrelated(run: Run, angle: str, rate: str) -> list[Note]:
     """An angle and a rate that both move, and go together at no shift, nor by Euler's kinematics: one is another signal."""
-    tried = [_changes(run, angle, rate)]
+    tried = [changes_of(run, angle, rate)]
     if (turning := _euler_rate(run, angle)) is not None:
-        tried.append(_changes(Run(run.name, run.time, {**run.signals, rate: turning}), angle, rate))
+        tried.append(changes_of(Run(run.name, run.time, {**run.signals, rate: turning}), angle, rate))
     elif angle == "pitch_rad" and run.has("yaw_rate_rad_s") and np.nanstd(run["yaw_rate_rad_s"]) > np.nanstd(run[rate]):
         return []  # at a roll that is not known, a turn pitches
     if any(c is None for c in tried):
@@ -212,7 +218,7 @@ def _off_over(
     return places, float(off[at]), limit, float(time[at])
 
 
-def _changes(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
+def changes_of(run: Run, angle: str, rate: str) -> tuple[FloatArray, FloatArray, float] | None:
     """Return the changes of an angle and of an integrated rate over the window (n,), and the step.
 
     None when the log is too short, or neither moves clearly more than its noise.

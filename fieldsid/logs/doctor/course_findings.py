@@ -10,6 +10,9 @@ import math
 
 import numpy as np
 
+from fieldsid.logs.convert.units import factor_to
+from fieldsid.logs.doctor.pair_findings import SPEEDS, UNIT_LIMIT, goes_with_way
+from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.trapezoid import trapezoid_integral
@@ -25,16 +28,21 @@ ALL_BUT = 0.95
 """Share of the windows in which the vehicle must have moved for its course to be followed round."""
 RATIO = 2.0
 """How much further than the heading the course may turn: a hull that slides in a turn turns as far as its course in the end."""
+FEWEST = 20
+LEAST_DIVE, MOST_DIVE = 0.7, 1.4
+"""How many times what speed and pitch say a depth may change: a heave lies between."""
+DEPTHS = {unit: factor_to("depth_m", unit) for unit in ("ft", "fathom", "cm", "mm")}
+"""Units in which a depth is logged, in m."""
 LEAST_WAY_M = 0.3
 """Way made in a window below which it is the sensors' noise."""
 SPREADS = 4.0
 """Standard deviations by which a correlation must be off zero, by Fisher's z = atanh(r) over windows that share no sample."""
 
 
-def course_findings(run: Run) -> list[Note]:
+def course_findings(run: Run, stated: Stated | None = None) -> list[Note]:
     """Return the findings on the course and the slope of the way of a run."""
     found = _course(run) if all(run.has(s) for s in ("x_m", "y_m", "yaw_rad")) else []
-    return [*found, *(_dive(run) if all(run.has(s) for s in ("depth_m", "pitch_rad", "surge_m_s")) else [])]
+    return [*found, *(_dive(run, stated or Stated()) if all(run.has(s) for s in ("depth_m", "pitch_rad", "surge_m_s")) else [])]
 
 
 def _windows(run: Run, *signals: str) -> tuple[FloatArray, int, list[FloatArray]] | None:
@@ -55,7 +63,7 @@ def _course(run: Run) -> list[Note]:
     dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
     way = np.hypot(dx, dy)
     moved = way > LEAST_WAY_M
-    if moved.sum() < 20:
+    if moved.sum() < FEWEST:
         return []
     heading = trapezoid_integral(time, yaw)
     course, mean = np.arctan2(dy, dx)[moved], ((heading[width:] - heading[:-width]) / (time[width:] - time[:-width]))[moved]
@@ -85,6 +93,22 @@ def _course(run: Run) -> list[Note]:
     return []
 
 
+def _dive_unit(slope: float, stated: Stated) -> list[Note]:
+    """Return the finding that a depth changes by a unit's factor of what speed and pitch say; the unit where one may be it."""
+    may = [("depth_m", u) for u, f in DEPTHS.items() if abs(slope * f - 1.0) < UNIT_LIMIT and stated.is_si("depth_m")]
+    may += [("surge_m_s", u) for u, f in SPEEDS.items() if abs(slope / f - 1.0) < UNIT_LIMIT and stated.is_si("surge_m_s")]
+    if not may:
+        return []
+    (signal, unit), is_one = may[0], len(may) == 1
+    advice = f"set {', or '.join(f'`unit: {u}` at {s}' for s, u in may)}"
+    message = (
+        f"depth_m changes {slope:.3g} times as fast as surge_m_s and pitch_rad say (limits {LEAST_DIVE:g} and {MOST_DIVE:g}): "
+        f"{advice}"
+    )
+    data = {"signal": signal, "value": slope, "limit": MOST_DIVE} | ({"unit": unit} if is_one else {})
+    return [Note("depth_unit" if signal == "depth_m" else "speed_unit", message, data)]
+
+
 def _slope_of(course: FloatArray, heading: FloatArray) -> float | None:
     """Return how far a course (n,) turns for a turn of the heading, None where the two do not go together."""
     c, h = course - course.mean(), heading - heading.mean()
@@ -94,17 +118,51 @@ def _slope_of(course: FloatArray, heading: FloatArray) -> float | None:
     return math.sqrt(float(c @ c) / float(h @ h))
 
 
-def _dive(run: Run) -> list[Note]:
+def goes_along_course(run: Run) -> bool:
+    """Whether the course made turns as far as the heading does, and turns at all: so it is in the unit it is taken in."""
+    found = _windows(run, "x_m", "y_m", "yaw_rad")
+    if found is None:
+        return False
+    time, width, (x, y, yaw) = found
+    dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
+    moved = np.hypot(dx, dy) > LEAST_WAY_M
+    if moved.sum() < FEWEST or moved.mean() <= ALL_BUT:
+        return False
+    heading = trapezoid_integral(time, yaw)
+    mean = ((heading[width:] - heading[:-width]) / (time[width:] - time[:-width]))[moved]
+    slope = _slope_of(np.unwrap(np.arctan2(dy, dx)[moved]), mean)
+    return slope is not None and 1.0 / RATIO < slope < RATIO
+
+
+def goes_with_depth(run: Run) -> bool:
+    """Whether the depth changes as speed and pitch say, in the units that they are taken in."""
+    found = _dived(run)
+    return found is not None and found[0] > TRUSTED and LEAST_DIVE < found[1] < MOST_DIVE
+
+
+def _dived(run: Run) -> tuple[float, float] | None:
+    """Return the correlation of the depth's change with what speed and pitch make of it, and their slope; None for too little."""
     found = _windows(run, "depth_m", "pitch_rad", "surge_m_s")
     if found is None:
-        return []
+        return None
     time, width, (depth, pitch, surge) = found
     said = trapezoid_integral(time, -surge * np.sin(pitch))
     made, wanted = depth[width:] - depth[:-width], said[width:] - said[:-width]
-    if float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
+    enough = math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) >= SPREADS
+    if not enough or float(np.ptp(made)) == 0.0 or float(np.ptp(wanted)) == 0.0:
+        return None
+    return float(np.corrcoef(made, wanted)[0, 1]), float(np.std(made) / np.std(wanted))
+
+
+def _dive(run: Run, stated: Stated) -> list[Note]:
+    found = _dived(run)
+    if found is None:
         return []
-    trust = float(np.corrcoef(made, wanted)[0, 1])
-    if trust > -TRUSTED or math.atanh(TRUSTED) * math.sqrt(max(made.size / width - 3.0, 0.0)) < SPREADS:
+    trust, slope = found
+    if trust > TRUSTED and not LEAST_DIVE < slope < MOST_DIVE:
+        is_known_wrong = all(run.has(s) for s in ("x_m", "y_m")) and not goes_with_way(run)
+        return [] if is_known_wrong else _dive_unit(slope, stated)
+    if trust > -TRUSTED:
         return []
     message = (
         f"depth_m goes against what surge_m_s and pitch_rad make of it (correlation {trust:.2f}, limit {-TRUSTED:g}): "

@@ -44,7 +44,7 @@ def _range(run: Run, fin: str) -> list[Note]:
         return []
     message = (
         f"{fin} reaches {largest:.3g} rad, {math.degrees(largest):.0f} deg (limit {WIDEST:g} rad): no fin does; where -1 .. 1 is "
-        "its whole range, set `unit: counts` with `centre: 0` and its largest angle in rad as `scale`"
+        "its whole range, set `unit: 1`, with its largest angle in rad as `scale`"
     )
     return [Note("fin_range", message, {"signal": fin, "value": largest, "limit": WIDEST})]
 

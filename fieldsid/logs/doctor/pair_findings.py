@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from fieldsid.logs.convert.units import KNOT
+from fieldsid.logs.convert.units import factor_to
 from fieldsid.logs.doctor.angle_and_rate import LAG_S, TRUSTED
 from fieldsid.logs.doctor.stated import Stated
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.shifted_correlation import lag_of, slope_of
 from fieldsid.numerics.trapezoid import trapezoid_integral
 
-KNOT_LIMIT = 0.15
-"""By how much of itself the ratio of way and speed may be off a knot's, and the speed still be in knots."""
+UNIT_LIMIT = 0.15
+"""By how much of itself a ratio may be off that of a unit, and the signal still be in it."""
+CLEARLY = 2.0
+"""How many times as near as the next a unit must be."""
+SPEEDS = {unit: factor_to("surge_m_s", unit) for unit in ("kn", "mph", "km/h", "ft/s", "cm/s", "mm/s")}
+"""Units in which a speed is logged, in m/s."""
+LEAST_WAY, MOST_WAY = 0.6, 1.5
+"""How many times the speed the way made in a second may be: a current and a slip lie between."""
+SLOWEST = 0.1
+SLOW_RPM = 30.0
+MOST_ADVANCE_M = 4.0
+"""Way made in a turn of a propeller that is larger than any this program's vehicles have."""
 _FINS = (("rudder_rad", "rudder_measured_rad"), ("elevator_rad", "elevator_measured_rad"))
 
 
@@ -21,6 +33,8 @@ def pair_findings(run: Run, stated: Stated) -> list[Note]:
     found: list[Note] = []
     if all(run.has(s) for s in ("surge_m_s", "x_m", "y_m")):
         found += _speed_and_way(run, stated)
+    if all(run.has(s) for s in ("surge_m_s", "propeller_rpm")):
+        found += _speed_and_turns(run)
     for command, fin in _FINS:
         if run.has(command) and run.has(fin):
             found += _command_and_fin(run, command, fin, stated)
@@ -29,25 +43,60 @@ def pair_findings(run: Run, stated: Stated) -> list[Note]:
 
 def _speed_and_way(run: Run, stated: Stated) -> list[Note]:
     """The way made over five seconds against the speed; a current may change it, a unit changes it more."""
+    ratio = _way_by_speed(run)
+    if ratio is None or LEAST_WAY < ratio < MOST_WAY:
+        return []
+    unit = unit_of_ratio(ratio, SPEEDS) if stated.is_si("surge_m_s") else None
+    advice = (
+        f"{unit} is {factor_to('surge_m_s', unit):.3g} m/s: set `unit: {unit}` at surge_m_s"
+        if unit
+        else "check the unit of speed"
+    )
+    message = f"the way made is {ratio:.3g} times what surge_m_s says (limits {LEAST_WAY:g} and {MOST_WAY:g}): {advice}"
+    data = {"signal": "surge_m_s", "value": ratio, "limit": MOST_WAY} | ({"unit": unit} if unit else {})
+    return [Note("speed_unit", message, data)]
+
+
+def goes_with_way(run: Run) -> bool:
+    """Whether the way made by x and y is that of the speed."""
+    ratio = _way_by_speed(run)
+    return ratio is not None and LEAST_WAY < ratio < MOST_WAY
+
+
+def unit_of_ratio(ratio: float, units: Mapping[str, float]) -> str | None:
+    """Return the unit whose factor the ratio of what is true to what is said is near to, and clearly nearer than to others'."""
+    off = sorted((abs(ratio / factor - 1.0), name) for name, factor in units.items())
+    return off[0][1] if off[0][0] < min(UNIT_LIMIT, off[1][0] / CLEARLY) else None
+
+
+def _way_by_speed(run: Run) -> float | None:
+    """Return how many times the speed the way made in a second is; None where there is too little of either."""
     good = np.isfinite(run["x_m"]) & np.isfinite(run["y_m"]) & np.isfinite(run["surge_m_s"])
     if good.sum() < 50:
-        return []
+        return None
     time, x, y, surge = run.time[good], run["x_m"][good], run["y_m"][good], run["surge_m_s"][good]
     width = max(1, round(5.0 / float(np.median(np.diff(time)))))
     if time.size <= 2 * width:
-        return []
+        return None
     made = np.hypot(x[width:] - x[:-width], y[width:] - y[:-width]) / (time[width:] - time[:-width])
     said = trapezoid_integral(time, surge)
     said = np.abs(said[width:] - said[:-width]) / (time[width:] - time[:-width])
     # In a turn the straight way is shorter than the path, so the fastest windows decide.
-    ratio = float(np.percentile(made, 90)) / max(float(np.percentile(said, 90)), 1e-9)
-    if 0.6 < ratio < 1.5 or float(np.percentile(said, 90)) < 0.1:
+    fast = float(np.percentile(said, 90))
+    return float(np.percentile(made, 90)) / fast if fast > SLOWEST else None
+
+
+def _speed_and_turns(run: Run) -> list[Note]:
+    """The way made in a turn of the propeller: a few tenths of a metre, whatever its slip."""
+    good = np.isfinite(run["propeller_rpm"]) & np.isfinite(run["surge_m_s"])
+    turning = good & (np.abs(run["propeller_rpm"]) > SLOW_RPM) & (np.abs(run["surge_m_s"]) > SLOWEST)
+    if turning.sum() < 50:
         return []
-    in_knots = stated.is_si("surge_m_s") and abs(ratio / KNOT - 1.0) < KNOT_LIMIT
-    advice = "a knot is 0.514 m/s: set `unit: kn` at surge_m_s" if in_knots else "check the unit of speed"
-    message = f"the way made is {ratio:.3g} times what surge_m_s says (limits 0.6 and 1.5): {advice}"
-    data = {"signal": "surge_m_s", "value": ratio, "limit": 1.5} | ({"unit": "kn"} if in_knots else {})
-    return [Note("speed_unit", message, data)]
+    advance = float(np.median(np.abs(60.0 * run["surge_m_s"][turning] / run["propeller_rpm"][turning])))
+    if advance < MOST_ADVANCE_M:
+        return []
+    message = f"surge_m_s makes {advance:.3g} m in a turn of propeller_rpm (limit {MOST_ADVANCE_M:g} m): check the units of both"
+    return [Note("speed_unit", message, {"signal": "surge_m_s", "value": advance, "limit": MOST_ADVANCE_M})]
 
 
 def _command_and_fin(run: Run, command: str, fin: str, stated: Stated) -> list[Note]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit
+from fieldsid.logs.convert.servo_counts import BY_UNIT, FINS
+from fieldsid.logs.convert.units import SPELLINGS, dimension_of, find_unit
+from fieldsid.logs.mapping.name_words import ALL_UNITS, unit_said
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import LINES, SIGNALS
-
-TIME = "time_s"
-_BRACKET = re.compile(r"[\[(](?P<unit>[^\])]+)[\])]")
 
 STEMS: Mapping[str, str] = MappingProxyType(
     {
@@ -24,12 +23,12 @@ STEMS: Mapping[str, str] = MappingProxyType(
 )  # fmt: skip
 """Names without a unit, and the signal each stands for."""
 
-_SUFFIX = {
-    "rad": "rad", "deg": "deg", "mrad": "mrad", "rad_s": "rad/s", "deg_s": "deg/s", "mrad_s": "mrad/s", "m_s": "m/s",
-    "cm_s": "cm/s", "mm_s": "mm/s", "km_h": "km/h", "kn": "kn", "ft_s": "ft/s", "m": "m", "cm": "cm", "mm": "mm",
-    "km": "km", "ft": "ft", "rpm": "rpm", "rps": "rev/s", "s": "s", "ms": "ms", "us": "us", "ns": "ns", "min": "min",
-    "h": "h", "dbar": "dbar", "bar": "bar", "mbar": "mbar", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "psi": "psi",
-}  # fmt: skip
+OF_CHANGES: Mapping[str, str] = MappingProxyType({"angle rate": "angle", "speed": "length"})
+"""Dimensions whose names leave out that a unit is one by a second, and that unit's dimension: a rate in `deg`."""
+
+
+OF_TOPIC = frozenset({"", "data", "value"})
+"""Fields that say nothing of what they are."""
 
 
 class Canonical(NamedTuple):
@@ -47,13 +46,11 @@ def canonical(column: str) -> Canonical | None:
     if name in LINES:
         return Canonical(name, "rad")
     for stem, suffix in _splits(name):
-        unit = _SUFFIX.get(suffix)
-        if unit is None:
-            continue
-        if stem == "time" and UNITS[unit].dimension == "time":
-            return Canonical(TIME, unit)
-        if stem in STEMS and _fits(STEMS[stem], unit):
-            return Canonical(STEMS[stem], unit)
+        signal, spelled = TIME if stem == "time" else STEMS.get(stem), suffix.replace("_", "/")
+        if signal is not None and spelled in ALL_UNITS:
+            unit = next((SPELLINGS[d][spelled] for d in fitting(signal) if spelled in SPELLINGS[d]), None)
+            if unit is not None:
+                return Canonical(signal, unit.name)
     return None
 
 
@@ -67,29 +64,34 @@ def _splits(name: str) -> list[tuple[str, str]]:
     return [("_".join(parts[:i]), "_".join(parts[i:])) for i in range(1, len(parts))]
 
 
-def _fits(signal: str, unit: str) -> bool:
-    dimension = UNITS[unit].dimension
-    return dimension == dimension_of(signal) or (signal == "depth_m" and dimension == "pressure")
+def fitting(signal: str) -> tuple[str, ...]:
+    """Return the dimensions that a signal's numbers may have: a depth may be a pressure; none where any unit may be meant."""
+    dimension = "time" if signal == TIME else dimension_of(signal)
+    return (*((dimension,) if dimension else ()), *(("pressure",) if signal == "depth_m" else ()))
 
 
 def stated_unit(text: str, signal: str) -> str | None:
     """Return a unit that stands beside a signal, as `deg/s` or `[deg/s]`, by its own name; None where it does not fit."""
-    unit = find_unit(text.strip().strip("[]()"))
-    fits = unit is not None and (unit.dimension == "time" if signal == TIME else _fits(signal, unit.name))
-    return unit.name if unit is not None and fits else None
+    bare = text.strip().strip("[]()")
+    units = (find_unit(bare, dimension) for dimension in fitting(signal))
+    return next((u.name for u in units if u is not None and u.dimension in fitting(signal)), None)
 
 
 def unit_in_name(name: str, signal: str) -> str | None:
-    """Return the unit a name states for a signal: `heading [deg]`, `r (deg/s)`, `fin_deg`; None when it states none that fits."""
-    inside = _BRACKET.search(name)
-    if inside is not None:
-        unit = find_unit(inside["unit"])
-        return unit.name if unit is not None and (signal == TIME or _fits(signal, unit.name)) else None
-    last = name.strip().rpartition(" ")[2] if " " in name.strip() else ""
-    if len(last) > 1 and (found := stated_unit(last, signal)) is not None:
-        return found
-    for _, suffix in _splits(name.strip().lower()):
-        unit_name = _SUFFIX.get(suffix)
-        if unit_name is not None and (UNITS[unit_name].dimension == "time" if signal == TIME else _fits(signal, unit_name)):
-            return unit_name
-    return None
+    """Return the unit a name states for a signal: `heading [deg]`, `r (deg/s)`, `DepthFt`; None when it states none that fits.
+
+    A rate named with the unit of its angle, or a speed with that of its way, is one by a second.
+    """
+    dimensions = fitting(signal)
+    found = unit_said(name, dimensions) or (unit_said(name, ("time", "ratio")) if signal in FINS else None)
+    if found is not None and (found.dimension in dimensions or found.name in BY_UNIT):
+        return "rad/s" if found.name == "rev/s" and signal != "propeller_rpm" else found.name
+    whole = unit_said(name, (OF_CHANGES[dimensions[0]],)) if dimensions and dimensions[0] in OF_CHANGES else None
+    by_second = None if whole is None else find_unit(f"{whole.name}/s")
+    return None if by_second is None else by_second.name
+
+
+def unit_of_field(topic: str, field: str, signal: str) -> str | None:
+    """Return the unit that a field of a topic states by its name, or where that says nothing, as `data`, the topic's."""
+    last = field.rpartition(".")[2]
+    return unit_in_name(last, signal) or (unit_in_name(topic.rpartition("/")[2], signal) if last in OF_TOPIC else None)

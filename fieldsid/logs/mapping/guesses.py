@@ -11,8 +11,10 @@ import numpy as np
 
 from fieldsid.logs.channels import ATTITUDE
 from fieldsid.logs.convert.units import dimension_of
-from fieldsid.logs.mapping.canonical_names import TIME, canonical, stated_unit, unit_in_name
-from fieldsid.logs.mapping.word_meaning import COMMANDED, LATITUDE, LETTERS, LONGITUDE, meaning_of, words_of
+from fieldsid.logs.mapping.canonical_names import canonical, stated_unit, unit_in_name, unit_of_field
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import COMMANDED, LATITUDE, LONGITUDE, TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import DEFINED, TABLE, ChannelInfo, FieldInfo
 from fieldsid.numerics.arrays import FloatArray
 
@@ -23,7 +25,6 @@ _VECTORS = {
     "position": ("x_m", "y_m", "depth_m"),
 }
 _EULER = {"rpy", "euler", "attitude", "orientation", "angles"}
-_TILTS = {"pitch_rad", "roll_rad", "pitch_goal_rad"}
 _COUNTERS = {"seq", "sec", "nanosec", "secs", "nsecs"}
 NAMELESS = frozenset({"field", "data", "value", "val"})
 """Words of a column that is called by its table's name."""
@@ -34,43 +35,36 @@ _PLANAR = {
 """Fields of a pose in the plane, which has an x, a y and one angle."""
 _FRAMED = {"ned", "enu", "local"}
 """Words of a pose whose x and y are metres: others are in degrees of latitude and longitude."""
-STEEPEST_DEG = 360.0
-"""A pitch or roll is less in any unit: a larger number is none, as the port or the error code that a constant may be."""
+STANDARD = 8.0
+"""What a part of a standard message is as sure as, whose unit is that of the standard: SI."""
 NOTHING = 0.1
 """What a column that never changes is as sure as, beside one that does."""
 
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A signal that a column or field may be, how sure that is, and how it is read."""
+    """A signal that a column or field may be, how sure that is, and how it is read; `defined` where a format says its unit."""
 
     signal: str
     sure: float
     item: dict[str, Any]
     count: int
+    defined: bool = False
 
 
 def of_column(channel: ChannelInfo, place: str | int) -> Iterator[Guess]:
     """Yield what a column may be; one of words is no signal."""
-    found = _of_message_path(channel.name) or meaning_of(channel.name)
+    found = _of_message_path(channel.name) or meaning_of(channel.name, channel.fields[0].span)
     if found is None or channel.count == 0 or channel.kind != "number" or found[0] == TIME:
         return
     signal, sure = found
     span = channel.fields[0].span
-    if _is_no_angle(signal, span or ()):
-        return
-    if signal in (LATITUDE, LONGITUDE):
-        if span is None or max(map(abs, span)) <= (90.0 if signal == LATITUDE else 360.0):
-            yield Guess(signal, _weighed(sure, span), {"column": place}, channel.count)
-        return
+    sure = sure if span is None or span[0] < span[1] else NOTHING
     said = canonical(channel.name)
-    unit = said.unit if said is not None else unit_in_name(channel.name, signal)
-    item: dict[str, Any] = {"column": place}
-    if unit is None and channel.unit:
+    unit = said.unit if said is not None else None if signal in (LATITUDE, LONGITUDE) else unit_in_name(channel.name, signal)
+    if unit is None and channel.unit and signal not in (LATITUDE, LONGITUDE):
         unit = stated_unit(channel.unit, signal)
-    if unit not in (None, "1"):
-        item["unit"] = unit
-    yield Guess(signal, _weighed(sure, span), item, channel.count)
+    yield Guess(signal, sure, {"column": place} | ({"unit": unit} if unit not in (None, "1") else {}), channel.count)
 
 
 def _of_message_path(name: str) -> tuple[str, float] | None:
@@ -82,37 +76,37 @@ def _of_message_path(name: str) -> tuple[str, float] | None:
     return _VECTORS[vector]["xyz".index(last)], 8.0
 
 
-_PARTS_OF_QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>[xyzw])(?P<end>_?\d*)$", re.IGNORECASE)
+_PARTS_OF_QUATERNION = (
+    re.compile(r"(?P<stem>.*?)(?P<part>[xyzw])(?P<end>_?\d*)$", re.IGNORECASE),
+    re.compile(r"(?P<stem>.*?q(?:uat|uaternion)?s?[_.]?[\[(]?)(?P<part>[0-4])(?P<end>[\])]?)$", re.IGNORECASE),
+)
+"""How the parts of a quaternion are called: by their letters, or counted behind a `q` as in `q[0]` and `quat_1`."""
 UNIT_LENGTH = 0.02
 """How far the length of a quaternion's four numbers may be from one."""
 
 
-def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> tuple[str, ...] | None:
-    """Return the four columns x, y, z, w of an attitude: alike in name but for the part, together of length one; or None."""
+def quaternion_of(names: Sequence[str], columns: Mapping[str | int, FloatArray]) -> dict[str, Any] | None:
+    """Return the four columns of an attitude: alike in name but for the part, together of length one; None where there are none.
+
+    Of parts that are counted the real one is first or last: a vehicle is upright more often than on its side, so that the two
+    that are no turn about the vertical are small.
+    """
     stems: dict[tuple[str, str], dict[str, str]] = {}
-    for name in names:
-        found = _PARTS_OF_QUATERNION.match(name.strip())
-        if found and name in columns and not COMMANDED & set(words_of(name)):
-            stems.setdefault((found["stem"], found["end"]), {})[found["part"].lower()] = name
+    for pattern in _PARTS_OF_QUATERNION:
+        for name in names:
+            found = pattern.match(name.strip())
+            if found and name in columns and not (COMMANDED | {"d", "delta"}) & set(words_of(name)):
+                stems.setdefault((found["stem"], found["end"]), {})[found["part"].lower()] = name
     for parts in stems.values():
-        if parts.keys() != set("xyzw"):
-            continue
-        picked = tuple(parts[p] for p in "xyzw")
-        lengths = np.linalg.norm(np.stack([columns[c] for c in picked]), axis=0)
+        picked = [parts[part] for part in ("xyzw" if "x" in parts else sorted(parts)) if part in parts]
+        numbers = np.stack([columns[c] for c in picked])
+        lengths = np.linalg.norm(numbers, axis=0)
         seen = lengths[np.isfinite(lengths)]
-        if seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
-            return picked
+        if len(picked) == 4 and seen.size and abs(float(np.median(seen)) - 1.0) < UNIT_LENGTH:
+            size = np.nanmean(numbers**2, axis=1)
+            is_real_first = "x" not in parts and size[1] + size[2] <= size[0] + size[1]
+            return {"columns": picked} | ({"order": "wxyz"} if is_real_first else {})
     return None
-
-
-def _is_no_angle(signal: str, seen: tuple[Any, ...]) -> bool:
-    """Whether numbers that were seen are too large for the pitch or roll they are named."""
-    numbers = [abs(v) for v in seen if isinstance(v, (int, float))]
-    return signal in _TILTS and max(numbers, default=0.0) > STEEPEST_DEG
-
-
-def _weighed(sure: float, span: tuple[float, float] | None) -> float:
-    return sure if span is None or span[0] < span[1] else NOTHING
 
 
 def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
@@ -131,6 +125,9 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             continue
         if channel.kind == DEFINED or last in _COUNTERS or "covariance" in info.path or "[" in parent:
             continue
+        if info.path == "q[0]" and {"q[1]", "q[2]", "q[3]"} <= paths and not commanded:
+            # the messages of PX4 have the real part first
+            yield Guess(ATTITUDE, 8.0, {"topic": channel.name, "field": "q", "order": "wxyz"}, channel.count, defined=True)
         if planar and info.path in _PLANAR:
             yield from _of_plane(channel, info.path, commanded=commanded)
             continue
@@ -139,7 +136,7 @@ def of_topic(channel: ChannelInfo) -> Iterator[Guess]:
             yield from _of_scalar(channel, info)
         elif not (signal == ATTITUDE and _is_nothing(channel, parent)):
             path = parent if signal == ATTITUDE else info.path
-            yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count)
+            yield Guess(signal, sure + preferred, {"topic": channel.name, "field": path}, channel.count, defined=sure == STANDARD)
 
 
 def _of_table(channel: ChannelInfo) -> Iterator[Guess]:
@@ -150,7 +147,7 @@ def _of_table(channel: ChannelInfo) -> Iterator[Guess]:
             yield _of_format(channel, info, *info.means)
             continue
         words = words_of(info.path)
-        of_both = f"{info.path} {bare}" if set(words) <= NAMELESS or (len(words) == 1 and words[0] in LETTERS) else ""
+        of_both = f"{info.path} {bare}" if set(words) <= NAMELESS or (len(words) == len("".join(words)) == 1) else ""
         name = of_both if of_both and (found := meaning_of(of_both)) is not None and found[1] > 1 else info.path
         column = ChannelInfo(name, info.kind, channel.count, channel.rate_hz, (replace(info, path=""),))
         for guess in of_column(column, info.path):
@@ -173,7 +170,7 @@ def _of_plane(channel: ChannelInfo, path: str, *, commanded: bool) -> Iterator[G
 
 
 def _of_format(channel: ChannelInfo, info: FieldInfo, signal: str, how: Mapping[str, Any]) -> Guess:
-    return Guess(signal, 9.0, {"topic": channel.name, "field": info.path, **how}, channel.count)
+    return Guess(signal, 9.0, {"topic": channel.name, "field": info.path, **how}, channel.count, defined=True)
 
 
 def _of_vector(channel: ChannelInfo, parent: str, last: str, *, commanded: bool) -> tuple[str | None, float]:
@@ -182,11 +179,11 @@ def _of_vector(channel: ChannelInfo, parent: str, last: str, *, commanded: bool)
     if commanded:
         return None, 0.0
     if last == "w" and {f.path for f in channel.fields} >= {f"{parent}.{p}" if parent else p for p in "xyz"}:
-        return ATTITUDE, 8.0
+        return ATTITUDE, STANDARD
     if last not in ("x", "y", "z"):
         return None, 0.0
     if name in _VECTORS:
-        return _VECTORS[name]["xyz".index(last)], 8.0
+        return _VECTORS[name]["xyz".index(last)], STANDARD
     if name == "vector" and _EULER & set(words_of(channel.name)):
         return ("roll_rad", "pitch_rad", "yaw_rad")["xyz".index(last)], 6.0
     return None, 0.0
@@ -205,10 +202,12 @@ def _of_scalar(channel: ChannelInfo, info: FieldInfo) -> Iterator[Guess]:
     if info.path.startswith(("velocity[", "effort[")) or info.path.rpartition(".")[2] in ("x", "y", "z", "w"):
         return
     name = info.path if info.path not in ("data", "vector", "position[0]") else ""
-    found = meaning_of(f"{channel.name} {name}".strip())
-    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE) or _is_no_angle(found[0], info.first):
+    first = [float(v) for v in info.first if isinstance(v, (int, float))]
+    seen = info.span or ((min(first), max(first)) if first else None)
+    found = meaning_of(f"{channel.name} {name}".strip(), seen)
+    if found is None or found[0] in (TIME, LATITUDE, LONGITUDE):
         return
-    unit = unit_in_name(info.path.rpartition(".")[2], found[0])
+    unit = unit_of_field(channel.name, info.path, found[0])
     unit = stated_unit(channel.unit, found[0]) if unit is None and channel.unit else unit
     if unit is not None:
         item["unit"] = unit

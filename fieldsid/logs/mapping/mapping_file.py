@@ -4,84 +4,127 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from fieldsid.errors import FieldsidError, MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
 from fieldsid.logs.convert.frames import Body, Frame, World
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, SUMMED
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, SUMMED, counts_unit
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
 from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
-from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import PART, SIGNALS, signal_of
 from fieldsid.registry import near
 from fieldsid.strict import StrictModel, read_model, validated
 
 SCHEMA = "fieldsid/mapping/1"
 Column = Annotated[int, Field(ge=0)] | str
+OF_FINS = "; `us` for a servo's pulses, `1` where -1 .. 1 is the whole range, `counts` for others"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _key(says: str, example: str, default: Any = None) -> Any:
+    """Return the field of a key: what it is for, and an example that the guide shows."""
+    return Field(default, description=says, examples=[example])
 
 
 class _Place(StrictModel):
     """Where numbers are and how they are read: what a signal and an entry of a sum have both."""
 
-    column: Column | None = None
-    columns: list[Column] | None = None
-    order: Literal["xyzw", "wxyz"] = "xyzw"
-    topic: str | None = None
-    field: str = ""
-    unit: str | None = None
-    sign: Literal[1, -1] = 1
-    offset: Finite = 0.0
-    frame: str | None = None
-    stamp: Literal["header", "receive"] | None = None
-    centre: Finite | None = None
+    column: Column | None = _key("the column of a table, by its name or by its place from 0", "yaw_rad: {column: Heading}")
+    columns: list[Column] | None = _key(
+        "several columns that give one line: the four of a quaternion, or latitude and longitude",
+        "attitude: {columns: [qx, qy, qz, qw]}",
+    )
+    order: Literal["xyzw", "wxyz"] = _key(
+        "the order of a quaternion's numbers", 'attitude: {columns: ["q[0]", "q[1]", "q[2]", "q[3]"], order: wxyz}', "xyzw"
+    )
+    topic: str | None = _key("the topic of a bag, or what else has a clock of its own", "depth_m: {topic: /depth, field: data}")
+    field: str = _key("the path of a number in the messages", "surge_m_s: {topic: /odom, field: twist.twist.linear.x}", "")
+    unit: Annotated[str | None, BeforeValidator(lambda unit: "1" if unit == 1 else unit)] = _key(
+        "the unit of the numbers, where the name does not say it; on a fin also `us` (pulses), `1` (-1 .. 1), `%` and `counts`",
+        "rudder_rad: {column: rudder_cmd, unit: deg}",
+    )
+    sign: Literal[1, -1] = _key("-1 turns a signal that counts the other way", "rudder_rad: {column: fin, sign: -1}", 1)
+    offset: Finite = _key("what is added last, in SI", "yaw_rad: {column: compass, unit: deg, offset: 0.0349}", 0.0)
+    frame: str | None = _key("the frames of this signal only", "yaw_rad: {column: yaw, frame: ENU}")
+    stamp: Literal["header", "receive"] | None = _key(
+        "which stamps this signal has", "rudder_rad: {topic: /rudder, field: data, stamp: receive}"
+    )
+    centre: Finite | None = _key("the count of a servo in the middle", "rudder_rad: {column: servo1, unit: counts, centre: 1500}")
 
 
 class _Entry(_Place):
-    scale: Finite | None = None
+    scale: Finite | None = _key("the share of this entry in the sum, either sign", "{column: fin3, scale: -0.5}")
 
 
 class _Source(_Place):
-    scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
-    sum: Annotated[list[_Entry], Field(min_length=1)] | None = None
+    scale: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = _key(
+        "the rad that one count of a servo is worth", "rudder_rad: {column: servo1, unit: us, scale: 0.0013}"
+    )
+    sum: Annotated[list[_Entry], Field(min_length=1)] | None = _key(
+        "several columns or topics that make up one fin or thrust together, as the fins of an X tail do",
+        "rudder_rad: {sum: [{column: fin1, scale: 0.5}, {column: fin3, scale: -0.5}]}",
+    )
 
 
 class _Time(StrictModel):
-    column: Column | None = None
-    columns: list[Column] | None = None
-    unit: str | None = None
-    date: Column | Annotated[list[Column], Field(min_length=1, max_length=3)] | None = None
-    week: Column | None = None
-    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    column: Column | None = _key("the column of the time, by its name or by its place from 0", "time: {column: stamp, unit: s}")
+    columns: list[Column] | None = _key(
+        "the columns whose sum the time is", "time: {columns: [hour, minute, second], unit: hh+mm+ss}"
+    )
+    unit: str | None = _key("the unit of the time, how a clock is written, or its parts", "time: {column: millis, unit: ms}")
+    date: Column | Annotated[list[Column], Field(min_length=1, max_length=3)] | None = _key(
+        "the columns of the days, where the time is that of a day", 'time: {column: clock, unit: "hhmmss", date: day}'
+    )
+    week: Column | None = _key("the column of the GPS weeks beside a time of the week", "time: {column: tow, week: wn}")
+    rate: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = _key(
+        "how many samples a second a column counts, or how many rows a second there are where no column is a time",
+        "time: {rate: 10}",
+    )
 
 
 class _Pressure(StrictModel):
-    density: Annotated[float, Field(gt=0.0)] = 1025.0
-    surface_pa: Annotated[float, Field(ge=0.0)] = 101325.0
+    density: Annotated[float, Field(gt=0.0)] = _key("the water's, in kg/m^3", "pressure: {density: 1000.0}", 1025.0)
+    surface_pa: Annotated[float, Field(ge=0.0)] = _key(
+        "the pressure at the surface in Pa, 0 for a gauge", "pressure: {surface_pa: 0.0}", 101325.0
+    )
 
 
 class _Table(StrictModel):
-    separator: str | None = None
-    header: bool | None = None
-    skip: Annotated[int, Field(ge=0)] | None = None
-    encoding: str | None = None
-    decimal: Literal[".", ","] | None = None
+    separator: str | None = _key("what stands between two cells, or `whitespace`", 'table: {separator: ";"}')
+    header: bool | None = _key("whether the columns have names", "table: {header: false}")
+    skip: Annotated[int, Field(ge=0)] | None = _key("lines above the table", "table: {skip: 4}")
+    encoding: str | None = _key("the encoding of the text", "table: {encoding: cp1252}")
+    decimal: Literal[".", ","] | None = _key("the decimal sign", 'table: {decimal: ","}')
 
 
 class _File(StrictModel):
-    schema_: Literal["fieldsid/mapping/1"] = Field(default="fieldsid/mapping/1", alias="schema")
-    frame: str | None = None
-    stamp: Literal["header", "receive"] | None = None
-    clock: str | None = None
-    gap_factor: Annotated[float, Field(ge=1.0, le=1000.0)] = 2.5
-    time: _Time | None = None
-    pressure: _Pressure = _Pressure()
-    table: _Table = _Table()
-    signals: dict[str, _Source | str | int]
+    schema_: Literal["fieldsid/mapping/1"] = Field(
+        default="fieldsid/mapping/1", alias="schema", description="the kind of the file", examples=["schema: fieldsid/mapping/1"]
+    )
+    frame: str | None = _key("the frames of the log: the world's (NED, ENU) and the body's (FRD, FLU)", "frame: ENU/FLU")
+    stamp: Literal["header", "receive"] | None = _key("which stamps every topic has", "stamp: receive")
+    clock: str | None = _key("the signal whose samples give the clock, else the fastest angle or rate", "clock: yaw_rad")
+    gap_factor: Annotated[float, Field(ge=1.0, le=1000.0)] = _key(
+        "over how many of its periods a measurement is interpolated at most", "gap_factor: 4.0", 2.5
+    )
+    time: _Time | None = _key("the time of a table", "time: {column: Time, unit: s}")
+    pressure: _Pressure = _key("what turns a pressure into a depth", "pressure: {density: 1000.0, surface_pa: 0.0}", _Pressure())
+    table: _Table = _key("how a table is written, where that is not found by itself", 'table: {separator: ";"}', _Table())
+    signals: dict[str, _Source | str | int] = Field(
+        description="a line for each signal: where it is and how it is read", examples=["yaw_rad: {column: Heading, unit: deg}"]
+    )
+
+
+KEYS: Mapping[str, type[StrictModel]] = MappingProxyType(
+    {"": _File, "a line of `signals`": _Source, "`time`": _Time, "`pressure`": _Pressure, "`table`": _Table}
+)
+"""The keys of a mapping by where they stand, as the guide lists them."""
 
 
 def load_mapping(path: Path) -> ChannelMap:
@@ -170,23 +213,23 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
 
 
 def _time(time: _Time, place: str) -> Source:
-    """The unit of a time is one of time, or says how a clock is written; one that counts samples has a rate, and no unit."""
-    if (time.column is None) == (not time.columns):
+    """The unit of a time is one of time, or says how a clock is written; one that counts samples or rows has a rate, and none."""
+    if (time.column is None) == (not time.columns) and (time.columns or time.rate is None):
         raise MappingError(
-            f"{place}: `time` needs one of `column`, `columns`",
+            f"{place}: `time` needs one of `column`, `columns`, `rate`",
             found="both" if time.columns else "none of them",
-            hint="name one with `column`, or those that make it up with `columns`",
+            hint="name one with `column`, those that make it up with `columns`, or give the rows a second with `rate`",
         )
     if time.rate is not None and (time.unit, time.date, time.week, time.columns) != (None, None, None, None):
         raise MappingError(
             f"{place}: a time with a `rate` counts samples, and has no unit, date or week",
             found=f"rate {time.rate:g}",
-            hint=f"write `time: {{column: {time.column or 'NAME'}, rate: {time.rate:g}}}`",
+            hint=f"write `time: {{rate: {time.rate:g}}}`",
         )
     if time.columns:
         parts_of(time.unit, time.columns, place)
     elif time.unit is not None and time.unit not in FORMS:
-        found = find_unit(time.unit)
+        found = find_unit(time.unit, "time")
         if found is None or found.dimension != "time":
             known = [u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS)
             raise MappingError(
@@ -303,7 +346,7 @@ def _check_counts(signal: str, item: _Source | _Entry, place: str) -> None:
     """A centre and a scale are those of counts, and counts those of a servo or a motor."""
     of_counts = (("centre", item.centre), ("scale", item.scale if isinstance(item, _Source) else None))
     extra = [n for n, v in of_counts if v is not None]
-    if extra and item.unit != COUNTS:
+    if extra and counts_unit(signal_of(signal), item.unit) is None:
         hint = f"write `unit: {COUNTS}` beside it"
         raise MappingError(f"{place}: `{signal}` has a `{extra[0]}` without counts", found=f"unit: {item.unit}", hint=hint)
     if item.unit == COUNTS and signal_of(signal) not in COUNTED:
@@ -314,11 +357,11 @@ def _check_counts(signal: str, item: _Source | _Entry, place: str) -> None:
 
 def _check_unit(signal: str, unit: str, place: str) -> None:
     """The unit is one, and of the signal's dimension; a depth may be a pressure."""
-    dimension = dimension_of(signal) if signal not in COMBINED else None
-    if dimension is None or unit == COUNTS:
+    dimension, whole = dimension_of(signal) if signal not in COMBINED else None, signal_of(signal)
+    if dimension is None or unit == COUNTS or counts_unit(signal, unit) is not None:
         return
     try:
-        picked = pick_unit(unit)
+        picked = pick_unit(unit, dimension)
     except FieldsidError as error:
         fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
         raise MappingError(f"{place}: `{signal}`: {error.what}", found=unit, hint=near(unit, fitting)) from error
@@ -326,5 +369,5 @@ def _check_unit(signal: str, unit: str, place: str) -> None:
         raise MappingError(
             f"{place}: `{signal}` cannot be in {unit!r}",
             found=f"a unit of {picked.dimension}",
-            hint=f"use a unit of {dimension}, such as `{SIGNALS[signal_of(signal)]}`",
+            hint=f"use a unit of {dimension}, such as `{SIGNALS[whole]}`{OF_FINS if whole in FINS else ''}",
         )

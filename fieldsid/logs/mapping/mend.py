@@ -14,8 +14,8 @@ import numpy as np
 
 from fieldsid.logs.channels import POSITION
 from fieldsid.logs.doctor.fin_findings import WIDEST
-from fieldsid.logs.mapping.true_north import GEOGRAPHIC
-from fieldsid.logs.mapping.word_meaning import words_of
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.numbers.true_north import GEOGRAPHIC
 from fieldsid.logs.run import Note, Run
 
 ANGLES_BESIDE = ("rudder_rad", "elevator_rad", "rudder_measured_rad", "elevator_measured_rad", "pitch_rad", "roll_rad")
@@ -33,7 +33,11 @@ def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Co
         if note.code == "unit" and signal == "yaw_rate_rad_s" and "yaw_rad" in by_size and _counts_turns(signals, run):
             del signals["yaw_rad"]["unit"]
             done.append(_evidence("yaw_rad", "no unit, as rad that count turns", note))
-        elif note.code in ("unit", "speed_unit") and "unit" in note.data and "unit" not in signals.get(signal, {"unit": 0}):
+        elif (
+            note.code in ("unit", "speed_unit", "depth_unit")
+            and "unit" in note.data
+            and "unit" not in signals.get(signal, {"unit": 0})
+        ):
             signals[signal]["unit"] = note.data["unit"]
             done.append(_evidence(signal, f"`unit: {note.data['unit']}`", note))
         elif note.code in ("rate_sign", "speed_sign") and _turn(signals, signal):

@@ -18,6 +18,8 @@ ERRORS = re.compile(
     rb"|-?\d+\.#(?:QNAN|SNAN|IND|INF)\d*)"
 )
 """Cells in which a spreadsheet or a C library says that there is no number, which are no comments."""
+SENTENCE = re.compile(rb"(?:\A|(?<=\n))[$!][A-Z]{3,}[A-Z0-9]*,[^\n]*")
+"""A line of NMEA 0183, which another talker wrote among the rows."""
 MISSING = frozenset({
     "", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "-nan", "infinity", "-", "--", "---", "nan(ind)", "-nan(ind)",
     "nan(snan)", "#n/a", "#value!", "#div/0!", "#ref!", "#name?", "#num!", "#null!",

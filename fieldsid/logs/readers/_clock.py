@@ -13,9 +13,11 @@ from fieldsid.errors import FieldsidError, LogError
 from fieldsid.logs.channels import Source
 from fieldsid.logs.convert.conditioning import in_order
 from fieldsid.logs.convert.times.clock_text import DAY_S, clock_of_text
-from fieldsid.logs.convert.times.time_column import likely_time_unit
-from fieldsid.logs.mapping.canonical_names import TIME, unit_in_name
-from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
+from fieldsid.logs.convert.times.time_column import YEARS_S, likely_time_unit
+from fieldsid.logs.mapping.canonical_names import unit_in_name
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import ReadOptions
 from fieldsid.logs.readers._clock_columns import clocks_in_parts, dates_beside, elapsed
 from fieldsid.logs.readers._columns import Columns, is_counter, time_of
@@ -65,6 +67,8 @@ class Clock:
 
 def clock_of(columns: Columns, known: Source | None) -> Clock | None:
     """Return the clock of a table, by its mapping or by the names of its columns; None where no column goes on like time."""
+    if known is not None and known.counts_rows:
+        return Clock((known.scale or 1.0) * np.arange(columns.take(0).size, dtype=np.float64), known)
     if known is not None and known.places:
         return _tried(columns, known)
     named = (_tried(columns, source) for source in _named(columns))
@@ -111,11 +115,11 @@ def _source(columns: Columns, index: int) -> Source:
         date = dates_beside(columns, (index,)) if clock is not None and clock.period_s == DAY_S else ()
         if date:
             return Source(column=place, date=tuple(map(columns.place, date)))
-    unit = columns.unit(index, TIME) or _unit_by_size(cells)
+    unit = columns.unit(index, TIME) or unit_by_size(cells)
     return Source(column=place, unit=unit)
 
 
-def _unit_by_size(cells: npt.NDArray[Any]) -> str | None:
+def unit_by_size(cells: npt.NDArray[Any]) -> str | None:
     if cells.dtype.kind not in "iuf" or not cells.size:
         return None
     steps = np.diff(cells[np.isfinite(cells)].astype(np.float64))
@@ -129,7 +133,7 @@ def _tried(columns: Columns, source: Source) -> Clock | None:
     cells = columns.take(first)
     if not cells.size:
         return None
-    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or _unit_by_size(cells)
+    unit = source.unit if source.columns else source.unit or unit_in_name(columns.name(first), TIME) or unit_by_size(cells)
     try:
         time, notes = time_of(columns, source, unit, ReadOptions(salvage=True))
     except FieldsidError:  # what is no time is not taken for one
@@ -149,11 +153,13 @@ def _by_numbers(columns: Columns) -> Clock | None:
             continue
         if is_counter(name) and cells.dtype.kind != "M":
             continue
-        clock = _tried(columns, Source(column=columns.place(i), unit=_unit_by_size(cells)))
+        clock = _tried(columns, Source(column=columns.place(i), unit=unit_by_size(cells)))
         if clock is None:
             continue
         steps = np.diff(clock.time[np.isfinite(clock.time)])
-        if float(np.std(steps)) < REGULAR * float(np.mean(steps)):
+        # seconds since 1970 are a time however long the logger paused
+        is_epoch = cells.dtype.kind in "iuf" and bool(((cells > YEARS_S[0]) & (cells < YEARS_S[1])).all())
+        if is_epoch or float(np.std(steps)) < REGULAR * float(np.mean(steps)):
             return replace(clock, notes=_guessed(name, clock.source.unit)) if name else clock
     return None
 

@@ -15,8 +15,10 @@ from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, COMBINED, ChannelMap, Source
 from fieldsid.logs.convert.number_cells import as_numbers
 from fieldsid.logs.convert.times.time_column import seconds_of, seconds_of_parts
-from fieldsid.logs.mapping.canonical_names import TIME, Canonical, canonical, stated_unit, unit_in_name
-from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
+from fieldsid.logs.mapping.canonical_names import Canonical, canonical, stated_unit, unit_in_name
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import RawLog, ReadOptions, Samples, Series
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
@@ -54,6 +56,7 @@ class Columns:
                 f"`{self.path}` has no column {column} for `{signal}`",
                 found=f"{self.width} columns, 0 to {self.width - 1}",
                 hint=f"columns are counted from 0: `sysid inspect {quote(str(self.path))}` lists them",
+                signal=signal,
             )
         places = [i for i, name in enumerate(self.names) if name == column]
         if len(places) == 1:
@@ -63,11 +66,13 @@ class Columns:
                 f"`{self.path}` has {len(places)} columns named `{column}`, and which is meant for `{signal}` is open",
                 found=f"columns {places}",
                 hint=f"name it by its place in a mapping, as `column: {places[0]}`",
+                signal=signal,
             )
         raise MappingError(
             f"`{self.path}` has no column `{column}` for `{signal}`",
             found=self.shown(),
             hint=near(column, self.names) if self.names else f"use an index from 0 to {self.width - 1}",
+            signal=signal,
         )
 
     def shown(self) -> str:
@@ -164,6 +169,7 @@ def _check_source(path: Path, signal: str, source: Source) -> None:
             f"`{signal}` is mapped to topic `{source.topic}`, but `{path}` is a table",
             found=source.label,
             hint="name a `column`; or, of a run in several tables, give their folder, or all of them with --join",
+            signal=signal,
         )
     if signal == ATTITUDE and len(source.columns) != 4:
         raise MappingError(
@@ -171,6 +177,7 @@ def _check_source(path: Path, signal: str, source: Source) -> None:
         )
 
 
+NO_CLOCK = "where no column is a time write how many rows there are a second at the top of the mapping, as `time: {rate: 10}`"
 COUNTERS = frozenset(
     {"sample", "samples", "index", "idx", "row", "frame", "no", "nr", "number", "count", "counter", "seq", "step"}
 )
@@ -184,11 +191,13 @@ def is_counter(name: str) -> bool:
 
 
 def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[FloatArray, list[Note]]:
+    if mapping.time is not None and mapping.time.counts_rows:
+        rows = columns.take(min(used_by(mapping, columns.names, columns.width), default=0)).size
+        return (mapping.time.scale or 1.0) * np.arange(rows, dtype=np.float64), []
     if mapping.time is None or not mapping.time.places:
         guessed = [name for name in columns.names if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
-        likely = guessed[0] if guessed else "COLUMN" if columns.names else "0"
         # Without a file the mapping came from `--channel`.
-        way = f"add `time: {{column: {likely}, unit: s}}` to {mapping.place}" if mapping.origin else ""
+        way = f"add `time: {{column: {guessed[0]}, unit: s}}` to {mapping.place}" if mapping.origin and guessed else ""
         counter = None if guessed else next((name for name in columns.names if is_counter(name)), None)
         if counter is not None:
             way = f"`{counter}` counts samples: write how many there are a second at the top of the mapping, as "
@@ -196,7 +205,7 @@ def _time(columns: Columns, mapping: ChannelMap, options: ReadOptions) -> tuple[
         raise MappingError(
             f"`{columns.path}` has no time column: `{TIME}` is missing",
             found=columns.shown(),
-            hint=way or f"add `--channel {quote(f'time={likely}:s')}`",
+            hint=way or (f"add `--channel {quote(f'time={guessed[0]}:s')}`" if guessed else NO_CLOCK),
         )
     time, notes = time_of(columns, mapping.time, mapping.time.unit, options)
     return time if mapping.time.scale is None else time * mapping.time.scale, notes
@@ -271,6 +280,7 @@ def _numbers(columns: Columns, index: int, signal: str, bad: list[Note], options
                 found=f"{wrong.size} of {values.size}, the first in row {first + 1}: {str(cells[first])[:40]!r}",
                 hint=options.salvaging("map another column, or take them as missing", 1.0 - wrong.size / values.size)
                 or "map another column, or leave the signal out",
+                signal=signal,
             )
         message = f"{signal}: cells that are no numbers and count as missing: {wrong.size}"
         bad.append(Note("not_a_number", message, {"signal": signal, "count": int(wrong.size)}))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fieldsid.logs.mapping.word_meaning import words_of
+from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.readers._columns import Columns
 
 CALLED = frozenset({"id", "device", "instance", "servo", "channel", "fin", "motor", "actuator", "thruster", "number", "no", "nr"})

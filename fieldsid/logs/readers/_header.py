@@ -16,6 +16,7 @@ OTHER_UNITS = frozenset({
 """Units of what is no signal here, as rows of units state them."""
 
 
+OTHER_SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 _RULE = re.compile(r"^[\s|+:=-]*[-=]{2,}[\s|+:=-]*$")
 """A line drawn below the names."""
 
@@ -24,9 +25,18 @@ def header_of(
     lines: list[str], at: int, first: int, separator: str, width: int, *, asked: bool | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names and the units of the columns; a row of units stands below one of names."""
-    units: tuple[str, ...] = ()
     if asked is False:
         return (), ()
+    names, units = _above(lines, at, first, separator, width)
+    if not names and width > 2 and cells(lines[at], separator)[-1] == "":
+        # rows that end in a separator have a cell more than there are names
+        names, units = _above(lines, at, first, separator, width - 1)
+        return (*names, "") if names else (), (*units, "") if units else ()
+    return names, units
+
+
+def _above(lines: list[str], at: int, first: int, separator: str, width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    units: tuple[str, ...] = ()
     for i in range(at - 1, max(first, 0) - 1, -1):
         if not lines[i].strip() or _RULE.match(lines[i]):
             continue
@@ -59,19 +69,24 @@ def _names(line: str, separator: str, width: int) -> tuple[str, ...]:
     """Return a header line's names when it has one word for each column, else nothing."""
     bare = line.strip().lstrip(COMMENTS).strip() if line.lstrip().startswith(tuple(COMMENTS)) else line
     names = cells(bare, separator)
+    if separator == "whitespace":
+        names = [n.strip(",;|") for n in names]
     if len(names) != width and separator == "whitespace":
         names = [n.strip() for n in re.split(r"\s{2,}|\t", bare.strip())]  # names of several words, further apart than these
-    if len(names) != width and bare != line:
-        names = _by_blanks(bare)
+    if len(names) != width:
+        names = _otherwise(bare, separator, width)
     if len(names) != width or any(is_number_or_date(n) for n in names) or not any(names):
         return ()
     return () if _are_units(line, separator, width) else tuple(names)
 
 
-def _by_blanks(comment: str) -> list[str]:
-    """Return the words of a comment above a table, which its program parts by blanks, where they name signals or units."""
-    words = comment.split()
-    return words if _state_units(tuple(words)) or sum(meaning_of(w) is not None for w in words) > 1 else []
+def _otherwise(line: str, separator: str, width: int) -> list[str]:
+    """Return the words of a line above a table that are parted otherwise than its rows, where they name signals or units."""
+    for other in OTHER_SEPARATORS:
+        words = cells(line, other) if other != separator else []
+        if len(words) == width and (_state_units(tuple(words)) or sum(meaning_of(w) is not None for w in words) > 1):
+            return words
+    return []
 
 
 def _are_units(line: str, separator: str, width: int) -> bool:

@@ -63,13 +63,13 @@ class PlainText:
         """Return how often a byte stands between two places."""
         return sum(self._piece(at, min(PIECE_BYTES, end - at)).count(what) for at in range(begin, end, PIECE_BYTES))
 
-    def holds(self, what: re.Pattern[bytes], begin: int, end: int) -> bool:
-        """Whether a cell of an expression that begins with `#`, or holds one, stands between two places."""
+    def holds(self, what: re.Pattern[bytes], mark: bytes, begin: int, end: int) -> bool:
+        """Whether a cell of an expression that holds a mark stands between two places."""
         pieces = (
             self._piece(max(begin, at - LONGEST_CELL), min(PIECE_BYTES + LONGEST_CELL, end - at))
             for at in range(begin, end, PIECE_BYTES)
         )
-        return any(b"#" in piece and what.search(piece) is not None for piece in pieces)
+        return any(mark in piece and what.search(piece) is not None for piece in pieces)
 
     def is_blank(self) -> bool:
         """Whether there is nothing but white space."""

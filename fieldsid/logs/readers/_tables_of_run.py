@@ -13,7 +13,7 @@ from shlex import quote
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
-from fieldsid.logs.mapping.canonical_names import TIME
+from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import check_readable
 from fieldsid.logs.readers import csv_table

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import TableForm
-from fieldsid.logs.readers._cells import cells, is_row, is_word
+from fieldsid.logs.readers._cells import SENTENCE, cells, is_row, is_word
 from fieldsid.logs.readers._header import behind_sizes, header_of
-from fieldsid.logs.unknown_file import COPY_AGAIN
+from fieldsid.logs.unknown_file import COPY_AGAIN, known_text
 
 SEPARATORS = ("\t", ";", ",", "|", "whitespace")
 LOOKED_AT = 400
@@ -32,6 +32,8 @@ class Form:
     names: tuple[str, ...]
     units: tuple[str, ...] = ()
 
+    is_sentences: bool = False
+
     def label(self, index: int) -> str:
         """The name of a column, or its index where there is no header."""
         return self.names[index] if self.names else str(index)
@@ -48,6 +50,8 @@ def form_of(text: str, asked: TableForm, path: Path) -> Form:
         form, score = _try(lines, first, separator, asked)
         if form is not None and score > best_score:
             best, best_score = form, score
+    if best is None and (known := known_text(path, lines)) is not None:
+        raise known
     if best is None:
         shown = next((line for line in lines if line.strip()), "")[:80]
         if sum(bool(line.strip()) for line in lines) == 1:
@@ -77,6 +81,7 @@ def _try(lines: list[str], first: int, separator: str, asked: TableForm) -> tupl
             score = (agreeing, sum(not is_word(c, decimal) for c in row) / len(row), len(row))
             if score > best[1]:
                 names, units = header_of(lines, at, first, separator, len(row), asked=asked.header)
-                best = Form(separator, decimal, behind_sizes(lines, at, names), len(row), names, units), score
+                said = SENTENCE.match(lines[at].encode()) is not None
+                best = Form(separator, decimal, behind_sizes(lines, at, names), len(row), names, units, said), score
             break
     return best

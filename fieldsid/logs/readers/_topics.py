@@ -15,8 +15,8 @@ import numpy as np
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import COMBINED, ChannelMap, Source
-from fieldsid.logs.mapping.canonical_names import stated_unit, unit_in_name
-from fieldsid.logs.reader import DEFINED, MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Series
+from fieldsid.logs.mapping.canonical_names import stated_unit, unit_of_field
+from fieldsid.logs.reader import DEFINED, MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Series, span_of
 from fieldsid.logs.run import Note
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.logs.unknown_file import COPY_AGAIN
@@ -85,7 +85,9 @@ def inventory_of(
 def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
     bare = name.partition("[")[0]
     several = {p: m for key, m in means.items() if (p := key.removeprefix(f"{bare}.")) != key and ", " in p}
-    fields = [FieldInfo(p, "number", tuple(v[:3].tolist()), _span(v), means.get(f"{bare}.{p}")) for p, v in topic.fields.items()]
+    fields = [
+        FieldInfo(p, "number", tuple(v[:3].tolist()), span_of(v), means.get(f"{bare}.{p}")) for p, v in topic.fields.items()
+    ]
     fields += [
         FieldInfo(p, "numbers", (), None, m) for p, m in several.items() if all(part in topic.fields for part in p.split(", "))
     ]
@@ -120,12 +122,14 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
             f"`{signal}` is mapped to a {source.label}, but `{path}` is a log of topics",
             found=source.label,
             hint="name a `topic` and a `field`",
+            signal=signal,
         )
     if source.topic not in topics:
         raise MappingError(
             f"`{path}` has no topic `{source.topic}` for `{signal}`",
             found=", ".join(sorted(topics)[:12]),
             hint=near(source.topic, list(topics)),
+            signal=signal,
         )
     topic = topics[source.topic]
     fields = [part.strip() for part in (source.path or DATA).split(",")]
@@ -135,12 +139,13 @@ def _picked(path: Path, topics: Mapping[str, Topic], signal: str, source: Source
                 f"topic `{source.topic}` has no field `{name}` for `{signal}`",
                 found=", ".join(topic.fields),
                 hint=near(name, list(topic.fields)),
+                signal=signal,
             )
     values = [topic.fields[name] for name in fields]
     label = f"{source.topic}.{source.path}" if source.path else source.topic
     unit = None
     if signal not in COMBINED:
-        unit = stated_unit(topic.unit, signal) if topic.unit else unit_in_name(fields[0], signal)
+        unit = stated_unit(topic.unit, signal) if topic.unit else unit_of_field(source.topic, fields[0], signal)
     return Series(topic.time, values[0] if len(values) == 1 else np.stack(values, axis=1), label, unit)
 
 

@@ -1,7 +1,9 @@
-"""ArduPilot logs, read by pymavlink (extra `ardupilot`): DataFlash .bin of the vehicle, telemetry .tlog of the ground."""
+"""ArduPilot logs, read by pymavlink (extra `ardupilot`): DataFlash .bin of the vehicle or its text form, telemetry .tlog."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.convert.servo_counts import COUNTS, SERVOS
 from fieldsid.logs.convert.times.time_column import YEARS_S
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.readers._topics import Means, Topic, inventory_of, library, raw_log_of, topic_of, unheard
@@ -19,11 +22,17 @@ from fieldsid.logs.unknown_file import COPY_AGAIN, DATAFLASH
 MAVLINK = (0xFE, 0xFD)
 """How a packet of either version of the protocol starts, behind eight bytes of time."""
 FORMAT, FORMAT_LENGTH = 128, 89
+HEAD = 4096
+PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
+"""Messages of the vehicle's parameters, with the fields of their name and value."""
+TEXT = re.compile(rb"^FMT, ?128,", re.MULTILINE)
+"""A line with which the text form of a DataFlash log begins, as ground stations write it."""
 _DEG, _DEG_S, _RAD, _RAD_S = ({"unit": unit} for unit in ("deg", "deg/s", "rad", "rad/s"))
 MEANS: Means = {
     "ATT.Yaw": ("yaw_rad", _DEG), "ATT.Pitch": ("pitch_rad", _DEG), "ATT.Roll": ("roll_rad", _DEG),
     "ATT.DesYaw": ("yaw_goal_rad", _DEG), "ATT.DesPitch": ("pitch_goal_rad", _DEG),
     "RATE.Y": ("yaw_rate_rad_s", _DEG_S), "RATE.P": ("pitch_rate_rad_s", _DEG_S), "RATE.R": ("roll_rate_rad_s", _DEG_S),
+    "IMU.GyrZ": ("yaw_rate_rad_s", _RAD_S), "IMU.GyrY": ("pitch_rate_rad_s", _RAD_S), "IMU.GyrX": ("roll_rate_rad_s", _RAD_S),
     "XKF1.PN": ("x_m", {}), "XKF1.PE": ("y_m", {}), "XKF1.PD": ("depth_m", {}),
     "ATTITUDE.yaw": ("yaw_rad", _RAD), "ATTITUDE.pitch": ("pitch_rad", _RAD), "ATTITUDE.roll": ("roll_rad", _RAD),
     "ATTITUDE.yawspeed": ("yaw_rate_rad_s", _RAD_S), "ATTITUDE.pitchspeed": ("pitch_rate_rad_s", _RAD_S),
@@ -31,50 +40,80 @@ MEANS: Means = {
     "LOCAL_POSITION_NED.x": ("x_m", {}), "LOCAL_POSITION_NED.y": ("y_m", {}), "LOCAL_POSITION_NED.z": ("depth_m", {}),
 }  # fmt: skip
 """What the definitions of the messages say."""
+FUNCTIONS = {19: "elevator_rad", 21: "rudder_rad", 26: "rudder_rad", 70: "thrust"}
+"""What an output moves by its parameter SERVOn_FUNCTION: elevator, rudder, ground steering, throttle."""
+PULSES = {"RCOU": "C{}", "SERVO_OUTPUT_RAW": "servo{}_raw"}
+"""Messages of the outputs' pulses, and what the n-th is called."""
+Rows = dict[str, list[tuple[float, dict[str, float]]]]
+"""Messages by name, each with its time in s and its numbers."""
+
+
+def _outputs(parameters: Mapping[str, float]) -> dict[str, tuple[str, Mapping[str, Any]]]:
+    """Return what the outputs are by the vehicle's parameters, with the pulse at which each is in the middle."""
+    found: dict[str, tuple[str, Mapping[str, Any]]] = {}
+    for name, function in parameters.items():
+        number = name.removeprefix("SERVO").removesuffix("_FUNCTION")
+        signal = FUNCTIONS.get(int(function)) if name == f"SERVO{number}_FUNCTION" else None
+        if signal is not None:
+            centre = parameters.get(f"SERVO{number}_TRIM", SERVOS[1].centre)
+            sign = {"sign": -1} if parameters.get(f"SERVO{number}_REVERSED", 0.0) else {}
+            how = {"unit": COUNTS, "centre": int(centre), **sign}
+            found |= {f"{message}.{field.format(number)}": (signal, how) for message, field in PULSES.items()}
+    return found
 
 
 def sniff(path: Path) -> bool:
-    """Whether a file starts as a DataFlash log, or as a packet with its time."""
+    """Whether a file starts as a DataFlash log, binary or text, or as a packet with its time."""
     if path.is_dir():
         return False
     with path.open("rb") as stream:
-        head = stream.read(9)
-    if head.startswith(DATAFLASH):
+        head = stream.read(HEAD)
+    if head.startswith(DATAFLASH) or TEXT.search(head):
         return True
-    return len(head) == 9 and head[8] in MAVLINK and YEARS_S[0] < 1e-6 * int.from_bytes(head[:8], "big") < YEARS_S[1]
+    return len(head) >= 9 and head[8] in MAVLINK and YEARS_S[0] < 1e-6 * int.from_bytes(head[:8], "big") < YEARS_S[1]
 
 
-def _topics(path: Path) -> dict[str, Topic]:
+def _topics(path: Path) -> tuple[dict[str, Topic], Means]:
+    """Return the topics of a log, and what they mean: by the definitions, the outputs by the vehicle's own parameters."""
     with path.open("rb") as stream:
-        is_flash = stream.read(3) == DATAFLASH
+        head = stream.read(HEAD)
+    is_flash = head.startswith(DATAFLASH) or TEXT.search(head) is not None
     what = "a DataFlash log (ArduPilot)" if is_flash else "a telemetry log (MAVLink)"
     mavutil = library("pymavlink.mavutil", path, what, "ardupilot")
     try:
         with unheard(), closing(mavutil.mavlink_connection(str(path)) if not is_flash else _flash(path)) as log:
-            rows = _rows(log, is_flash=is_flash)
+            rows, parameters = _rows(log, is_flash=is_flash)
     except Exception as error:  # pymavlink raises this very class for a format it does not know
         found = f"{type(error).__name__}: {error}"[:160]
         raise LogError(f"`{path}` is {what} that cannot be read", found=found, hint=COPY_AGAIN) from error
     found_topics = {name: _joined(messages) for name, messages in rows.items()}
-    return {name: topic for name, topic in found_topics.items() if topic is not None}
+    topics = {name: topic for name, topic in found_topics.items() if topic is not None}
+    return topics, {**MEANS, **_outputs(parameters)}
 
 
-def _rows(log: Any, *, is_flash: bool) -> dict[str, list[tuple[float, dict[str, float]]]]:
-    """Return the messages by name, each with its time in s and its numbers."""
-    rows: dict[str, list[tuple[float, dict[str, float]]]] = {}
+def _rows(log: Any, *, is_flash: bool) -> tuple[Rows, dict[str, float]]:
+    """Return the messages by name, and the vehicle's parameters."""
+    rows: Rows = {}
+    parameters: dict[str, float] = {}
     while (message := log.recv_match()) is not None:
         if message.get_type() == "BAD_DATA":
             continue
+        if message.get_type() in PARAMETERS:
+            name, value = (getattr(message, field) for field in PARAMETERS[message.get_type()])
+            parameters[str(name)] = float(value)
         name, time, fields = _of_flash(message) if is_flash else _of_packet(message)
         if time is not None and fields:
             rows.setdefault(name, []).append((time, fields))
-    return rows
+    return rows, parameters
 
 
 def _flash(path: Path) -> Any:
-    its_own = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot").DFReader_binary
+    forms = library("pymavlink.DFReader", path, "a DataFlash log (ArduPilot)", "ardupilot")
+    with path.open("rb") as stream:
+        is_binary = stream.read(len(DATAFLASH)) == DATAFLASH
+    its_own = forms.DFReader_binary if is_binary else forms.DFReader_text
     # its compiled index writes a line for each damaged byte to the process's own stderr, where nothing keeps it from the user
-    kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})
+    kind: Any = type("Quiet", (its_own,), {"init_arrays_fast": its_own.init_arrays})  # the text form has none
     log = kind.__new__(kind)
     try:
         kind.__init__(log, str(path))
@@ -88,10 +127,11 @@ def _flash(path: Path) -> Any:
 
 def _of_flash(message: Any) -> tuple[str, float | None, dict[str, float]]:
     body = {k: v for k, v in message.to_dict().items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
-    stamp = body.pop("TimeUS", None)
-    which = getattr(message.fmt, "instance_field", None)
+    stamp, unit_s = (body.pop("TimeUS"), 1e-6) if "TimeUS" in body else (body.pop("TimeMS", None), 1e-3)
+    # without the units of its fields a format does not say which is the number of the sensor: then it stands behind the time
+    which = getattr(message.fmt, "instance_field", None) or ("I" if list(message.fmt.columns[1:2]) == ["I"] else None)
     name = f"{message.get_type()}[{int(body.pop(which))}]" if which in body else message.get_type()
-    return name, None if stamp is None else float(stamp) / 1e6, body
+    return name, None if stamp is None else float(stamp) * unit_s, body
 
 
 def _of_packet(message: Any) -> tuple[str, float | None, dict[str, float]]:
@@ -120,18 +160,19 @@ def _joined(messages: list[tuple[float, dict[str, float]]]) -> Topic | None:
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the messages with count, rate and first values; raises LogError for a damaged file, or without pymavlink."""
-    return inventory_of(path, "ArduPilot log", _topics(path), MEANS, _cut(path))
+    topics, means = _topics(path)
+    return inventory_of(path, "ArduPilot log", topics, means, _cut(path))
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped fields; raises MappingError for one that is not there, LogError as `inventory` does."""
-    return raw_log_of(path, _topics(path), mapping, _cut(path))
+    return raw_log_of(path, _topics(path)[0], mapping, _cut(path))
 
 
 READER = Reader(
     name="ardupilot",
-    says="ArduPilot log: .bin, .tlog, with the extra `ardupilot`",
-    suffixes=(".bin", ".BIN", ".tlog"),
+    says="ArduPilot log: .bin, its text form .log, .tlog, with the extra `ardupilot`",
+    suffixes=(".bin", ".BIN", ".log", ".tlog"),
     sniff=sniff,
     inventory=inventory,
     read=read,

@@ -15,16 +15,16 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers._cells import ERRORS, MISSING, cells, has_number, is_word
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
+from fieldsid.logs.readers._cells import ERRORS, MISSING, SENTENCE, cells, has_number, is_word
 from fieldsid.logs.readers._clock import Clock, clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, numbers_mostly, own_map_of, samples_of, series_of, used_by
 from fieldsid.logs.readers._growing import NUMBERS, GrowingColumn
 from fieldsid.logs.readers._plain_text import GZIP, HEAD, PlainText, plain_text
-from fieldsid.logs.readers._text import Form, form_of
+from fieldsid.logs.readers._text import LOOKED_AT, Form, form_of
 from fieldsid.logs.readers._unpacked_rows import LONGEST_ROW, refuse_endless
 from fieldsid.logs.run import Note
-from fieldsid.logs.unknown_file import COPY_AGAIN, is_text
+from fieldsid.logs.unknown_file import COPY_AGAIN, is_text, known_text
 
 _LINE = re.compile(r"line (\d+)")
 BLOCK_ROWS = 100_000
@@ -43,7 +43,7 @@ def sniff(path: Path) -> bool:
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
     """Return the columns with their count of numbers, the table's rate and the first values."""
-    with _opened(path, form, options) as table:
+    with opened(path, form, options) as table:
         columns = table.columns(range(table.form.width))
         clock = clock_of(columns, options.clock)
         channels = tuple(_channel(columns, i, clock) for i in range(table.form.width))
@@ -60,14 +60,14 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
     """Return the mapped columns; raises MappingError for a column that is not there, LogError for cells that are no numbers."""
-    with _opened(path, mapping.table, options) as table:
+    with opened(path, mapping.table, options) as table:
         columns = table.columns(used_by(mapping, table.form.names, table.form.width))
         return series_of(path, columns, mapping, tuple(table.notes), options)
 
 
 def columns_of(path: Path, form: TableForm, options: ReadOptions) -> tuple[Columns, tuple[Note, ...]]:
     """Return all columns of a table, and notes on it; raises LogError where it is none."""
-    with _opened(path, form, options) as table:
+    with opened(path, form, options) as table:
         return table.columns(range(table.form.width)), tuple(table.notes)
 
 
@@ -93,7 +93,8 @@ def _head_of(path: Path, text: PlainText) -> str:
 
 
 @contextmanager
-def _opened(path: Path, asked: TableForm, options: ReadOptions) -> Iterator[_Table]:
+def opened(path: Path, asked: TableForm, options: ReadOptions) -> Iterator[_Table]:
+    """Yield the table of a file, its text and the form in which it is written."""
     with plain_text(path, asked.encoding) as text:
         yield _Table(path, text, asked, options)
 
@@ -147,9 +148,11 @@ class _Table:
 
     def _cells(self, wanted: Sequence[int]) -> dict[int, npt.NDArray[Any]]:
         """Return the cells (n,) of the wanted columns; lines of words that do not fit the columns are left out."""
-        with TemporaryFile() as blanked, TemporaryFile() as plain:
-            if self.text.holds(ERRORS, self.begin, self.end):
+        with TemporaryFile() as blanked, TemporaryFile() as own, TemporaryFile() as plain:
+            if self.text.holds(ERRORS, b"#", self.begin, self.end):
                 self._without_errors(blanked)
+            if self.text.holds(SENTENCE, b"$", self.begin, self.end):
+                self._without_sentences(own)
             try:
                 return self._parsed(wanted)
             except LogError:
@@ -168,6 +171,21 @@ class _Table:
         self._turn_to(plain)
         message = f"cells that say there is no number, as {first.decode()!r}, taken as missing: {count}"
         self.notes.append(Note("error_cells", message, {"count": count}))
+
+    def _without_sentences(self, plain: IO[bytes]) -> None:
+        """Copy the rows, with an empty line for each sentence of NMEA among them; a log of nothing else stays as it is."""
+        found: list[bytes] = []
+        with self.text.between(self.begin, self.end) as rows:
+            for raw in rows:
+                is_sentence = SENTENCE.match(raw) is not None
+                found += [raw] if is_sentence else []
+                plain.write(b"\n" if is_sentence else raw)
+        if self.form.is_sentences:
+            return
+        self._turn_to(plain)
+        first = found[0].decode("latin-1").strip()[:60]
+        message = f"lines of another talker (NMEA 0183) between the rows, left out: {len(found)}, the first {first!r}"
+        self.notes.append(Note("nmea_lines", message, {"count": len(found)}))
 
     def _turn_to(self, plain: IO[bytes]) -> None:
         """Read the rows from a copy of them."""
@@ -233,7 +251,7 @@ class _Table:
         }
 
     def _misfit(self, error: Exception) -> LogError:
-        return LogError(
+        return known_text(self.path, self.text.head().splitlines()[:LOOKED_AT]) or LogError(
             f"`{self.path}` has a row that does not fit its {self.form.width} columns",
             found=_LINE.sub(lambda m: f"line {int(m[1]) + self.form.start}", str(error).strip().rpartition("error: ")[2]),
             hint=f"mend the line, or leave such rows out: {self.options.with_option('--salvage')}",
@@ -241,7 +259,8 @@ class _Table:
 
     def _count_bad_rows(self, kept: int) -> None:
         with self.text.between(self.begin, self.end) as rows:
-            lines = (line.strip() for line in rows)
+            # a quote that closes on a line of its own ends a cell, and is no row
+            lines = (line.strip(b"\"' \t\r\n") for line in rows)
             left_out = sum(1 for line in lines if line and not line.startswith(b"#")) - kept
         if left_out > 0:
             self.notes.append(
@@ -263,7 +282,7 @@ def _channel(columns: Columns, index: int, clock: Clock | None) -> ChannelInfo:
     seen = np.isfinite(values.astype(float)) if numeric else ~np.asarray(pd.isna(values))
     first: Sequence[Any] = values[seen][:3].tolist()
     kind = "number" if numeric else "text"
-    span = (float(values[seen].min()), float(values[seen].max())) if numeric and seen.any() else None
+    span = span_of(values) if numeric else None
     rate = clock.rate_hz(values) if clock else float("nan")
     unit = columns.units[index] if columns.units else None
     return ChannelInfo(columns.name(index), kind, int(seen.sum()), rate, (FieldInfo("", kind, tuple(first), span),), unit)

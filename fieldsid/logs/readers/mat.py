@@ -13,7 +13,7 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.reader import ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, span_of
 from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._mat_elements import refuse_damaged
@@ -131,7 +131,7 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
             "number",
             int(np.isfinite(values).sum()),
             clock.rate_hz(values) if clock else float("nan"),
-            (FieldInfo("", "number", tuple(values[:3].tolist())),),
+            (FieldInfo("", "number", tuple(values[:3].tolist()), span_of(values)),),
         )
         for name, values in ((n, columns.take(i)) for i, n in enumerate(columns.names))
     )

@@ -11,8 +11,8 @@ import numpy as np
 
 from fieldsid.errors import LogError
 from fieldsid.logs.channels import ChannelMap, TableForm
-from fieldsid.logs.mapping.canonical_names import TIME
-from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series
+from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, RawLog, Reader, ReadOptions, Series, span_of
 from fieldsid.logs.readers._clock import clock_of, why_no_clock
 from fieldsid.logs.readers._columns import Columns, own_map_of, samples_of, series_of
 from fieldsid.logs.readers._unpacked_rows import refuse_repeated
@@ -52,7 +52,7 @@ def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
         kind = "text" if cells.dtype.kind == "O" else "number"
         rate = clock.rate_hz(cells) if clock else float("nan")
         first = cells[:3].astype(str) if cells.dtype.kind == "M" else cells[:3]
-        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist())),)))
+        channels.append(ChannelInfo(name, kind, count, rate, (FieldInfo("", kind, tuple(first.tolist()), span_of(cells)),)))
     samples = samples_of(columns, clock.time, clock.source) if clock else None
     problem = why_no_clock(columns) if clock is None and options.clock is None else None
     duration, notes = (clock.duration_s, clock.notes) if clock else (float("nan"), ())

@@ -9,15 +9,15 @@ from pathlib import Path
 
 from fieldsid.logs.channels import ChannelMap, TableForm
 from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
-from fieldsid.logs.readers.bags.packets import keep_first
 from fieldsid.logs.readers.bags.stores import SUFFIXES, collected, is_bag
 
 
 def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
-    """Return topics with type, count, rate and the first values of every number inside."""
-    from fieldsid.logs.readers.bags.contents import contents_of
+    """Return topics with type, count, rate, and the first value, least and largest of every number inside."""
+    from fieldsid.logs.readers.bags.contents import Contents
 
-    return contents_of(path, collected(path, None, keep_first, options.progress), options)
+    contents = Contents(path, options)
+    return contents.inventory(collected(path, None, contents.settle, options.progress))
 
 
 def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:

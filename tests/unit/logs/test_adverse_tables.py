@@ -83,7 +83,7 @@ def test_a_fin_in_per_cent_is_not_taken_for_degrees(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(table("time,heading,rudder_percent", text(T, 1), H, text(300.0 * F["rudder"], 1)))
     found = inspect_log(path)
-    assert found.proposal.body["signals"]["rudder_rad"] == {"column": "rudder_percent", "unit": "counts", "centre": 0}
+    assert found.proposal.body["signals"]["rudder_rad"] == {"column": "rudder_percent", "unit": "%"}
     assert "counts" in {n.code for n in found.notes}
 
 

@@ -194,7 +194,13 @@ def test_the_messages_of_a_dune_log_are_those_of_the_definition_beside_it(tmp_pa
         "SetServomotorPosition[2]",
     }
     signals = found.proposal.body["signals"]
-    assert {s: i["field"] for s, i in signals.items()} == {"yaw_rad": "psi", "yaw_rate_rad_s": "r", "surge_m_s": "u"}
+    assert {s: i["field"] for s, i in signals.items()} == {
+        "yaw_rad": "psi",
+        "yaw_rate_rad_s": "r",
+        "surge_m_s": "u",
+        "rudder_rad": "value",
+    }
+    assert signals["rudder_rad"]["topic"] == "SetServomotorPosition[2]"
     body = {**found.proposal.body, "signals": {**signals, "rudder_rad": {"topic": "SetServomotorPosition[2]", "field": "value"}}}
     run = load_run(log, mapping_of(body))
     np.testing.assert_allclose(run["yaw_rad"], YAW, atol=1e-12)

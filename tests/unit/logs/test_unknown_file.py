@@ -10,6 +10,7 @@ import pytest
 
 from fieldsid.errors import LogError
 from fieldsid.logs import Run, load_run, save_run
+from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.reader import reader_of
 
 ULOG = b"ULog\x01\x12\x35\x01" + bytes(8)
@@ -115,3 +116,21 @@ def test_what_is_wrong_with_standard_input_names_no_file_of_ours(monkeypatch, tm
         load_run("-")
     assert "`sysid import - --salvage -o imported/`" in caught.value.hint
     assert "/stdin" not in str(caught.value)
+
+
+TEXTS = {
+    "NMEA 0183": "".join(f"$GPRMC,1235{k:02d},A,4807.0,N\n$GPGSA,A,3,{k},23,24,25,26,27\n!AIVDM,1,1,,A,15\n" for k in range(40)),
+    "JSON": "".join(f'{{"t": {0.1 * k:.1f}, "yaw": {k}}}\n' for k in range(40)),
+    "XML": '<?xml version="1.0"?>\n<gpx>\n' + "".join(f'<trkpt lat="{k}" lon="1"/>\n' for k in range(40)) + "</gpx>\n",
+    "CAN bus": "".join(f"(1700000000.{k:06d}) can0 09F10D{k % 16:X}0#FFFC7FFFFF7FFFFF\n" for k in range(40)),
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_text_that_is_no_table_is_said_by_name_and_not_to_be_mended(tmp_path, kind):
+    log = tmp_path / "log.txt"
+    log.write_text(TEXTS[kind])
+    with pytest.raises(LogError) as error:
+        load_run(log, mapping_of({"time": {"column": 0, "unit": "s"}, "signals": {"yaw_rad": 1}}))
+    assert kind in error.value.what
+    assert "mend" not in error.value.hint

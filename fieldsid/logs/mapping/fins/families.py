@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fieldsid.logs.mapping.word_meaning import COMMANDED, MEASURED, words_of
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import COMMANDED, MEASURED
 from fieldsid.logs.reader import Inventory
 
 CALLED = frozenset({

@@ -21,7 +21,7 @@ from fieldsid.logs.convert.units import pick_unit
 from fieldsid.logs.mapping.fins.families import Family, families, is_measured, is_on_starboard, is_thruster
 from fieldsid.logs.mapping.fins.shares import FinShares, fin_shares, window_mean
 from fieldsid.logs.mapping.mapping_file import mapping_of
-from fieldsid.logs.mapping.recognise import EXPLAINS, WINDOWS_S
+from fieldsid.logs.mapping.numbers.recognise import EXPLAINS, WINDOWS_S
 from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Series
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray

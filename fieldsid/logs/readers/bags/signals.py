@@ -76,15 +76,18 @@ def _topic(path: Path, collector: Collector, signal: str, source: Source) -> Non
             f"`{signal}` is mapped to a {source.label}, but `{path}` is a bag",
             found=source.label,
             hint="name a `topic` and a `field`",
+            signal=signal,
         )
     if source.topic not in collector.connections:
         raise MappingError(
             f"`{path}` has no topic `{source.topic}` for `{signal}`",
             found=", ".join(sorted(collector.connections)) or "no topics",
             hint=near(source.topic, list(collector.connections)),
+            signal=signal,
         )
     if not collector.packets[source.topic].stamps:
-        raise LogError(f"topic `{source.topic}` has no messages", found="0 messages", hint=f"map `{signal}` to another topic")
+        hint = f"map `{signal}` to another topic"
+        raise LogError(f"topic `{source.topic}` has no messages", found="0 messages", hint=hint, signal=signal)
     connection = collector.connections[source.topic]
     if not connection.is_decodable or source.topic in collector.mixed:
         if source.topic in collector.mixed:
@@ -92,7 +95,7 @@ def _topic(path: Path, collector: Collector, signal: str, source: Source) -> Non
         else:
             found = not_decodable(connection)
             hint = "convert it with `ros2 bag convert` where that format is installed, or record with `rmw_fastrtps_cpp`"
-        raise LogError(f"topic `{source.topic}` cannot be decoded", found=found, hint=hint)
+        raise LogError(f"topic `{source.topic}` cannot be decoded", found=found, hint=hint, signal=signal)
 
 
 def not_decodable(connection: Connection) -> str:

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fieldsid.logs.mapping.canonical_names import STEMS, canonical, canonical_names, unit_in_name
-from fieldsid.logs.mapping.word_meaning import meaning_of, words_of
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.run import SIGNALS
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs.channels import ATTITUDE, Source, Stamp
-from fieldsid.logs.mapping.canonical_names import unit_in_name
+from fieldsid.logs.mapping.canonical_names import unit_of_field
 from fieldsid.logs.reader import Series
 from fieldsid.logs.readers.bags.messages.definitions import AnyDecoder, DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.messages.message_layout import Layout, as_floats, numbers_at
@@ -57,7 +57,13 @@ class TopicSeries:
         """Return one signal's series, in seconds from `origin`."""
         path = self.paths[signal]
         last = path.rpartition(".")[2]
-        stated = "Pa" if self.connection.type_name == PRESSURE else unit_in_name(last, signal) if signal != ATTITUDE else None
+        stated = (
+            "Pa"
+            if self.connection.type_name == PRESSURE
+            else unit_of_field(self.connection.topic, path, signal)
+            if signal != ATTITUDE
+            else None
+        )
         label = f"{self.connection.topic}.{path}" if path else self.connection.topic
         return Series((stamps - origin) / 1e9, self.values[signal], label, stated, last == "z")
 
@@ -126,6 +132,7 @@ class TopicDecoding:
                     f"`{path}` of topic `{connection.topic}` is beyond the end, or never a number",
                     found=f"{values[signal].size} messages",
                     hint=f"map `{signal}` to another element",
+                    signal=signal,
                 )
 
 
@@ -168,10 +175,14 @@ def field_of(connection: Connection, layout: Layout, signal: str, path: str) -> 
             f"`{ATTITUDE}` needs a quaternion, not `{path}` of `{connection.topic}`",
             found=f"quaternions: {', '.join(quaternions_in(layout)) or 'none'}",
             hint="give the field that holds x, y, z, w",
+            signal=signal,
         )
     if len(places) == 4 and signal not in (ATTITUDE, "yaw_rad", "pitch_rad", "roll_rad"):
         raise MappingError(
-            f"`{signal}` cannot come from a quaternion", found=f"{connection.topic}.{path}", hint=f"name one number: `{path}.x`"
+            f"`{signal}` cannot come from a quaternion",
+            found=f"{connection.topic}.{path}",
+            hint=f"name one number: `{path}.x`",
+            signal=signal,
         )
     return path
 

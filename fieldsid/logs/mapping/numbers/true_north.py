@@ -16,7 +16,9 @@ import numpy.typing as npt
 
 from fieldsid.logs.convert.geodetic import north_and_east
 from fieldsid.logs.mapping.canonical_names import unit_in_name
-from fieldsid.logs.mapping.word_meaning import COMMANDED, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND, meaning_of, words_of
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import COMMANDED, LATITUDE, LONGITUDE, OF_ANOTHER, OVER_GROUND
+from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import Samples
 from fieldsid.logs.run import Note
 from fieldsid.numerics.arrays import FloatArray

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fieldsid.logs.convert.servo_counts import COUNTS, servo_of
 from fieldsid.logs.convert.units import KNOT
 from fieldsid.logs.reader import Samples
 from fieldsid.numerics.arrays import FloatArray
@@ -29,6 +30,7 @@ TURNS_ALONG = 0.6
 MOST_SLIP = 3.0
 """How many times as far a heading may turn as its course, or the course as the heading: sideslip lies between them."""
 MOST_WAYS = 30
+BEYOND_TILTS_DEG = 90.0
 FOLLOWS = 0.95
 """Correlation from which on one column is the derivative of another."""
 EXPLAINS = 0.3
@@ -133,7 +135,22 @@ def _ways(scene: _Scene, known: Mapping[str, str | int]) -> list[list[Recognised
             if heading not in (x, y):
                 middle = np.nan_to_num(scene.samples.columns[heading][scene.width // 2 :][: made.size])
                 found += _pointing(heading, (x, y), middle, way[x] + 1j * way[y])
-    return [way for _, way in sorted(found, key=lambda f: -f[0])[:MOST_WAYS]] or [[]]
+    ways = [way for _, way in sorted(found, key=lambda f: -f[0])[:MOST_WAYS]]
+    return ways or [[heading] for heading in _going_round(scene)] or [[]]
+
+
+def _going_round(scene: _Scene) -> list[Recognised]:
+    """Return the columns that may be a heading though no way is logged: they go beyond what tilts do, and have a derivative."""
+    found = []
+    for column in scene.free:
+        largest = float(np.nanmax(np.abs(scene.samples.columns[column])))
+        turned = scene.changes(np.unwrap(np.radians(np.nan_to_num(scene.samples.columns[column]))))
+        pairs = [(_alike(turned, _swept(scene, c)), c) for c in scene.free if c != column and largest > BEYOND_TILTS_DEG]
+        (trust, slope), rate = max(pairs, key=lambda p: p[0][0], default=((0.0, 0.0), ""))
+        if _is_rate(trust, slope):
+            why = f"it goes to {largest:.4g}, beyond tilts, and column {rate} is its derivative, correlation {trust:.3f}"
+            found.append(Recognised("yaw_rad", column, {"unit": "deg"}, why, trust))
+    return found
 
 
 def _with_rates(scene: _Scene) -> list[str | int]:
@@ -240,7 +257,8 @@ def _fin(scene: _Scene, known: Mapping[str, str | int], free: list[str | int], b
         return
     grows = scene.changes(rate) / scene.passed
     middle = rate[scene.width // 2 :][: grows.size]
-    means = {c: _mean(scene, c) for c in free if _about_zero(scene, c)}
+    deflected = {c: v for c in free if (v := _deflected(scene.samples.columns[c])) is not None}
+    means = {c: _mean(scene, v) for c, (v, _) in deflected.items()}
     shares = sorted(((_explained(grows, [middle], v), c) for c, v in means.items()), key=lambda s: -s[0])
     if not shares or shares[0][0] < EXPLAINS:
         return
@@ -250,11 +268,9 @@ def _fin(scene: _Scene, known: Mapping[str, str | int], free: list[str | int], b
     rival = max(others, key=lambda c: own[c], default=None)
     if rival is not None and own[column] < CLEARLY * own[rival]:
         return
-    largest = float(np.nanmax(np.abs(scene.samples.columns[column])))
-    unit = "deg" if largest > 1.6 else "rad"
     beside = "" if rival is None else f", {own[column] / max(own[rival], 1e-9):.3g} times what column {rival} adds to the others"
     why = f"it explains {100 * share:.0f} % of what the yaw rate's change has beside the rate's own{beside}"
-    yield Recognised("rudder_rad", column, {"unit": unit}, why)
+    yield Recognised("rudder_rad", column, deflected[column][1], why)
 
 
 def _turning(scene: _Scene, known: Mapping[str, str | int], before: list[Recognised]) -> FloatArray | None:
@@ -266,16 +282,35 @@ def _turning(scene: _Scene, known: Mapping[str, str | int], before: list[Recogni
     return np.gradient(yaw, np.nan_to_num(scene.samples.time) + 1e-9 * np.arange(yaw.size))
 
 
-def _mean(scene: _Scene, column: str | int) -> FloatArray:
-    """Return a column's mean (n,) over each window: what turns a rate over it."""
-    total = np.cumsum(np.nan_to_num(scene.samples.columns[column]))
-    return scene.changes(total) / scene.width
+def _mean(scene: _Scene, values: FloatArray) -> FloatArray:
+    """Return the mean (n,) of numbers over each window: what turns a rate over it."""
+    return scene.changes(np.cumsum(np.nan_to_num(values))) / scene.width
 
 
-def _about_zero(scene: _Scene, column: str | int) -> bool:
-    values = scene.samples.columns[column]
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    return low < 0.0 < high and min(-low, high) > 0.2 * max(-low, high) and high < 90.0
+def _deflected(values: FloatArray) -> tuple[FloatArray, dict[str, Any]] | None:
+    """Return numbers (n,) of both sides of zero, or of a servo's centre, with how they are read; None where they are neither."""
+    servo = servo_of(values)
+    centred = values if servo is None else values - servo.centre
+    low, high = float(np.nanmin(centred)), float(np.nanmax(centred))
+    if not (low < 0.0 < high and min(-low, high) > 0.2 * max(-low, high) and (high < 90.0 or servo is not None)):
+        return None
+    if servo is not None:
+        return centred, {"unit": COUNTS, "centre": round(servo.centre)}
+    return centred, {"unit": "deg" if high > 1.6 else "rad"}
+
+
+def moving_fin(samples: Samples, known: Mapping[str, str | int], outputs: list[str | int]) -> Recognised | None:
+    """Return which of some outputs the yaw rate follows, where one does clearly; `known` has the yaw rate, or the heading."""
+    usual = np.diff(samples.time)
+    if usual.size < 50:
+        return None
+    moving = [c for c in outputs if _moves(samples.columns[c])]
+    found = [
+        fin
+        for window in WINDOWS_S
+        for fin in _fin(_Scene(samples, max(1, round(window / float(np.median(usual)))), moving), known, moving, [])
+    ]
+    return found[0] if found else None
 
 
 def _explained_alone(

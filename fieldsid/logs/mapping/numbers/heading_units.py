@@ -32,6 +32,13 @@ def unit_of_wraps(values: FloatArray) -> str:
     return next((u for u, turn in turns.items() if OF_A_TURN * turn <= jump <= span <= turn), "deg")
 
 
+def wraps_in_rad(values: FloatArray) -> bool:
+    """Whether a heading (n,) or (n, 4) jumps by nearly a turn in rad where it wraps."""
+    seen = values[np.isfinite(values)] if values.ndim == 1 else values[:0, 0]
+    jump, span = float(np.abs(np.diff(seen)).max(initial=0.0)), float(np.ptp(seen)) if seen.size else 0.0
+    return 2.0 * np.pi * OF_A_TURN <= jump <= span <= 2.0 * np.pi * 1.01
+
+
 def heading_in_doubt(values: FloatArray, signals: Mapping[str, Any]) -> list[Note]:
     """Say of a heading (n,) taken for degrees by its size what else it may be, where no rate and no position tells."""
     unit = signals["yaw_rad"].get("unit")

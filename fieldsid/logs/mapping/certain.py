@@ -1,0 +1,90 @@
+"""Whether a proposed mapping may be used unasked: what an axis needs is told by names, agrees with the numbers, has its units.
+
+What is in doubt is said with its reason. A mapping is asked for where an axis needs it, and it is left out where none does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from fieldsid.logs.channels import ANGLES, ATTITUDE, ChannelMap, is_enough
+from fieldsid.logs.doctor.angle_and_rate import CONTRADICTING
+from fieldsid.logs.mapping.draft import place_of
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.trial import Proposal
+from fieldsid.logs.mapping.vocabulary import OVER_GROUND
+from fieldsid.logs.run import READ_AS, Note
+
+SAID: Mapping[str, str] = MappingProxyType(
+    {"alternatives": "it may be another one", "left_out": "it cannot be read", "frame_open": "port and starboard are open",
+     "course_against": "the course goes against it", "course_slope": "the course turns otherwise", "unit": "its unit is open",
+     "course_offset": "the course is off it", "fin_range": "no fin goes so far", "fin_late": "the motion comes before it",
+     "rate_scale": "angle and rate differ", "constant": "it never moves", "speed_unit": "its unit is open",
+     "depth_unit": "its unit is open", "dive_sign": "its sign is open", "speed_sign": "its sign is open"}
+    | dict.fromkeys(CONTRADICTING - {"unit"}, "angle and rate contradict each other")
+)  # fmt: skip
+"""Codes of notes that put the signal they name in doubt, and how that is said."""
+OF_ALL = frozenset({"rate_guessed", "time_guessed", "time_unit"})
+"""Codes of notes that put the time in doubt, and all with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Certain:
+    """A mapping that is used unasked with the note that says it, or none; and why signals are in doubt."""
+
+    mapping: ChannelMap | None
+    note: Note | None
+    doubts: Mapping[str, str]
+
+
+def certain_of(proposal: Proposal) -> Certain:
+    """Return what of a proposed mapping is beyond doubt, where that is all that an axis needs."""
+    from fieldsid.logs.mapping.mapping_file import mapping_of
+
+    signals = proposal.body["signals"]
+    notes = (*proposal.notes, *(() if proposal.run is None else proposal.run.notes))
+    doubts = _doubts(signals, notes)
+    sure = {s: item for s, item in signals.items() if s not in doubts}
+    if proposal.run is None or not is_enough(sure) or any(n.code in OF_ALL for n in notes):
+        return Certain(None, None, MappingProxyType(doubts))
+    return Certain(mapping_of(proposal.body | {"signals": sure}), _said(sure, doubts), MappingProxyType(doubts))
+
+
+def _doubts(signals: Mapping[str, Any], notes: Iterable[Note]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for note in notes:
+        named = (note.data.get("signal"), *note.data.get("signals", ()))
+        if note.code == "unit_assumed":
+            found |= dict.fromkeys(note.data["signals"], "nothing tells its unit")
+        elif note.code == "evidence" and ({"column", "outputs"} & note.data.keys() or "sign" in str(note.data.get("finding"))):
+            found[note.data["signal"]] = "only the numbers say so"
+        elif note.code in SAID:
+            found |= {s: SAID[note.code] for s in named if s in signals or s in ANGLES}
+    if ATTITUDE in signals and set(ANGLES) & found.keys():
+        found[ATTITUDE] = found[next(s for s in ANGLES if s in found)]
+    if OVER_GROUND & set(words_of(place_of(signals.get("yaw_rad", {})))):
+        found["yaw_rad"] = "it may be a course over ground"
+    return found
+
+
+def _said(sure: Mapping[str, Any], doubts: Mapping[str, str]) -> Note:
+    """Return the line that says how a log is read: each signal with its place and unit, and what was left out."""
+    parts = [f"{_short(s)} from {place_of(item)}{_unit(item)}" for s, item in sure.items()]
+    left = [f"{_short(s)} ({why})" for s, why in doubts.items()]
+    message = f"read as: {', '.join(parts)}" + (f"; left out: {', '.join(left)}" if left else "")
+    return Note(READ_AS, message, {"signals": list(sure), "left_out": list(doubts)})
+
+
+def _short(signal: str) -> str:
+    """Return a signal without its unit, as `yaw rate` for yaw_rate_rad_s."""
+    for suffix in ("_rad_s", "_m_s", "_rad", "_m"):
+        signal = signal.removesuffix(suffix)
+    return signal.replace("_", " ")
+
+
+def _unit(item: Mapping[str, Any]) -> str:
+    centre = f" about {item['centre']:g}" if "centre" in item else ""
+    return f" ({item['unit']}{centre})" if "unit" in item else ""

@@ -1,0 +1,126 @@
+"""Tables of one reading a row, `Timestamp, Key, Value`: each key is a topic on a clock of its own.
+
+So write FRC's and Influx's exporters, Signal K and many programs of one's own; a key whose values are words is no topic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fieldsid.errors import LogError
+from fieldsid.logs.channels import ChannelMap, TableForm
+from fieldsid.logs.convert.number_cells import as_numbers
+from fieldsid.logs.convert.times.time_column import seconds_of
+from fieldsid.logs.mapping.name_words import words_of
+from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.word_meaning import meaning_of
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
+from fieldsid.logs.readers import csv_table
+from fieldsid.logs.readers._cells import cells, is_word
+from fieldsid.logs.readers._clock import unit_by_size
+from fieldsid.logs.readers._columns import Columns
+from fieldsid.logs.readers._plain_text import HEAD, plain_text
+from fieldsid.logs.readers._text import Form, form_of
+from fieldsid.logs.readers._topics import DATA, Topic, inventory_of, raw_log_of, topic_of
+from fieldsid.logs.run import Note
+from fieldsid.numerics.arrays import FloatArray
+
+KEYS = frozenset({"key", "name", "variable", "signal", "topic", "field", "channel", "parameter", "path", "tag", "entry"})
+VALUES = frozenset({"value", "val", "data", "reading"})
+"""Words of the column that says what was read, and of that which holds it."""
+LOOKED_AT = 200
+FEWEST, OFTEN = 2, 3
+"""Keys that there must be, and how often one returns on the average."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """The columns of the time, the key and the value."""
+
+    time: int
+    key: int
+    value: int
+
+
+def sniff(path: Path) -> bool:
+    """Whether a text table has a column of times, one of few words that return, and one of what was read."""
+    if not csv_table.sniff(path):
+        return False
+    try:
+        with plain_text(path, limit=HEAD) as text:
+            head = text.head()
+            form = form_of(head, TableForm(), path)
+    except LogError:  # the reader of tables says what is wrong
+        return False
+    return _places(form, head) is not None
+
+
+def _places(form: Form, head: str) -> _Places | None:
+    names = [set(words_of(name)) for name in form.names]
+    times = [i for i, name in enumerate(form.names) if (meaning := meaning_of(name)) is not None and meaning[0] == TIME]
+    keys = [i for i, words in enumerate(names) if words & KEYS and i not in times]
+    values = [i for i, words in enumerate(names) if words & VALUES and i not in times]
+    rows = [cells(line, form.separator) for line in head.splitlines()[form.start :][:LOOKED_AT]]
+    rows = [row for row in rows if len(row) == form.width]
+    for time, key, value in ((t, k, v) for t in times for k in keys for v in values if k != v):
+        said = [row[key] for row in rows]
+        are_words = all(is_word(word, form.decimal) for word in said)
+        if are_words and FEWEST <= len(set(said)) <= len(said) / OFTEN and any(not is_word(r[value], form.decimal) for r in rows):
+            return _Places(time, key, value)
+    return None
+
+
+def _topics(path: Path, options: ReadOptions) -> tuple[dict[str, Topic], tuple[Note, ...]]:
+    """Return the keys whose values are numbers as topics of one number, in the order of their times."""
+    with csv_table.opened(path, TableForm(), options) as table:
+        with plain_text(path, limit=HEAD) as text:
+            places = _places(table.form, text.head())
+        if places is None:
+            raise LogError(f"`{path}` is no table of keys and values", found=", ".join(table.form.names), hint="name its columns")
+        columns = table.columns((places.time, places.key, places.value))
+        time, notes = _times(columns, places.time)
+        said = columns.take(places.key).astype(str)
+        values = as_numbers(columns.take(places.value))[0]
+        found = {str(key): _topic(time, values, said == key) for key in np.unique(said)}
+        return {k: t for k, t in found.items() if t is not None}, (*table.notes, *notes)
+
+
+def _times(columns: Columns, place: int) -> tuple[FloatArray, list[Note]]:
+    """Return the times (n,) of the rows in s: several readings may have one, which makes it no coarse stamp."""
+    import pandas as pd
+
+    rows, stamps = pd.factorize(columns.take(place))
+    unit = columns.unit(place, TIME) or unit_by_size(stamps)
+    time, notes = seconds_of(stamps, unit, ReadOptions(salvage=True), name=columns.name(place))
+    return np.where(rows >= 0, time[rows], np.nan), notes
+
+
+def _topic(time: FloatArray, values: FloatArray, rows: npt.NDArray[np.bool_]) -> Topic | None:
+    seen = rows & np.isfinite(values)
+    return topic_of(time[seen], {DATA: values[seen]})
+
+
+def inventory(path: Path, options: ReadOptions, form: TableForm) -> Inventory:
+    """Return the keys whose values are numbers, with count, rate, least and largest."""
+    topics, notes = _topics(path, options)
+    return inventory_of(path, "key-value table", topics, {}, notes, kind="key")
+
+
+def read(path: Path, mapping: ChannelMap, options: ReadOptions) -> RawLog:
+    """Return the mapped keys; raises MappingError for one that is not there."""
+    topics, notes = _topics(path, options)
+    return raw_log_of(path, topics, mapping, notes)
+
+
+READER = Reader(
+    name="key_value",
+    says="text table of one reading a row: time, key, value",
+    suffixes=(".csv", ".csv.gz", ".tsv", ".txt"),
+    sniff=sniff,
+    inventory=inventory,
+    read=read,
+)

@@ -1,0 +1,64 @@
+"""A log without a mapping is read where nothing an axis needs is in doubt, and it is said how; else a mapping is asked for."""
+
+import numpy as np
+import pytest
+from look_alikes import A22, B2, truth, write_table
+
+TRUTH = truth(seconds=100.0)
+DEG = np.pi / 180.0
+CLEAR = {"Time [s]": ("time_s", 1.0), "HeadDeg": ("yaw_rad", DEG), "GyroZ_dps": ("yaw_rate_rad_s", DEG),
+         "RudderDeg": ("rudder_rad", DEG), "SpeedKts": ("surge_m_s", 1852 / 3600)}  # fmt: skip
+
+
+def written(folder, **changed):
+    columns = {name: TRUTH[signal] / factor for name, (signal, factor) in (CLEAR | changed).items() if signal}
+    return write_table(folder / "boat.csv", columns)
+
+
+def test_identify_reads_what_is_clear_and_says_how_in_one_line(run_cli, tmp_path):
+    done = run_cli("identify", written(tmp_path), "--axis", "yaw", "--no-figures", "--json")
+    assert done.code == 0, done.err
+    fit = done.json["fits"][0]
+    assert fit["parameters"]["a22"]["value"] == pytest.approx(A22, rel=0.01)
+    assert fit["parameters"]["b2"]["value"] == pytest.approx(B2, rel=0.01)
+    assert fit["speed_m_s"] == pytest.approx(1.5, rel=0.01)
+    said = [line for line in done.err.splitlines() if line.startswith("read as: ")]
+    assert said == [
+        "read as: yaw from HeadDeg (deg), yaw rate from GyroZ_dps (deg/s), surge from SpeedKts (kn), rudder from RudderDeg (deg)"
+    ]
+    assert "read_as" not in {w["code"] for w in fit["warnings"]}
+
+
+@pytest.mark.parametrize("command", ["diagnose", "live", "batch"])
+def test_the_other_commands_read_it_too(run_cli, tmp_path, command):
+    more = {"live": ("--speed", "0"), "batch": ("-o", tmp_path / "out")}.get(command, ())
+    done = run_cli(command, written(tmp_path), "--axis", "yaw", *more, "--json")
+    assert done.code == 0, done.err
+
+
+def test_what_no_axis_needs_and_has_no_unit_is_left_out_and_said(run_cli, tmp_path):
+    done = run_cli("identify", written(tmp_path, SpeedKts=("", 1.0), speed=("surge_m_s", 1.0)), "--axis", "yaw", "--no-figures")
+    assert done.code == 0, done.err
+    assert "left out: surge (nothing tells its unit)" in done.err
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"RudderDeg": ("", 1.0), "rudder": ("rudder_rad", 1.0)}, "rudder_rad (nothing tells its unit)"),
+        ({"GyroZ_dps": ("yaw_rate_rad_s", 1.0)}, "yaw_rad"),
+        ({"RudderDeg": ("", 1.0), "port": ("rudder_rad", DEG)}, "rudder_rad (only the numbers say so)"),
+    ],
+    ids=["a fin without a unit", "a rate that contradicts its unit", "a fin without a name"],
+)
+def test_what_is_in_doubt_asks_for_a_mapping_and_says_why(run_cli, tmp_path, changed, why):
+    done = run_cli("identify", written(tmp_path, **changed), "--axis", "yaw", "--no-figures")
+    assert done.code == 2
+    assert "sysid inspect" in done.err
+    assert why in done.err
+
+
+def test_an_import_still_asks_for_a_mapping(run_cli, tmp_path):
+    done = run_cli("import", written(tmp_path), "-o", tmp_path / "runs")
+    assert done.code == 2
+    assert "--write-mapping" in done.err
