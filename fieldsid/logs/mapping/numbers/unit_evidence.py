@@ -31,7 +31,7 @@ def assumed_units(run: Run, known: Collection[str]) -> tuple[str, ...]:
     if _all_there(run, "depth_m", "pitch_rad", "surge_m_s") and goes_with_depth(run):
         agreeing += [{"depth_m", "surge_m_s"}]
     sure |= {s for both in agreeing if both & sure for s in both}
-    return tuple(s for s in run.signals if run.has(s) and s not in sure and s not in NEEDS_NONE)
+    return tuple(s for s in run.signals if s in SIGNALS and run.has(s) and s not in sure and s not in NEEDS_NONE)
 
 
 def _all_there(run: Run, *signals: str) -> bool:

@@ -66,13 +66,13 @@ def test_a_fin_in_pulses_or_in_shares_of_its_range_is_taken_about_its_centre(tmp
     np.testing.assert_allclose(scaled["rudder_rad"], TRUTH["rudder_rad"], atol=1e-6)
 
 
-@pytest.mark.parametrize(("values", "unit"), [(1500.0 + 800.0 * TRUTH["rudder_rad"], "counts, centre: 1500"),
-                                              (np.degrees(TRUTH["rudder_rad"]), "deg")])  # fmt: skip
+@pytest.mark.parametrize(("values", "unit"), [(1500.0 + 800.0 * TRUTH["rudder_rad"], "`unit: counts` and `centre: 1500`"),
+                                              (np.degrees(TRUTH["rudder_rad"]), "`unit: deg`")])  # fmt: skip
 def test_a_fin_of_more_than_half_a_turn_is_refused_with_its_unit(tmp_path, values, unit):
     run = mapped(tmp_path, np.round(values))
     with pytest.raises(DataError, match="no angle in rad") as error:
         record_of(run, Axis.YAW)
-    assert f"`unit: {unit}`" in error.value.hint
+    assert unit in error.value.hint
 
 
 @pytest.mark.parametrize(("name", "unit"), [("Rudder Cmd (%)", "%"), ("rudder_pct", "%"), ("servo_rudder_us", "us")])

@@ -90,7 +90,7 @@ def test_a_channel_stands_for_the_whole_sum(tmp_path):
         ({"sum": [{"column": "a"}], "unit": "deg"}, "has `unit` beside its `sum`"),
         ({"sum": [{"column": "a", "scale": 0}]}, "scale of zero"),
         ({"sum": [{"column": "a", "unit": "N"}]}, "`rudder_rad[0]`"),
-        ({"sum": [{"column": "a", "unit": "fathom", "scale": 2}]}, "no unit 'fathom'"),
+        ({"sum": [{"column": "a", "unit": "bushel", "scale": 2}]}, "no unit 'bushel'"),
         ({"sum": [{"column": "a", "centre": 1500}]}, "`centre` without counts"),
         ({"sum": [{}]}, "needs one of"),
         ({"sum": []}, "sum"),
