@@ -23,7 +23,7 @@ def bound_by(search: Search, found: Found) -> str:
     outcome = search.at(share, max(found.more, search.needed(share))).outcome
     lacks = dict(zip(_words(demand, wish), (*outcome.own, *outcome.drawn), strict=True))
     most = max(lacks, key=lambda name: lacks[name])
-    return most if lacks[most] > 0.0 else "the fin's lag and rate: more gain settles no sooner"
+    return most if lacks[most] > 0.0 else "the step itself: more gain settles no sooner"
 
 
 def _fin(demand: Demand) -> str:
