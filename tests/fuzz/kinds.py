@@ -18,6 +18,7 @@ from bags import MAPPING, write_bag
 from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
 from cli import trial
 from fuzz.mutate import Spoil, spoil_bytes, spoil_column, spoil_parquet, spoil_sqlite, spoil_text, spoil_yaml
+from look_alikes import write_key_value, write_text_dataflash
 
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.cli.app import run as command
@@ -275,6 +276,8 @@ KINDS = (
     Kind("ros1_bz2", bag("ros1", "bz2"), (spoil_bytes,), BAG),
     Kind("ulog", written(write_ulog, "log.ulg"), (spoil_bytes,), (inspected,)),
     Kind("ardupilot", written(write_dataflash, "log.bin"), (spoil_bytes,), (inspected,)),
+    Kind("text_dataflash", written(write_text_dataflash, "log.log"), (spoil_text, spoil_bytes), (inspected,)),
+    Kind("key_value", written(write_key_value, "log.csv"), (spoil_text, spoil_bytes), (inspected,)),
     Kind("slocum", written(write_dbd, "log.dbd"), (spoil_bytes, spoil_text), (inspected,)),
     Kind("mat", written(write_mat, "log.mat"), (spoil_bytes,), LOG),
     Kind("alog", written(write_alog, "log.alog"), (spoil_text, spoil_bytes), (inspected,)),
