@@ -73,3 +73,15 @@ def write_dataflash_text(path, run, parameters=(), outputs=14, rudder=3, per_rad
         lines += [f"IMU, {stamp}, {i}, 0.0, 0.0, {run['yaw_rate_rad_s'][k] + 1e-4 * i:.6f}" for i in (0, 1)]
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+def write_key_value(path, time, signals):
+    """Write signals (n,) at times (n,) as one reading a row: time, key, value."""
+    lines = [f"{float(t)!r},{name},{float(v[k])!r}\n" for k, t in enumerate(time) for name, v in signals.items()]
+    path.write_text("Timestamp,Key,Value\n" + "".join(lines))
+    return path
+
+
+def write_text_dataflash(path, time, signals):
+    """Write signals by canonical name at times (n,) as ArduPilot's text log."""
+    return write_dataflash_text(path, {"time_s": time, **signals}, (("SERVO3_FUNCTION", 26),), outputs=4)

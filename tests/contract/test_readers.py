@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from bags import MAPPING, write_bag
 from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
+from look_alikes import write_key_value
 
 from fieldsid.errors import LogError, MappingError
 from fieldsid.logs import Run, load_run, save_run
@@ -84,9 +85,7 @@ def as_tables(folder):
 
 
 def as_key_value(folder):
-    lines = [f"{t!r},{name},{float(v[k])!r}\n" for k, t in enumerate(map(float, TIME)) for name, v in SIGNALS.items()]
-    (folder / "log.csv").write_text("Timestamp,Key,Value\n" + "".join(lines))
-    return folder / "log.csv", by_topic({n: (n, "data") for n in SIGNALS})
+    return write_key_value(folder / "log.csv", TIME, SIGNALS), by_topic({n: (n, "data") for n in SIGNALS})
 
 
 MADE = {

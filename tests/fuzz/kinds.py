@@ -30,6 +30,7 @@ from fuzz.mutate import (
     spoil_text,
     spoil_yaml,
 )
+from look_alikes import write_key_value, write_text_dataflash
 
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.cli.app import run as command
@@ -512,6 +513,8 @@ KINDS = (
     Kind("ros1_bz2", bag("ros1", "bz2"), (spoil_bytes,), BAG),
     Kind("ulog", written(write_ulog, "log.ulg"), (spoil_bytes,), (inspected,)),
     Kind("ardupilot", written(write_dataflash, "log.bin"), (spoil_bytes,), (inspected,)),
+    Kind("text_dataflash", written(write_text_dataflash, "log.log"), (spoil_text, spoil_bytes), (inspected,)),
+    Kind("key_value", written(write_key_value, "log.csv"), (spoil_text, spoil_bytes), (inspected,)),
     Kind("slocum", written(write_dbd, "log.dbd"), (spoil_bytes, spoil_text), (inspected,)),
     Kind("mat", written(write_mat, "log.mat"), (spoil_bytes,), LOG),
     Kind("alog", written(write_alog, "log.alog"), (spoil_text, spoil_bytes), (inspected,)),
