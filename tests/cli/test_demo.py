@@ -39,7 +39,7 @@ def test_the_tour_is_told_on_one_screen_and_ends_with_the_report(tour):
     assert sum(1 + len(line) // 80 for line in told.splitlines()) <= 30
     assert tour["steps"][-1]["command"] == f"sysid report {tour['folder']}"
     assert Path(tour["folder"], "report.html").is_file()
-    assert "servo_lag, probability 0.97" in told
+    assert "servo_lag, probability 0.99" in told
 
 
 def test_briefly_each_command_is_a_line_and_verbosely_all_that_it_says(run_cli, tmp_path, monkeypatch):

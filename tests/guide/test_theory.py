@@ -8,7 +8,7 @@ import pytest
 from guide.make import GUIDE
 
 from fieldsid.diagnosis import thresholds
-from fieldsid.diagnosis.search import speed_law_search
+from fieldsid.diagnosis.moves import speed_law_search
 from fieldsid.fitting import auto_method
 from fieldsid.fitting.checks import parameter_checks, score_tests
 from fieldsid.fitting.covariance import reml

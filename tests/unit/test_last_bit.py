@@ -11,8 +11,8 @@ import pytest
 
 from fieldsid.diagnosis.data.holdout_split import holdout_split
 from fieldsid.diagnosis.evidence import likelihood_fit, noise_kind
+from fieldsid.diagnosis.moves import speed_law_search
 from fieldsid.diagnosis.parallel_map import ParallelMap
-from fieldsid.diagnosis.search import speed_law_search
 from fieldsid.effects import pick_effect
 from fieldsid.fitting.initial.joint_grid_search import _first_least
 from fieldsid.fitting.problem.parameters import layout_of, speed_groups
@@ -158,7 +158,7 @@ def test_white_noise_is_of_the_first_kind_whatever_the_last_bit_says(monkeypatch
     monkeypatch.setattr(noise_kind, "has_sensor_colour", lambda _judged: False)
     monkeypatch.setenv("FIELDSID_IS_WORKER", "1")
     start = SimpleNamespace(problem=None, x=None)
-    assert noise_kind.fit_base(start, FLOOR, FLOOR, "", ParallelMap((), ())).noise_kind == kind
+    assert noise_kind.fit_base(start, FLOOR, FLOOR, ParallelMap((), ())).noise_kind == kind
 
 
 @pytest.mark.parametrize(("speeds", "asks"), [((1.4, UP), False), ((1.4, 1.42), True)])
@@ -170,4 +170,6 @@ def test_the_other_law_of_the_speed_is_asked_for_runs_of_several_speeds_only(mon
     monkeypatch.setattr(speed_law_search, "_snapped", lambda *_of, **_how: (None, None))
     monkeypatch.setattr(speed_law_search, "under_other_speed_law", lambda *_of: (None, None))
     monkeypatch.setattr(speed_law_search, "_better", lambda *_of: "asked")
-    assert speed_law_search.other_speed_law(h, FLOOR, "disturbance", asks_for_more=True) == ("asked" if asks else None)
+    monkeypatch.setattr(speed_law_search, "leaves_error", lambda *_of: True)
+    found = speed_law_search.other_speed_law(h, SimpleNamespace(floor=FLOOR))
+    assert found == ("asked" if asks else None)

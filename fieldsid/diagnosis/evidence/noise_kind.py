@@ -21,20 +21,18 @@ from fieldsid.models.model import Noise
 from fieldsid.noise.noise_kinds import JOINT_NOISE, SINGLE_NOISE_KINDS
 
 
-def fit_base(
-    fitted: FittedProblem, floor: Noise, resolution_floor: Noise, noise_kind: str, parallel: ParallelMap
-) -> LikelihoodFit:
-    """Return the base model under the kind of noise given; without one under the likeliest, or both together where that is so.
+def fit_base(fitted: FittedProblem, floor: Noise, resolution_floor: Noise, parallel: ParallelMap) -> LikelihoodFit:
+    """Return the base model under the likeliest kind of noise, or both kinds together where that is so.
 
     White noise is a member of every kind: a later kind is taken only where it gains more than MIN_LIKELIHOOD_GAIN.
     """
     best, *others = parallel.map(
         lambda f: fit_maximum_likelihood(fitted.problem, fitted.x, floor, resolution_floor, f),
-        (noise_kind,) if noise_kind else SINGLE_NOISE_KINDS,
+        SINGLE_NOISE_KINDS,
     )
     for other in others:
         best = other if other.log_likelihood > best.log_likelihood + MIN_LIKELIHOOD_GAIN else best
-    return joint_noise_fit(best, parallel) if not noise_kind and has_sensor_colour(best) else best
+    return joint_noise_fit(best, parallel) if has_sensor_colour(best) else best
 
 
 def joint_noise_fit(own: LikelihoodFit, parallel: ParallelMap) -> LikelihoodFit:

@@ -13,7 +13,6 @@ from fieldsid.diagnosis.evidence.acceptance import (
     errs_less,
     gains_any_evidence,
     gains_evidence,
-    gains_training_evidence,
     leaves_error,
     only_validation_shows,
     worst_error,
@@ -88,6 +87,9 @@ class Growth:
         self.evaluate(by_effects([move for move in later if move.screened.effect.name in leading]), every=True)
         if self._prefer_output_error(refit=True):
             self._prefer_output_error(refit=False)
+        if is_root and self._is_lost(tried.children(self.key)):
+            rest = [e for e in self.effects if e.variants and self.key | {e.name} not in tried]
+            self.evaluate(by_effects(screen_addition(Addition(self.parent, rest), self.grounds.parallel)))
         if self.may_refine():
             self._try_laws_and_variants(self._leading())
 
@@ -213,6 +215,11 @@ class Growth:
             return True
         return self.grounds.explained_share(self.tried[self.key], h) >= MAIN_EXPLAINED_SHARE
 
+    def _is_lost(self, children: Sequence[ScoredModel]) -> bool:
+        """Whether the parent errs far and no child gains evidence: what is missing may be any of them in another variant."""
+        large = self.grounds.error_ratio(self.tried[self.key]) > MISSING_ERROR_RATIO
+        return large and not any(gains_evidence(self.tried[self.key], child) for child in children)
+
     def _try_laws_and_variants(self, names: Sequence[Names]) -> None:
         """Try another speed law and other variants of the effects for some children, kept where they have more evidence.
 
@@ -220,9 +227,8 @@ class Growth:
         be any of them in another variant, whatever follows the training runs alone.
         """
         tried, parent = self.tried, self.tried[self.key]
-        large = self.grounds.error_ratio(parent) > MISSING_ERROR_RATIO
-        lost = large and not any(gains_evidence(parent, tried[n]) for n in names)
+        lost = self._is_lost([tried[n] for n in names])
         names = [frozenset(c.names) for c in tried.children(self.key)] if lost else names
         helping = [n for n in names if lost or gains_any_evidence(parent, tried[n])]
-        under_other_law([n for n in names if gains_training_evidence(parent, tried[n])], tried, self.grounds)
+        under_other_law(names, tried, self.grounds)
         try_variants([VariantRequest(tried[n], n - self.key) for n in helping], tried, self.grounds)

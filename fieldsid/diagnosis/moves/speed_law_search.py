@@ -82,11 +82,34 @@ def under_other_law(names: Sequence[Names], tried: Archive, grounds: Grounds) ->
     """Fit models under another speed law, and keep that where it has more evidence."""
 
     def other(key: Names) -> ScoredModel | None:
-        found = other_speed_law(tried[key], grounds)
+        found = other_law(tried[key], grounds)
         return None if found is None else grounds.flown(found)
 
     others = grounds.parallel.map(other, names)
     tried.update({key: found for key, found in zip(names, others, strict=True) if found is not None})
+
+
+def other_law(h: ScoredModel, grounds: Grounds) -> ScoredModel | None:
+    """Return a model under another law of the speed, of the trim, or both, where that has more evidence; None elsewhere."""
+    found = other_speed_law(h, grounds)
+    trimmed = _other_trim_law(h if found is None else found, grounds)
+    return found if trimmed is None else trimmed
+
+
+def _other_trim_law(h: ScoredModel, grounds: Grounds) -> ScoredModel | None:
+    """Return a model under the other law of the trim where that has more evidence, None elsewhere.
+
+    A first effect may favour the law that the whole set does not; an effect that is missing may have turned the base to the wrong
+    one.
+    """
+    problem, varying = h.likelihood_fit.fitted.problem, any(e.terms is not None for e in h.effects)
+    layout, usual = problem.layout, TRIM_OF_FIN[problem.layout.axis]
+    possible = possible_trims(speed_groups(problem.records, width=FINE_GROUP_WIDTH), varying=varying)
+    for trim in (trim for trim in possible if trim != layout.groups.trim_of_fin):
+        other = replace(problem, layout=replace(layout, groups=replace(layout.groups, trim_of_fin=trim)))
+        worth = 0.0 if trim == usual else ALTERNATIVE_LOG_ODDS
+        return _better(h, (other, h.likelihood_fit.fitted.x), grounds, worth)
+    return None
 
 
 def other_speed_law(h: ScoredModel, grounds: Grounds) -> ScoredModel | None:

@@ -101,7 +101,7 @@ def _named(search: Search, verdict: Verdict, found: ScoredModel, left: Left, flo
         ended = (f", to {sized(search, r, floor)} with {n}" for n, r in others.items() if len(r.names) > len(found.names))
         both = f"{names} or {', '.join(others)}: these data cannot tell them apart; with {names} {fall}{''.join(ended)}"
         return Sentence(both, both)
-    rest = _rest(left)
+    rest = "" if search.is_noiseless else _rest(left)
     return Sentence(f"{names} ({says}): {fall}{rest}", f"{names}: {fall}{rest}")
 
 

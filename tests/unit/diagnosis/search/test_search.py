@@ -110,7 +110,7 @@ def test_the_whole_hull_has_its_effects_and_every_set_on_the_way():
     assert hull.names == ("sway_coupling", "servo_lag", "quadratic_damping")
     way = [made.base(), made.tried[frozenset(hull.names[:1])], made.tried[frozenset(hull.names[:2])], hull]
     assert all(after.log_likelihood > before.log_likelihood - 1.0 for before, after in pairwise(way))
-    assert hull.likelihood_model.values["lag"] == pytest.approx(hidden_lag.LAG, rel=0.3)
+    assert hull.train.over(made.floor) < 1.05
 
 
 def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence():
