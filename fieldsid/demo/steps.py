@@ -123,7 +123,7 @@ def _joined(result: Result) -> str:
 
 
 def _compared(result: Result) -> str:
-    run = max(result["runs"], key=lambda r: float(r["over_floor"][r["judged_by"]]))
+    run = max(result["runs"], key=lambda r: float(r["over_noise"]))
     opening = f"On {run['run']}, which the fit has not seen, the {_fits(run, run['over_floor'])}. "
     if not run["failing"]:
         return opening + "That is the noise: here the model lacks nothing."

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from math import exp, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.progress import get_ready
+from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -62,13 +62,13 @@ def several_models(
         "models": [
             {
                 "model": str(p),
-                "over_floor": _score(found),
+                "over_floor": pooled(c.over_noise for c in found),
                 "fitted_to": [c.run for c in found if c.run in fitted],
                 "runs": [entry(c, None, fitted) for c in found],
             }
             for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
         ],
-        "best": str(paths[min(range(len(paths)), key=lambda i: _score(found_of[i]))]),
+        "best": str(paths[min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))]),
         "figures": figures,
         "skipped_runs": skips.records,
     }
@@ -81,11 +81,6 @@ def several_models(
     result = emit(body, as_json=as_json, render=lambda to: _render(to, body, found_of, names), headline=headline, notes=notes)
     skips.end(len(found_of[0]))
     return result
-
-
-def _score(found: Sequence[Comparison]) -> float:
-    """Return the geometric mean over the runs of the error over the noise, each run's worse channel."""
-    return exp(sum(log(c.leading.over_floor) for c in found) / len(found))
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -109,7 +104,7 @@ def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folde
 
 def _render(to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> None:
     runs = [c.run for c in found_of[0]]
-    rows = [(run, *(f"{found[i].leading.over_floor:.2f}" for found in found_of)) for i, run in enumerate(runs)]
+    rows = [(run, *(f"{found[i].over_noise:.2f}" for found in found_of)) for i, run in enumerate(runs)]
     to.print(table("error over the noise", ("run", *names), rows))
     for path in body["figures"]:
         to.print(f"figure: {path}", soft_wrap=True)

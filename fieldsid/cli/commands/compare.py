@@ -193,17 +193,19 @@ def _entry(c: Comparison, figure: str | None, fitted: Collection[str]) -> dict[s
         "noise_floor": {"angle_rad": c.floor.angle, "rate_rad_s": c.floor.rate},
         "command_times": _as_flown(c, "command_between_samples"),
         "own_speed": _as_flown(c, "own_speed"),
+        "over_noise": c.over_noise,
         "over_floor": {channel.name: channel.over_floor for channel in c.channels},
         "judged_by": c.leading.name,
-        **_fault(c.leading),
-        "failing": [{"channel": channel.name} | _fault(channel) for channel in c.failing],
+        **_fault(c.leading, c),
+        "failing": [{"channel": channel.name} | _fault(channel, c) for channel in c.failing],
         "moves_with": [{"signal": m.signal, "explained": m.explained} for m in c.moves_with if c.failing],
         "figure": figure,
     }
 
 
-def _fault(c: Channel) -> dict[str, Any]:
+def _fault(c: Channel, of: Comparison) -> dict[str, Any]:
     """Return how well a channel is followed and, where it fails, where; one that is down to its noise fails nowhere."""
+    where, worst = (c.where, c.worst) if c in of.failing else ((), ())
     return {
         "theil": c.metrics.theil,
         "r2": c.metrics.r2,
@@ -217,10 +219,9 @@ def _fault(c: Channel) -> dict[str, Any]:
                 "t_start_s": p.start_s,
                 "t_end_s": p.end_s,
             }
-            for p in c.where
-            if c.fails
+            for p in where
         ],
-        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in c.worst if c.fails],
+        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in worst],
     }
 
 
@@ -277,7 +278,8 @@ def _render_where(to: Console, e: Mapping[str, Any], top: int) -> None:
     if quiet:
         if not failing:
             to.print()
-        to.print(f"{e['run']}: down to the noise: {', '.join(quiet)}", soft_wrap=True)
+        pooled = "" if failing else f", {e['over_noise']:.2f} x"
+        to.print(f"{e['run']}: down to the noise{pooled}: {', '.join(quiet)}", soft_wrap=True)
     if e["moves_with"]:
         said = ", ".join(f"{m['signal']} ({100 * m['explained']:.0f} %)" for m in e["moves_with"][:3])
         to.print(f"the missing moment moves with {said}")
