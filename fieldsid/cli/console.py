@@ -90,6 +90,8 @@ def emit(
             return whole
         warn(notes)
         to.print()
+        for rest in headline.rest:
+            to.print(f"... {rest}", soft_wrap=True)
     render(to)
     return whole
 

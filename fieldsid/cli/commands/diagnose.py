@@ -240,20 +240,22 @@ def _errors(found: Diagnosis, errors: Pair) -> tuple[str, str]:
 
 
 def _render_words(to: Console, found: Diagnosis) -> None:
-    """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
+    """Say what each named effect does, what it may be confused with, and the evidence for what is not in the first line."""
+    from fieldsid.diagnosis import what_it_does
     from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
 
     if found.verdict in ("sufficient", "disturbed"):
         return
-    if found.effects:
-        to.print()
-        to.print(shown_words(found.says))
+    to.print()
+    for name in found.effects:
+        to.print(shown_words(f"{name}: {what_it_does(name, found.model.values)}"))
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < RIVAL_PROBABILITY_RATIO:
             continue
-        alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
-        to.print()
-        to.print(shown_words(f"{c.effect}: {c.evidence}{alike}"))
+        if found.verdict != "effect" or i:
+            to.print(shown_words(f"{c.effect}: {c.evidence}"))
+        if c.confusable_with:
+            to.print(shown_words(f"on these data nearly as good as {c.effect}: {', '.join(c.confusable_with)}"))
 
 
 def _render_where(to: Console, found: Diagnosis) -> None:
