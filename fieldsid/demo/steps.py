@@ -307,7 +307,7 @@ STEPS: tuple[Step, ...] = (
     Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", briefs.turned, _turned, (Axis.YAW,)),
     Step(
         "Gains for every speed",
-        "schedule design {fits} --fin-limit 0.26 -o {turning}/gains.yaml",
+        "schedule design {fits} --fin-max 0.26 -o {turning}/gains.yaml",
         briefs.scheduled,
         _scheduled,
         (Axis.YAW,),

@@ -57,8 +57,8 @@ def design_schedule(
     if depth and source.axis is not Axis.PITCH:
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
     if not 0.0 < fin_limit <= 1.5708:
-        hint = in_radians("--fin-limit", fin_limit)
-        raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-limit {fin_limit:g}", hint=hint)
+        hint = in_radians("--fin-max", fin_limit)
+        raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-max {fin_limit:g}", hint=hint)
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
     plants, refused = plants_of(source, limits, runs, length), False
@@ -133,7 +133,7 @@ def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: 
     raise UsageError(
         f"the fin limit is below the offset at {speed:.3g} m/s: holding a straight run would take the whole {FIN[source.axis]}",
         found=f"limit {fin_limit:.4g} rad, offset {NAMES[source.axis].trim_fin} = {offsets[speed]:.4g} rad",
-        hint=wider_fin("--fin-limit", abs(offsets[speed]), source),
+        hint=wider_fin("--fin-max", abs(offsets[speed]), source),
     )
 
 

@@ -92,12 +92,16 @@ def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folde
     if folder is None:
         return []
     from fieldsid.figures.canvas import save
+    from fieldsid.figures.kinds import figure_at
     from fieldsid.figures.several import figure
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
+    alone = len(found_of[0]) == 1
     with BackgroundTasks() as own:
         return [
-            str(save(figure(of_run, names), folder / f"models_on_{of_run[0].run}.png", force=force, tasks=own))
+            str(
+                save(figure(of_run, names), figure_at(folder, f"models_on_{of_run[0].run}", is_one=alone), force=force, tasks=own)
+            )
             for of_run in zip(*found_of, strict=True)
         ]
 

@@ -11,8 +11,8 @@ import typer
 
 from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import complain, emit, table
-from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
-from fieldsid.cli.progress import get_ready, refuse_closed
+from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, JsonFlag, MappingFile, ToS
+from fieldsid.cli.progress import get_ready, refuse_place
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_in, shown_words
 from fieldsid.errors import UsageError
@@ -50,7 +50,7 @@ def command(
     mapping: MappingFile = None,
     min_fit: MinFit = None,
     top: Top = MOST_SHOWN,
-    output: OutputDir = None,
+    output: FigurePlace = None,
     figures: Figures = True,
     force: Force = False,
     as_json: JsonFlag = False,
@@ -71,6 +71,7 @@ def command(
     """
     from fieldsid.cli.commands._before_after import before_after, is_side
 
+    refuse_place(output, force=force)
     sides = [p for p in (model, *runs) if is_side(p)]
     if len(sides) == len(runs) + 1 == 2:
         _refuse_part(start, end, mapping, min_fit)
@@ -81,7 +82,6 @@ def command(
     from fieldsid.models.model import load_model
     from fieldsid.models.record import left_out
 
-    refuse_closed(output)
     if len(sides) > 1:
         return _several(
             sides,
@@ -174,10 +174,20 @@ def _drawn(
         return [None] * len(found)
     from fieldsid.figures.canvas import save
     from fieldsid.figures.compare import figure
+    from fieldsid.figures.kinds import figure_at
 
+    alone = len(found) == 1
     with drawing(context) as own:
         return [
-            str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force, tasks=own)) for c in found
+            str(
+                save(
+                    figure(c, model, name.name),
+                    figure_at(folder, f"{name.stem}_on_{c.run}", is_one=alone),
+                    force=force,
+                    tasks=own,
+                )
+            )
+            for c in found
         ]
 
 

@@ -39,7 +39,7 @@ Speeds = Annotated[
 FinLimit = Annotated[
     str | None,
     typer.Option(
-        "--fin-limit",
+        "--fin-max",
         metavar="ANGLE",
         help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
         rich_help_panel=LIMITS,
@@ -121,7 +121,7 @@ def design(
     do; with a rate the gains are those of least error and fin, each over its largest. What none holds is refused. The
     feed-forward cancels the trim.
 
-    Example: sysid schedule design law.yaml --fin-limit 0.26 -o gains.yaml
+    Example: sysid schedule design law.yaml --fin-max 0.26 -o gains.yaml
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
@@ -135,7 +135,7 @@ def design(
     from fieldsid.schedule.verify import STEP_ANGLE_RAD
 
     refuse_existing(output, force=force)
-    given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
+    given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
     fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
     source = load_parameter_source(models, laws=law or ())
