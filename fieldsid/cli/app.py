@@ -139,8 +139,11 @@ def _dispatch(arguments: list[str]) -> int:
 
         sys.stdout.write(install(arguments[1:]))
         return DONE
-    from fieldsid.cli.voice import take
+    from fieldsid.cli.voice import command_first, take
 
+    ordered = command_first(arguments)
+    if ordered != list(arguments):
+        return _dispatch(ordered)
     arguments = take(arguments)
     _enter_folder()
     is_link = os.path.islink(JOURNAL)  # noqa: PTH114 - no import

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, TypeVar
 
-from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.measure import Measurement
 from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.segment import Segment
@@ -28,8 +28,9 @@ from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
 WIDTH = 80
-NARROW, FAR = 60, 1000
-"""Columns of a terminal below which a table that does not fit is shown row by row, and those in which any table fits."""
+NARROW, FAR, LEAST_WORDS = 60, 1000, 12
+"""Columns of a terminal below which a table that does not fit is shown row by row, those in which any table fits, and those
+that a column of words is folded down to."""
 
 
 class Terminal(Console):
@@ -90,6 +91,8 @@ def emit(
             return whole
         warn(notes)
         to.print()
+        for rest in headline.rest:
+            to.print(f"... {rest}", soft_wrap=True)
     render(to)
     return whole
 
@@ -111,12 +114,15 @@ def print_file(to: Console, text: str) -> None:
 
 
 class Rows(Table):
-    """A table that a narrow terminal gets row by row, a line for each cell: folded in a column, a number cannot be read."""
+    """A table that is shown row by row, a line for each cell, where its numbers do not fit: folded, a number cannot be read."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the table where it fits, and where the page is no narrow one."""
-        wanted = Measurement.get(console, options.update(max_width=FAR), self).maximum
-        if options.max_width >= NARROW or wanted <= options.max_width:
+        """Yield the table where it fits, or on a page that is no narrow one with its words folded."""
+        far = options.update(max_width=FAR)
+        wanted = Measurement.get(console, far, self).maximum
+        widths = [(Measurement.get(console, far, Group(c.header, *c.cells)).maximum, c.no_wrap) for c in self.columns]
+        least = sum(width if whole else min(width, LEAST_WORDS) for width, whole in widths) + 2 * (len(widths) - 1)
+        if wanted <= options.max_width or (options.max_width >= NARROW and least <= options.max_width):
             yield from super().__rich_console__(console, options)
             return
         if self.title:
@@ -133,7 +139,7 @@ class Rows(Table):
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[RenderableType]], *, left: int = 1) -> Table:
-    """Return a table whose first `left` columns are words and whose others are numbers."""
+    """Return a table whose first `left` columns are words; those behind them are to the right, and whole if of numbers."""
     made = Rows(
         title=title or None,
         title_justify="left",
@@ -143,11 +149,17 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Renderable
         padding=(0, 2, 0, 0),
         show_header=any(columns),
     )
+    rows = list(rows)
     for i, column in enumerate(columns):
-        made.add_column(column, justify="left" if i < left else "right", header_style="dim", overflow="fold")
+        whole = i >= left and any(_is_number(cell) for row in rows for cell in row[i : i + 1])
+        made.add_column(column, justify="left" if i < left else "right", header_style="dim", overflow="fold", no_wrap=whole)
     for row in rows:
         made.add_row(*row)
     return made
+
+
+def _is_number(cell: RenderableType) -> bool:
+    return str(cell).lstrip("+-<>=~.")[:1].isdigit()
 
 
 def say(text: str) -> None:

@@ -83,6 +83,17 @@ OutputDir = Annotated[
         "-o", "--output", metavar="DIR", help="Folder for what is written.", show_default=False, rich_help_panel=WRITTEN
     ),
 ]
+FigurePlace = Annotated[
+    Path | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="PLACE",
+        help="Folder for the figures, or the name of one: .png, .svg or .pdf.",
+        show_default=False,
+        rich_help_panel=WRITTEN,
+    ),
+]
 OutputFile = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="File to write.", show_default=False, rich_help_panel=WRITTEN),

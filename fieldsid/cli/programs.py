@@ -10,11 +10,15 @@ if TYPE_CHECKING:
     import typer
 
 
+ONCE_NAMED = {"--rudder-max": "--fin-max", "--fin-limit": "--fin-max"}
+"""Options by the names they had when each command had its own: still understood, and named nowhere."""
+
+
 def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
     """Return the program of a command, the words it takes, and the name it goes by; raises UsageError for an unknown command."""
     from fieldsid.cli.help.catalogue import entries
 
-    known = entries()
+    known, arguments = entries(), [_as_named_now(word) for word in arguments]
     name = arguments[0]
     if name not in known:
         raise _unknown(name, tuple(known))
@@ -28,9 +32,14 @@ def program_of(arguments: Sequence[str]) -> tuple[typer.Typer, list[str], str]:
         for leaf in module.command.registered_commands:
             leaf.cls = CommandPage
         program.add_typer(module.command, name=name)
-        return program, list(arguments), "sysid"
+        return program, arguments, "sysid"
     program.command(name, cls=CommandPage)(module.command)
-    return program, list(arguments[1:]), f"sysid {name}"
+    return program, arguments[1:], f"sysid {name}"
+
+
+def _as_named_now(word: str) -> str:
+    name, equals, value = word.partition("=")
+    return f"{ONCE_NAMED.get(name, name)}{equals}{value}"
 
 
 def _unknown(name: str, known: tuple[str, ...]) -> Exception:

@@ -15,6 +15,7 @@ from rich.live import Live
 from fieldsid.artifacts import check_output
 from fieldsid.cli.console import messages, shows_progress
 from fieldsid.cli.session import session_of
+from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from fieldsid.fitting.jit_warmup import Warmup
@@ -31,9 +32,30 @@ def refuse_existing(*paths: Path | None, force: bool) -> None:
 
 
 def refuse_closed(folder: Path | None) -> None:
-    """Refuse a folder that nothing can be written to, before the work is done and not after it; raises ArtifactError."""
+    """Refuse a folder that nothing can be written to, or with the name of a figure, before the work is done and not after it.
+
+    Raises ArtifactError or UsageError.
+    """
+    from fieldsid.figures.kinds import is_figure
+
+    if folder is not None and is_figure(folder):
+        raise UsageError(
+            f"`{folder}` is a figure's name, and what is written here is a folder",
+            found=f"-o {folder}",
+            hint=f"`-o {folder.with_suffix('')}/`",
+        )
     if folder is not None:
         check_output(folder / "-", force=True)
+
+
+def refuse_place(output: Path | None, *, force: bool) -> None:
+    """Refuse what figures cannot be written to, a folder or a figure's name, as `refuse_closed` and `refuse_figure` do."""
+    from fieldsid.figures.kinds import is_figure
+
+    if output is not None and is_figure(output):
+        refuse_figure(output, force=force)
+    else:
+        refuse_closed(output)
 
 
 def refuse_figure(path: Path | None, *, force: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from math import pi
 from re import Match
 from re import compile as pattern
@@ -46,6 +47,14 @@ def take(arguments: Sequence[str]) -> list[str]:
     _VOICE[0] = replace(Voice(), is_quiet=QUIET in own, is_verbose=VERBOSE in own, is_in_degrees=DEGREES in own)
     taken = set(SAYS) - ({VERBOSE} if arguments and arguments[0] in HAS_OWN_V else set())
     return [*(a for a in own if a not in taken), *rest]
+
+
+def command_first(arguments: Sequence[str]) -> list[str]:
+    """Return a command line with what any command answers to behind the command, where it stands before it."""
+    before = list(takewhile((*SAYS, "--json").__contains__, arguments))
+    rest = list(arguments[len(before) :])
+    end = rest.index("--") if "--" in rest else len(rest)
+    return [*rest[:end], *before, *rest[end:]]
 
 
 def shown_in(unit: str) -> tuple[float, str]:

@@ -9,7 +9,7 @@ from fieldsid.comparison.conditions import conditions
 from fieldsid.comparison.localize import Place, Stretch, places, stretches
 from fieldsid.comparison.metrics import Metrics, metrics
 from fieldsid.comparison.residuals import Companion, companions
-from fieldsid.comparison.sufficient import is_noise
+from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.display import Brief, Plotted
 from fieldsid.dynamics.free_run import base_at
 from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit, goodness_of_fit
@@ -47,13 +47,8 @@ class Channel(Brief):
     worst: tuple[Stretch, ...]
 
     @property
-    def fails(self) -> bool:
-        """Whether more is left than the sensor's noise."""
-        return not is_noise(self.over_floor)
-
-    @property
     def badness(self) -> tuple[float, float]:
-        """What it is ordered by among channels, and its run among runs."""
+        """What it is ordered by among channels."""
         return badness(self.over_floor, self.fit)
 
 
@@ -79,9 +74,19 @@ class Comparison(Plotted):
         return self.channels[0]
 
     @property
+    def over_noise(self) -> float:
+        """The error over the noise floor, the measured channels pooled: what a diagnosis and an extension judge by."""
+        return pooled(c.over_floor for c in self.channels)
+
+    @property
+    def badness(self) -> tuple[float, float]:
+        """What it is ordered by among runs."""
+        return badness(self.over_noise, self.leading.fit)
+
+    @property
     def failing(self) -> tuple[Channel, ...]:
-        """The channels that have more left than their noise, the worst first."""
-        return tuple(c for c in self.channels if c.fails)
+        """The channels that have more left than their noise, the worst first; none where the run as a whole has not."""
+        return () if is_noise(self.over_noise) else tuple(c for c in self.channels if not is_noise(c.over_floor))
 
     @property
     def where(self) -> tuple[Place, ...]:

@@ -49,8 +49,8 @@ def fitted(result: Result) -> str:
 
 def compared(result: Result) -> str:
     """Return what the step came to."""
-    run = max(result["runs"], key=lambda r: float(r["over_floor"][r["judged_by"]]))
-    said = f"{run['run']}: {run['judged_by']} error {run['over_floor'][run['judged_by']]:.2f} x its noise"
+    run = max(result["runs"], key=lambda r: float(r["over_noise"]))
+    said = f"{run['run']}: error {run['over_noise']:.2f} x the noise"
     return f"{said}, most of it at `{run['where'][0]['condition']}`" if run["failing"] else f"{said}: nothing is left"
 
 

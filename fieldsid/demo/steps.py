@@ -123,7 +123,7 @@ def _joined(result: Result) -> str:
 
 
 def _compared(result: Result) -> str:
-    run = max(result["runs"], key=lambda r: float(r["over_floor"][r["judged_by"]]))
+    run = max(result["runs"], key=lambda r: float(r["over_noise"]))
     opening = f"On {run['run']}, which the fit has not seen, the {_fits(run, run['over_floor'])}. "
     if not run["failing"]:
         return opening + "That is the noise: here the model lacks nothing."
@@ -309,7 +309,7 @@ STEPS: tuple[Step, ...] = (
     Step("How tight does it turn?", "turn-radius {fits} --speeds 1.0,1.4,1.8 -o {turning}", briefs.turned, _turned, (Axis.YAW,)),
     Step(
         "Gains for every speed",
-        "schedule design {fits} --fin-limit 0.26 -o {turning}/gains.yaml",
+        "schedule design {fits} --fin-max 0.26 -o {turning}/gains.yaml",
         briefs.scheduled,
         _scheduled,
         (Axis.YAW,),

@@ -2,5 +2,6 @@
 
 from fieldsid.diagnosis.diagnose import body_of, diagnose
 from fieldsid.diagnosis.records import Candidate, Diagnosis, Errors, Pair
+from fieldsid.diagnosis.report.report_text import what_it_does
 
-__all__ = ["Candidate", "Diagnosis", "Errors", "Pair", "body_of", "diagnose"]
+__all__ = ["Candidate", "Diagnosis", "Errors", "Pair", "body_of", "diagnose", "what_it_does"]

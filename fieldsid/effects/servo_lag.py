@@ -3,7 +3,7 @@
 The response to a straight-line command is exact, and so is its mean over the interval; the servo starts at rest on
 the command. In its form of second order the servo has inertia: inertia_share lag^2 d2(delta)/dt2 is added on the left, which
 is damped by 1 / (2 sqrt(inertia_share)). In another it follows
-with slackening times the lag while it falls. Source: Van Amerongen 1982 (the steering machine, linear part).
+with lag_ratio times the lag while it falls. Source: Van Amerongen 1982 (the steering machine, linear part).
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def fin(path: FinPath, values: Values, record: Record) -> FinPath:
     if "inertia_share" in values:
         inertia = float(values["inertia_share"]) * lag * lag
         return through(path, record.steps, lambda steps, start, end, out: swung(steps, start, end, lag, inertia, out))
-    falling = lag * float(values.get("slackening", 1.0))
+    falling = lag * float(values.get("lag_ratio", 1.0))
     return through(path, record.steps, lambda steps, start, end, out: lagged(steps, start, end, lag, falling, out))
 
 
@@ -138,8 +138,8 @@ def _hull_poles(damping: float, values: Values) -> tuple[float, float | None] | 
     return middle + float(np.sqrt(squared)), middle - float(np.sqrt(squared))
 
 
-SLACKENING = Coefficient(
-    "slackening", "1", 0.1, 10.0, 1.0, scan=(0.6, 1.6), step=1e-3, says="lag to the negative side over that to the other"
+LAG_RATIO = Coefficient(
+    "lag_ratio", "1", 0.1, 10.0, 1.0, scan=(0.6, 1.6), step=1e-3, says="lag to the negative side over that to the other"
 )
 
 EFFECT = Effect(
@@ -165,6 +165,6 @@ EFFECT = Effect(
                 ),
             ),
         ),
-        Variant("it follows faster to one side than to the other", (SLACKENING,)),
+        Variant("it follows faster to one side than to the other", (LAG_RATIO,)),
     ),
 )

@@ -86,10 +86,10 @@ def rudder_of(vehicle: Vehicle | None, source: ParameterSource, say: Callable[[s
         return vehicle.rudder_max_rad
     trained = _trained(source)
     if trained is not None:
-        say(f"rudder: {trained:.4g} rad, the largest in the models' runs; `--rudder-max` takes another")
+        say(f"rudder: {trained:.4g} rad, the largest in the models' runs; `--fin-max` takes another")
         return trained
     raise UsageError(
-        "how far does the rudder go in the turn", found="no --rudder-max and no vehicle.yaml", hint="add `--rudder-max 0.26`"
+        "how far does the rudder go in the turn", found="no --fin-max and no vehicle.yaml", hint="add `--fin-max 0.26`"
     )
 
 
@@ -104,9 +104,9 @@ def fin_limits_of(
         return limit, rate
     trained = _trained(source)
     if trained is not None:
-        say(f"fin limit: {trained:.4g} rad, the largest in the models' runs; `--fin-limit` takes another")
+        say(f"fin limit: {trained:.4g} rad, the largest in the models' runs; `--fin-max` takes another")
         return trained, rate
-    raise UsageError("how far does the fin go", found="no --fin-limit and no vehicle.yaml", hint="add `--fin-limit 0.26`")
+    raise UsageError("how far does the fin go", found="no --fin-max and no vehicle.yaml", hint="add `--fin-max 0.26`")
 
 
 def run_files(source: ParameterSource, say: Callable[[str], None]) -> list[Path]:

@@ -19,6 +19,18 @@ KINDS: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
 """What each kind says of itself; no date, so that the same figure is the same file."""
 
 
+def is_figure(path: Path) -> bool:
+    """Whether a path is named as a figure is, and is no folder."""
+    return path.suffix.removeprefix(".").lower() in KINDS and not path.is_dir()
+
+
+def figure_at(output: Path, name: str, *, is_one: bool = True) -> Path:
+    """Return the file of a figure: in a folder, or at a figure's name, which gets its own `name` where it is not the only one."""
+    if not is_figure(output):
+        return output / f"{name}.png"
+    return output if is_one else output.with_name(f"{output.stem}_{name}{output.suffix}")
+
+
 def kind_of(path: Path) -> str:
     """Return the kind of file a figure is written as; raises UsageError for a suffix that is none of them."""
     kind = path.suffix.removeprefix(".").lower()

@@ -18,7 +18,7 @@ TITLE_WIDTH = 110
 def figure(found: Sequence[Comparison], names: Sequence[str]) -> Figure:
     """Return a sheet of one run: angle, rate, what each model leaves of the rate, and the fin."""
     sheet = canvas.sheet(10.0, 7.5)
-    over = ", ".join(f"{n} {c.leading.over_floor:.2f} x" for n, c in zip(names, found, strict=True))
+    over = ", ".join(f"{n} {c.over_noise:.2f} x" for n, c in zip(names, found, strict=True))
     sheet.suptitle(fill(f"{found[0].run}: error over the noise: {over}", TITLE_WIDTH), x=0.01, ha="left", fontsize=11)
     axes = sheet.subplots(4, 1, sharex=True, height_ratios=(1.2, 1.2, 0.9, 0.6))
     record = found[0].shown.record

@@ -34,7 +34,7 @@ def draw_radius(prediction: TurnPrediction, ax: Axes) -> None:
             _series(ax, rows, [r.predicted for r in rows], [r.predicted95 for r in rows], f"{side}, predicted", side)
     for m in prediction.measured:
         circle, side = m.turn.circle, m.turn.side
-        speed = m.turn.entry_speed if np.isfinite(m.turn.entry_speed) else m.turn.path_speed
+        speed = m.turn.flown_at
         label = f"measured circle, {side}" if m is next(x for x in prediction.measured if x.turn.side == side) else None
         ax.errorbar(
             [speed], [circle.radius], yerr=[1.96 * circle.radius_std_error], fmt="D", color=COLOURS[side], markeredgecolor="0.1",
@@ -101,7 +101,12 @@ def draw_track(turn: MeasuredTurn, ax: Axes) -> None:
         label=f"circle R = {circle.radius:.3f} ± {circle.radius_std_error:.3f} m\nin a current of {speed:.3f} m/s",
     )  # fmt: skip
     ax.plot([east], [north], "+", color=canvas.SIMULATED, markersize=10)
-    canvas.dress(ax, x="east y, m", y="north x, m", title=f"{turn.run}: {turn.side}, radius {circle.radius:.2f} m")
+    canvas.dress(
+        ax,
+        x="east y, m",
+        y="north x, m",
+        title=f"{turn.run}: {turn.side} at {turn.flown_at:.2f} m/s, radius {circle.radius:.2f} m",
+    )
     ax.set_aspect("equal", adjustable="box")
     reach = 2.2 * circle.radius
     ax.set_xlim(east - reach, east + reach)

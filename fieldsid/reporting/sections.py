@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from math import exp, log
 from typing import Any
 
 import numpy as np
 
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
+from fieldsid.comparison.sufficient import is_noise, pooled
 from fieldsid.reporting import figures
 from fieldsid.reporting.made_from import lineage_rows
 from fieldsid.reporting.material import AxisMaterial, Material, Shown
@@ -52,12 +52,12 @@ def _verdicts(axis: AxisMaterial, state: FolderState) -> list[dict[str, str]]:
     if best.found:
         seen, unseen = _split(best)
         judged = unseen or seen
-        over = exp(sum(log(c.leading.over_floor) for c in judged) / len(judged))
+        over = pooled(c.over_noise for c in judged)
         on = f"{len(judged)} run{'s' * (len(judged) > 1)} {'it was not fitted to' if unseen else 'it was fitted to'}"
-        worst = max(judged, key=lambda c: c.leading.badness)
-        good = not worst.leading.fails
+        worst = max(judged, key=lambda c: c.badness)
+        good = is_noise(over)
         tail = ": nothing is left but the sensors' noise" if good else ": more is left than the sensors' noise"
-        most = f", {worst.leading.over_floor:.2f} x on {worst.run}" if len(judged) > 1 and not good else ""
+        most = f", {worst.over_noise:.2f} x on {worst.run}" if len(judged) > 1 and not good else ""
         says = f"error {over:.2f} x the noise on {on}{most}{tail}" if over < MANY else _without_noise(judged, on)
         effects = f" with {', '.join(best.model.effects)}" if best.model.effects else ""
         out.append({"what": f"{axis.axis} model{effects}", "says": says, "state": "good" if good else "warn"})
@@ -156,7 +156,7 @@ def _followed(channel: Channel) -> str:
 
 
 def _without_noise(judged: Sequence[Comparison], on: str) -> str:
-    worst = max(judged, key=lambda c: c.leading.badness)
+    worst = max(judged, key=lambda c: c.badness)
     return f"{_followed(worst.leading)} on {on}{', the worst' * (len(judged) > 1)}; the log has next to no noise"
 
 
@@ -180,7 +180,7 @@ def _errors(shown: Shown) -> list[dict[str, str]]:
             "rate": number(np.degrees(c.merit.rate_rms), 2),
             "rate_noise": number(np.degrees(c.floor.rate), 2),
             "fit": f"{number(c.merit.angle_fit, 3)} / {number(c.merit.rate_fit, 3)}",
-            "over": f"{c.leading.over_floor:.2f}" if c.leading.over_floor < MANY else "no noise",
+            "over": f"{c.over_noise:.2f}" if c.over_noise < MANY else "no noise",
             "fitted": "yes" if shown.was_fitted_to(c.run) else "no",
         }
         for c in shown.found

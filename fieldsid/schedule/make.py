@@ -55,13 +55,13 @@ def design_schedule(
     if depth and source.axis is not Axis.PITCH:
         raise UsageError("depth is held through pitch", found="axis: yaw", hint="give the pitch models")
     if not 0.0 < fin_limit <= 1.5708:
-        hint = in_radians("--fin-limit", fin_limit)
-        raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-limit {fin_limit:g}", hint=hint)
+        hint = in_radians("--fin-max", fin_limit)
+        raise UsageError("a fin's limit lies above 0 and at most at 90 deg", found=f"--fin-max {fin_limit:g}", hint=hint)
     if fins is not None and not fins.follows(fin_limit):
         raise UsageError(
             "the fin's limit is more than the fins reach",
-            found=f"--fin-limit {fin_limit:g}, {fins.reach:.4g} rad by `fins` of vehicle.yaml",
-            hint=f"write `--fin-limit {fins.reach:.4g}`, or leave it out",
+            found=f"--fin-max {fin_limit:g}, {fins.reach:.4g} rad by `fins` of vehicle.yaml",
+            hint=f"write `--fin-max {fins.reach:.4g}`, or leave it out",
         )
     source.require(knots)
     _refuse_offsets(source, knots, fin_limit, limits)
@@ -119,7 +119,7 @@ def _refuse_offsets(source: ParameterSource, knots: Sequence[float], fin_limit: 
     raise UsageError(
         f"the fin limit is below the offset at {speed:.3g} m/s: holding a straight run would take the whole {FIN[source.axis]}",
         found=f"limit {fin_limit:.4g} rad, offset {NAMES[source.axis].trim_fin} = {offsets[speed]:.4g} rad",
-        hint=wider_fin("--fin-limit", abs(offsets[speed]), source),
+        hint=wider_fin("--fin-max", abs(offsets[speed]), source),
     )
 
 

@@ -9,7 +9,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from fieldsid.comparison.sufficient import is_noise, pooled_over_noise
+from fieldsid.comparison.sufficient import is_noise, over_noise
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.records.named_inputs import sha256_of
@@ -159,9 +159,8 @@ def left_by(model: Mapping[str, Any]) -> float:
     """Return the error over the noise floor that an extended model leaves, the larger of fitted and unseen runs; else NaN."""
     record = (model.get("info") or {}).get("extension") or {}
     floor = record.get("noise_floor") or {}
-    names = (("angle_rms_rad", "angle_rad"), ("rate_rms_rad_s", "rate_rad_s"))
-    pairs = [[(errors.get(name), floor.get(of)) for name, of in names] for errors in (record.get("after") or {}).values()]
-    return max((o for o in (pooled_over_noise(*p) for p in pairs) if isfinite(o)), default=float("nan"))
+    over = (over_noise(errors, floor) for errors in (record.get("after") or {}).values())
+    return max((o for o in over if isfinite(o)), default=float("nan"))
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:

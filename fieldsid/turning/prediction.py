@@ -164,7 +164,7 @@ class TurnPrediction(Plotted):
                 yield f"{m.turn.run} begins in the turn, so that its speed before it is not known: log the approach too"
         for fin, names in fins.items():
             counted = f"{', '.join(names)} count{'s' * (len(names) == 1)} as measured"
-            yield f"with `--rudder-max {fin}`, the rudder of {'that turn' if len(names) == 1 else 'those turns'}, {counted}"
+            yield f"with `--fin-max {fin}`, the rudder of {'that turn' if len(names) == 1 else 'those turns'}, {counted}"
 
     def best(self, side: str) -> TurnRow | None:
         """Return the local minimum of the radius over speed that is farthest up, None where it only rises or falls."""

@@ -160,7 +160,7 @@ def _refuse_turns(source: ParameterSource, speeds: Sequence[float], rudder: floa
     refuse_unstable(damping[loosest], f"at {loosest:.3g} m/s", damping_that_holds(source, loosest))
     worst = max(speeds, key=lambda speed: abs(_offset(source, speed)))
     offset = _offset(source, worst)
-    refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", wider_fin("--rudder-max", abs(offset), source))
+    refuse_short_fin(rudder, offset, f"at {worst:.3g} m/s", wider_fin("--fin-max", abs(offset), source))
 
 
 def _offset(source: ParameterSource, speed: float) -> float:
@@ -305,8 +305,8 @@ def _check(source: ParameterSource, speeds: Sequence[float], rudder_max: float, 
     if not 0.0 < rudder_max <= 1.5708:
         raise UsageError(
             "the rudder held in a turn lies above 0 and at most at 90 deg",
-            found=f"--rudder-max {rudder_max:g}",
-            hint=in_radians("--rudder-max", rudder_max),
+            found=f"--fin-max {rudder_max:g}",
+            hint=in_radians("--fin-max", rudder_max),
         )
     if not len(speeds) or not all(s > 0 and np.isfinite(s) for s in speeds):
         raise UsageError("speeds must be above zero", found=f"{list(speeds)}", hint="write `--speeds 0.5:2.5:0.1` or `1.0,1.5`")

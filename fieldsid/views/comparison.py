@@ -20,8 +20,8 @@ def line(found: Comparison) -> str:
     """Return the run, fit and error of the channel furthest above its noise, and where that fails most."""
     channel, m = found.leading, found.merit
     fit = m.rate_fit if channel.name == "rate" else m.angle_fit
-    worst = f", worst at {channel.where[0].condition}" if channel.fails and channel.where else ""
-    return f"{cut(found.run, 60)}: {channel.name} fit {fit:.1f} %, error {times_noise(channel.over_floor)}{worst}"
+    worst = f", worst at {channel.where[0].condition}" if found.failing and channel.where else ""
+    return f"{cut(found.run, 60)}: {channel.name} fit {fit:.1f} %, error {times_noise(found.over_noise)}{worst}"
 
 
 def page(found: Comparison) -> Page:

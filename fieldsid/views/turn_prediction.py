@@ -46,6 +46,7 @@ def page(found: TurnPrediction) -> Page:
     circles = tuple(
         (
             cut(m.turn.run, 60),
+            number(m.turn.flown_at, 3),
             number(m.turn.fin, 3),
             with_error(m.turn.circle.radius, m.turn.circle.radius_std_error),
             number(m.predicted, 3),
@@ -57,7 +58,7 @@ def page(found: TurnPrediction) -> Page:
     settle = next((r.settle_with for r in found.rows if r.because), "")
     bracketed = (BRACKETED,) if any(r.band_only for r in found.rows) else ()
     closing = (*bracketed, *(f"extrapolated: {b}" for b in because), *((f"what would settle it: {settle}",) if settle else ()))
-    measured = Block("Measured circles", circles, ("", "fin rad", "radius m", "predicted", "95 %"))
+    measured = Block("Measured circles", circles, ("", "m/s", "fin rad", "radius m", "predicted", "95 %"))
     title = f"Turns with {found.rudder_max:.4g} rad of rudder, {_methods(found)}"
     return Page(title, warned(found.notes), (Block("Radius", rows, heads), measured), closing)
 

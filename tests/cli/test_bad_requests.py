@@ -37,7 +37,7 @@ def test_a_plan_that_cannot_be_meant_names_the_option_and_what_leaving_it_out_me
 @pytest.mark.parametrize(
     ("words", "says", "hint"),
     [
-        ("--rudder-max 0", "above 0 and at most at 90 deg", "--rudder-max 15deg"),
+        ("--rudder-max 0", "above 0 and at most at 90 deg", "--fin-max 15deg"),
         ("--rudder-max 0.26 --speeds 100", "a speed of 100 m/s cannot be right", "0.01 to 15"),
         ("--rudder-max 0.26 --speeds 1e-9", "a speed of 1e-09 m/s cannot be right", "0.01 to 15"),
         ("--rudder-max 0.26 --law b2=nan", "not a law of numbers", "`--law a22=1`"),

@@ -28,7 +28,7 @@ def test_the_model_that_made_a_run_is_down_to_its_noise(run_cli, tmp_path):
     assert run["r2"] <= 1.0
     assert (run["failing"], run["where"], run["worst"], run["moves_with"]) == ([], [], [], [])
     text = run_cli(*asked).out
-    assert "down to the noise: " in text
+    assert f"run7: down to the noise, {run['over_noise']:.2f} x: " in text
     assert "fails" not in text
     assert "worst" not in text
     assert "missing moment" not in text

@@ -53,8 +53,9 @@ def test_text_says_verdict_candidates_place_what_was_skipped_and_what_to_do(run_
     assert answer.code == 0
     assert max(map(len, trial.below(answer.out))) <= 80
     assert answer.out.startswith("effect: servo_lag: the error on unseen runs falls from")
-    assert "servo_lag (the fin follows" in answer.out
-    for part in ("as it is", "log evidence", "where the model as it is fails", "not tried: ", "needs roll, which the log lacks"):
+    assert "servo_lag: the fin follows" in answer.out
+    assert answer.out.count("falls from") == answer.out.count("the fin follows") == 1
+    for part in ("as it is", "evidence: log", "where the model as it is fails", "not tried: ", "needs roll, which the log lacks"):
         assert part in answer.out
     then = answer.out.splitlines()[2]
     assert then.startswith("next: sysid identify ")

@@ -15,7 +15,7 @@ from cli import trial
 
 from fieldsid.cli.app import main
 from fieldsid.cli.console import emit
-from fieldsid.cli.headlines.headline import Headline
+from fieldsid.cli.headlines.headline import LONGEST, Headline
 from fieldsid.cli.headlines.typed import pasted, remember, typed_with
 from fieldsid.cli.help.catalogue import entries
 from fieldsid.cli.trial.parsed import parse
@@ -115,6 +115,7 @@ def test_a_result_says_its_verdict_then_what_it_rests_on_then_what_comes_next(sa
     if line.startswith("live"):  # its looks come first, one a line, while it goes on
         lines = lines[next(i for i, text in enumerate(lines) if text.startswith("rests on ")) - 1 :]
     verdict, rests_on, then = lines[:3]
+    assert max(len(verdict), len(rests_on)) <= LONGEST
     assert line.split()[0] in NUMBERLESS or "--undo" in line or re.search(r"\d", verdict)
     assert not verdict.startswith(("warning", "rests on", "next"))
     assert rests_on.startswith("rests on ")

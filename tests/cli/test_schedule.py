@@ -177,7 +177,7 @@ def test_export_into_needs_a_key_that_is_there(run_cli, gains, tmp_path):
 def test_a_fin_limit_below_the_offset_and_none_at_all_are_refused(run_cli, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "below the offset" in run_cli("schedule", "design", table(tmp_path), "--fin-limit", "0.01").err
-    assert "--fin-limit 0.26" in run_cli("schedule", "design", table(tmp_path)).err
+    assert "--fin-max 0.26" in run_cli("schedule", "design", table(tmp_path)).err
 
 
 def test_depth_goes_through_pitch(run_cli, tmp_path):

@@ -47,7 +47,7 @@ def test_without_a_rudder_limit_a_table_is_refused(run_cli, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     answer = run_cli("turn-radius", table(tmp_path))
     assert answer.code == 2
-    assert "--rudder-max 0.26" in answer.err
+    assert "--fin-max 0.26" in answer.err
 
 
 def test_the_vehicles_rudder_limit_is_taken(run_cli, tmp_path, monkeypatch):

@@ -123,3 +123,24 @@ def test_a_table_that_fits_or_a_page_that_is_wide_keeps_its_columns():
     assert on_a_terminal_of(40, small).splitlines()[0].split() == ["run", "m/s"]
     wide = table("", ("run", "value"), [("r" * 90, "1.4")])
     assert on_a_terminal_of(80, wide).splitlines()[0].split() == ["run", "value"]
+
+
+@pytest.mark.parametrize("width", [45, 60, 80, 120])
+@pytest.mark.parametrize("many", [1, 3, 9, 14])
+@pytest.mark.parametrize(
+    "name", ["a", "speed_varying +servo_lag +sway_coupling", "joint_yaw_of_a_day_in_july_with_no_blank_in_it"]
+)
+def test_no_number_is_ever_broken_inside_its_cell(width, many, name):
+    columns = ("what it is of", *(f"value {i}" for i in range(many)))
+    cells = [f"-0.{i:02d}874" if i % 2 else f"-{i}.5 .. {i}.5" for i in range(many)]
+    shown = on_a_terminal_of(width, table("", columns, [(name, *cells)]))
+    assert all(len(line.rstrip()) <= width for line in shown.splitlines())
+    for cell in cells:
+        assert any(cell in line for line in shown.splitlines()), shown
+
+
+def test_a_column_of_words_behind_the_first_is_folded_and_the_numbers_beside_it_are_not():
+    rows = [("run7", "2400", "yaw_rad, yaw_rate_rad_s, rudder_rad, surge_m_s, depth_m, pitch_rad, roll_rad, x_m, y_m")]
+    lines = on_a_terminal_of(60, table("", ("run", "samples", "signals"), rows)).splitlines()
+    assert lines[0].split() == ["run", "samples", "signals"]
+    assert any(line.startswith("run7") and "2400" in line for line in lines)

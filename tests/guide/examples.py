@@ -145,15 +145,15 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         Example("Simulated to the settled circle.", f"sysid turn-radius {SPEEDS} --speeds 1.0,1.4,1.8 -o demo/turning"),
         Example(
             "Beside a circle that was flown, with positions in its log.",
-            f"sysid turn-radius {SPEEDS} --speeds 1.4 --rudder-max 0.26 --measured circle.csv",
+            f"sysid turn-radius {SPEEDS} --speeds 1.4 --fin-max 0.26 --measured circle.csv",
         ),
         Example(
             "By the u-turn formula, from a table.",
-            "printf 'speed_m_s,a22,b2\\n1.5,1.0,-0.97\\n' | sysid turn-radius - --rudder-max 0.26",
+            "printf 'speed_m_s,a22,b2\\n1.5,1.0,-0.97\\n' | sysid turn-radius - --fin-max 0.26",
         ),
     ),
     "schedule": (
-        Example("Gains for each model's speed.", f"sysid schedule design {SPEEDS} --fin-limit 0.26 -o {GAINS}"),
+        Example("Gains for each model's speed.", f"sysid schedule design {SPEEDS} --fin-max 0.26 -o {GAINS}"),
         Example(
             "Margins and steps over the identified set, also between the speeds.",
             f"sysid schedule verify {GAINS} --require-phase-margin 30 -o demo/turning/gains.png",

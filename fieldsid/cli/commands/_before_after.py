@@ -52,7 +52,7 @@ def before_after(old: Path, new: Path, output: Path | None, *, figures: bool, fo
         raise UsageError("there is no axis with models on both sides", found=there, hint="give two models of one axis")
     twice = _in_both(sides)
     found = [_compared(sides, axis) for axis in axes]
-    drawn = [_drawn(c, (old, new), output if figures else None, force=force) for c in found]
+    drawn = [_drawn(c, (old, new), output if figures else None, alone=len(found) == 1, force=force) for c in found]
     changes = [
         {**c.record(), "models": [[str(p) for p in s.files[c.axis.value]] for s in sides], "figure": f, "next": _next(c, sides)}
         for c, f in zip(found, drawn, strict=True)
@@ -127,14 +127,15 @@ def _compared(sides: Sequence[Side], axis: str) -> Change:
     return compare_models(sources[0], sources[1], fin_limit=limit, stated=stated)
 
 
-def _drawn(found: Change, names: tuple[Path, Path], folder: Path | None, *, force: bool) -> str | None:
+def _drawn(found: Change, names: tuple[Path, Path], folder: Path | None, *, alone: bool, force: bool) -> str | None:
     if folder is None:
         return None
     from fieldsid.figures.canvas import save
     from fieldsid.figures.change import figure
+    from fieldsid.figures.kinds import figure_at
 
     sheet = figure(found, (f"before: {names[0]}", f"after: {names[1]}"))
-    return str(save(sheet, folder / f"before_after_{found.axis.value}.png", force=force))
+    return str(save(sheet, figure_at(folder, f"before_after_{found.axis.value}", is_one=alone), force=force))
 
 
 def _next(found: Change, sides: Sequence[Side]) -> str | None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from math import exp, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import emit, table
 from fieldsid.cli.progress import get_ready
+from fieldsid.comparison.sufficient import pooled
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
@@ -62,13 +62,13 @@ def several_models(
         "models": [
             {
                 "model": str(p),
-                "over_floor": _score(found),
+                "over_floor": pooled(c.over_noise for c in found),
                 "fitted_to": [c.run for c in found if c.run in fitted],
                 "runs": [entry(c, None, fitted) for c in found],
             }
             for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
         ],
-        "best": str(paths[min(range(len(paths)), key=lambda i: _score(found_of[i]))]),
+        "best": str(paths[min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))]),
         "figures": figures,
         "skipped_runs": skips.records,
     }
@@ -83,11 +83,6 @@ def several_models(
     return result
 
 
-def _score(found: Sequence[Comparison]) -> float:
-    """Return the geometric mean over the runs of the error over the noise, each run's worse channel."""
-    return exp(sum(log(c.leading.over_floor) for c in found) / len(found))
-
-
 def _names(paths: Sequence[Path]) -> list[str]:
     stems = [p.stem for p in paths]
     return [s if stems.count(s) == 1 else str(p) for s, p in zip(stems, paths, strict=True)]
@@ -97,19 +92,23 @@ def _drawn(found_of: Sequence[Sequence[Comparison]], names: Sequence[str], folde
     if folder is None:
         return []
     from fieldsid.figures.canvas import save
+    from fieldsid.figures.kinds import figure_at
     from fieldsid.figures.several import figure
     from fieldsid.runtime.background_tasks import BackgroundTasks
 
+    alone = len(found_of[0]) == 1
     with BackgroundTasks() as own:
         return [
-            str(save(figure(of_run, names), folder / f"models_on_{of_run[0].run}.png", force=force, tasks=own))
+            str(
+                save(figure(of_run, names), figure_at(folder, f"models_on_{of_run[0].run}", is_one=alone), force=force, tasks=own)
+            )
             for of_run in zip(*found_of, strict=True)
         ]
 
 
 def _render(to: Console, body: Mapping[str, Any], found_of: Sequence[Sequence[Comparison]], names: Sequence[str]) -> None:
     runs = [c.run for c in found_of[0]]
-    rows = [(run, *(f"{found[i].leading.over_floor:.2f}" for found in found_of)) for i, run in enumerate(runs)]
+    rows = [(run, *(f"{found[i].over_noise:.2f}" for found in found_of)) for i, run in enumerate(runs)]
     to.print(table("error over the noise", ("run", *names), rows))
     for path in body["figures"]:
         to.print(f"figure: {path}", soft_wrap=True)

@@ -11,8 +11,8 @@ import typer
 
 from fieldsid.cli.commands._other_data import fitted_to
 from fieldsid.cli.console import complain, emit, table
-from fieldsid.cli.options import Figures, Force, FromS, JsonFlag, MappingFile, OutputDir, ToS
-from fieldsid.cli.progress import get_ready, refuse_closed
+from fieldsid.cli.options import FigurePlace, Figures, Force, FromS, JsonFlag, MappingFile, ToS
+from fieldsid.cli.progress import get_ready, refuse_place
 from fieldsid.cli.session import drawing
 from fieldsid.cli.voice import shown_in, shown_words
 from fieldsid.errors import UsageError
@@ -50,7 +50,7 @@ def command(
     mapping: MappingFile = None,
     min_fit: MinFit = None,
     top: Top = MOST_SHOWN,
-    output: OutputDir = None,
+    output: FigurePlace = None,
     figures: Figures = True,
     force: Force = False,
     as_json: JsonFlag = False,
@@ -71,6 +71,7 @@ def command(
     """
     from fieldsid.cli.commands._before_after import before_after, is_side
 
+    refuse_place(output, force=force)
     sides = [p for p in (model, *runs) if is_side(p)]
     if len(sides) == len(runs) + 1 == 2:
         _refuse_part(start, end, mapping, min_fit)
@@ -81,7 +82,6 @@ def command(
     from fieldsid.models.model import load_model
     from fieldsid.models.record import left_out
 
-    refuse_closed(output)
     if len(sides) > 1:
         return _several(
             sides,
@@ -174,10 +174,20 @@ def _drawn(
         return [None] * len(found)
     from fieldsid.figures.canvas import save
     from fieldsid.figures.compare import figure
+    from fieldsid.figures.kinds import figure_at
 
+    alone = len(found) == 1
     with drawing(context) as own:
         return [
-            str(save(figure(c, model, name.name), folder / f"{name.stem}_on_{c.run}.png", force=force, tasks=own)) for c in found
+            str(
+                save(
+                    figure(c, model, name.name),
+                    figure_at(folder, f"{name.stem}_on_{c.run}", is_one=alone),
+                    force=force,
+                    tasks=own,
+                )
+            )
+            for c in found
         ]
 
 
@@ -193,17 +203,19 @@ def _entry(c: Comparison, figure: str | None, fitted: Collection[str]) -> dict[s
         "noise_floor": {"angle_rad": c.floor.angle, "rate_rad_s": c.floor.rate},
         "command_times": _as_flown(c, "command_between_samples"),
         "own_speed": _as_flown(c, "own_speed"),
+        "over_noise": c.over_noise,
         "over_floor": {channel.name: channel.over_floor for channel in c.channels},
         "judged_by": c.leading.name,
-        **_fault(c.leading),
-        "failing": [{"channel": channel.name} | _fault(channel) for channel in c.failing],
+        **_fault(c.leading, c),
+        "failing": [{"channel": channel.name} | _fault(channel, c) for channel in c.failing],
         "moves_with": [{"signal": m.signal, "explained": m.explained} for m in c.moves_with if c.failing],
         "figure": figure,
     }
 
 
-def _fault(c: Channel) -> dict[str, Any]:
+def _fault(c: Channel, of: Comparison) -> dict[str, Any]:
     """Return how well a channel is followed and, where it fails, where; one that is down to its noise fails nowhere."""
+    where, worst = (c.where, c.worst) if c in of.failing else ((), ())
     return {
         "theil": c.metrics.theil,
         "r2": c.metrics.r2,
@@ -217,10 +229,9 @@ def _fault(c: Channel) -> dict[str, Any]:
                 "t_start_s": p.start_s,
                 "t_end_s": p.end_s,
             }
-            for p in c.where
-            if c.fails
+            for p in where
         ],
-        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in c.worst if c.fails],
+        "worst": [{"t_start_s": s.start_s, "t_end_s": s.end_s, "share_of_error": s.share_of_error} for s in worst],
     }
 
 
@@ -277,7 +288,8 @@ def _render_where(to: Console, e: Mapping[str, Any], top: int) -> None:
     if quiet:
         if not failing:
             to.print()
-        to.print(f"{e['run']}: down to the noise: {', '.join(quiet)}", soft_wrap=True)
+        pooled = "" if failing else f", {e['over_noise']:.2f} x"
+        to.print(f"{e['run']}: down to the noise{pooled}: {', '.join(quiet)}", soft_wrap=True)
     if e["moves_with"]:
         said = ", ".join(f"{m['signal']} ({100 * m['explained']:.0f} %)" for m in e["moves_with"][:3])
         to.print(f"the missing moment moves with {said}")

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from fieldsid.models.model import Model
 
 MOST_PLACES, MOST_SPOKEN = 5, 3
-NAME_WIDTH = 30
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
@@ -178,15 +176,17 @@ def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
     from fieldsid.cli.headlines.words import times
     from fieldsid.comparison.sufficient import over_noise
 
-    def row(name: str, errors: Mapping[str, Any], floor: Mapping[str, Any], model: str) -> tuple[str, ...]:
-        return (name, *(times(over_noise(errors[side], floor)) for side in ("train", "validation")), model)
+    def row(name: str, errors: Mapping[str, Any], floor: Mapping[str, Any]) -> tuple[str, ...]:
+        return (name, *(times(over_noise(errors[side], floor)) for side in ("train", "validation")))
 
     if not applied:
         return
-    rows = [row("as it is", applied[0]["before"], applied[0]["noise_floor"], "")]
-    rows += [row(f"+ {step['effect']}", step["after"], step["noise_floor"], step["model"]) for step in applied]
+    rows = [row("as it is", applied[0]["before"], applied[0]["noise_floor"])]
+    rows += [row(f"+ {step['effect']}", step["after"], step["noise_floor"]) for step in applied]
     to.print()
-    to.print(table("the error step by step, over the noise floor", ("", "fitted", "unseen", "model"), rows))
+    to.print(table("the error step by step, over the noise floor", ("", "fitted", "unseen"), rows))
+    for step in applied:
+        to.print(f"model: {step['model']}", soft_wrap=True)
 
 
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
@@ -214,7 +214,7 @@ def _candidates(found: Diagnosis) -> Any:
     rows = [("as it is", "", *_errors(found, found.base), "", "")]
     rows += [
         (
-            fill(c.effect.replace("+", " +"), NAME_WIDTH),
+            c.effect.replace("+", " +"),
             probability(c.probability),
             *_errors(found, c.errors),
             "worse" if c.worse else f"{100 * c.explained:.0f} %",
@@ -240,20 +240,22 @@ def _errors(found: Diagnosis, errors: Pair) -> tuple[str, str]:
 
 
 def _render_words(to: Console, found: Diagnosis) -> None:
-    """Say the evidence for the first candidate and its likely rivals, and what they may be confused with."""
+    """Say what each named effect does, what it may be confused with, and the evidence for what is not in the first line."""
+    from fieldsid.diagnosis import what_it_does
     from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
 
     if found.verdict in ("sufficient", "disturbed"):
         return
-    if found.effects:
-        to.print()
-        to.print(shown_words(found.says))
+    to.print()
+    for name in found.effects:
+        to.print(shown_words(f"{name}: {what_it_does(name, found.model.values)}"))
     for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
         if i and c.probability < RIVAL_PROBABILITY_RATIO:
             continue
-        alike = f"; on these data nearly as good: {', '.join(c.confusable_with)}" if c.confusable_with else ""
-        to.print()
-        to.print(shown_words(f"{c.effect}: {c.evidence}{alike}"))
+        if found.verdict != "effect" or i:
+            to.print(shown_words(f"{c.effect}: {c.evidence}"))
+        if c.confusable_with:
+            to.print(shown_words(f"on these data nearly as good as {c.effect}: {', '.join(c.confusable_with)}"))
 
 
 def _render_where(to: Console, found: Diagnosis) -> None:

@@ -70,7 +70,7 @@ Speeds = Annotated[
 FinLimit = Annotated[
     str | None,
     typer.Option(
-        "--fin-limit",
+        "--fin-max",
         metavar="ANGLE",
         help="Largest fin angle, `15deg`; if not given the vehicle's limit, else the models' largest.",
         rich_help_panel=LIMITS,
@@ -165,7 +165,7 @@ def design(
     alike, each with the least fin that does: as soon as asked, else as the slowest can. P and PI have the damping's gain. Each
     row says what binds it, and what none holds is refused with what is possible. The feed-forward cancels the trim.
 
-    Example: sysid schedule design law.yaml --fin-limit 15deg -o gains.yaml
+    Example: sysid schedule design law.yaml --fin-max 15deg -o gains.yaml
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
     from fieldsid.cli.user_effects import check_effects
@@ -179,7 +179,7 @@ def design(
     from fieldsid.schedule.wish import QUICKEST, Wish
 
     refuse_existing(output, force=force)
-    given = None if fin_limit is None else parse_angle(fin_limit, "--fin-limit", FIN)
+    given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
     fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
     source = load_parameter_source(models, laws=law or ())

@@ -29,7 +29,7 @@ Speeds = Annotated[
 RudderMax = Annotated[
     str | None,
     typer.Option(
-        "--rudder-max",
+        "--fin-max",
         metavar="ANGLE",
         help="Rudder held in the turn, `15deg`; if not given the vehicle's limit, else the models' largest.",
     ),
@@ -74,7 +74,7 @@ def command(
     once, and the radius is the median of what these allow; without runs the models are simulated to the settled circle. A table
     or first-order models go by the u-turn formula. Rows say what they rest on: measured, identified or extrapolated.
 
-    Example: sysid turn-radius models/*.yaml --rudder-max 0.35 --measured circle.parquet -o turning/
+    Example: sysid turn-radius models/*.yaml --fin-max 0.35 --measured circle.parquet -o turning/
     """
     from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.headlines.gains import of_turn
@@ -86,7 +86,7 @@ def command(
     from fieldsid.turning.radius import turn_radius
 
     refuse_closed(output)
-    given = None if rudder_max is None else parse_angle(rudder_max, "--rudder-max", FIN)
+    given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
     source, skips = load_parameter_source(models, laws=law or ()), Skips()
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     prediction = turn_radius(
@@ -224,12 +224,13 @@ def _render_measured(to: Console, prediction: TurnPrediction) -> None:
         off = 100.0 * (m.predicted / circle.radius - 1.0)
         band = f"{number(m.predicted95[0], 3)} .. {number(m.predicted95[1], 3)}"
         radius = with_error(circle.radius, circle.radius_std_error)
-        rows.append((m.turn.run, number(times * m.turn.fin, 3), radius, number(m.predicted), band, f"{off:+.1f}"))
+        fin, speed = number(times * m.turn.fin, 3), number(m.turn.flown_at, 3)
+        rows.append((m.turn.run, speed, fin, radius, number(m.predicted), band, f"{off:+.1f}"))
     to.print()
     to.print(
         table(
             "measured circles, and what the other runs alone predict",
-            ("run", "fin", "radius m", "predicted", "95 %", "off %"),
+            ("run", "m/s", "fin", "radius m", "predicted", "95 %", "off %"),
             rows,
         )
     )

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+LONGEST = 200
+"""Characters of a line that is read at a glance; what a verdict has beyond them is told below it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Headline:
@@ -16,8 +19,23 @@ class Headline:
     @property
     def lines(self) -> tuple[str, ...]:
         """The lines as they are printed."""
-        return (self.says, f"rests on {self.rests_on}", *([f"next: {self.next}"] if self.next else []))
+        shown = (begun(self.says)[0], begun(f"rests on {self.rests_on}")[0])
+        return (*shown, *([f"next: {self.next}"] if self.next else []))
+
+    @property
+    def rest(self) -> tuple[str, ...]:
+        """What the first two lines have no room for."""
+        return tuple(rest for text in (self.says, f"rests on {self.rests_on}") if (rest := begun(text)[1]))
 
     def record(self) -> dict[str, str]:
-        """Return the lines as `--json` has them."""
+        """Return the lines as `--json` has them, each whole."""
         return {"says": self.says, "rests_on": self.rests_on, "next": self.next}
+
+
+def begun(text: str) -> tuple[str, str]:
+    """Return a text as far as a line has room, whole clauses where there are any, and the rest of it."""
+    if len(text) <= LONGEST:
+        return text, ""
+    room = text[: LONGEST - len(" ...")]
+    end = next((at for mark in ("; ", ": ", ", ", " ") if (at := room.rfind(mark)) > LONGEST // 3), len(room))
+    return f"{room[:end]} ...", text[end:].lstrip(";:, ")

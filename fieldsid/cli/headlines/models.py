@@ -10,7 +10,7 @@ from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import is_there, pasted, repeated, typed_with
 from fieldsid.cli.headlines.words import MOST_NAMED, Body, counted, named, used
 from fieldsid.cli.voice import shown_estimate, shown_in, shown_words
-from fieldsid.comparison.sufficient import is_noise, over_noise
+from fieldsid.comparison.sufficient import is_noise, over_noise, pooled
 from fieldsid.rounding import MANY, noise_fall, number, times_noise
 
 NO_NOISE, WHOLE_FIT = "filtered_sensor", 99.0
@@ -72,16 +72,19 @@ def _after_fit(body: Body, axis: str, over: Sequence[float], files: Sequence[Seq
 
 
 def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Headline:
-    """Return the worst run's worse channel, and on what it was judged; inputs: what the model was fitted to."""
+    """Return what is left over all runs, the worst of them, and on what it was judged; inputs: what the model was fitted to."""
     entries, axis = body["runs"], str(body["axis"])
     worst = max(entries, key=_badness)
     channel = worst["judged_by"]
-    over = f"{_leading(worst):.2f} x its noise, " if _leading(worst) < MANY else ""
-    says = f"{worst['run']}: {channel} {f'error {over}' if over else ''}fit {worst[f'{channel}_fit_percent']:.1f} %"
-    if worst["failing"]:
-        says += f"; fails most at {shown_words(worst['where'][0]['condition'])}" if worst["where"] else ""
-    else:
+    over = pooled(float(e["over_noise"]) for e in entries)
+    error = f"error {worst['over_noise']:.2f} x the noise, " if worst["over_noise"] < MANY else ""
+    says = f"{worst['run']}: {error}{channel} fit {worst[f'{channel}_fit_percent']:.1f} %"
+    if len(entries) > 1 and over < MANY:
+        says += f"; over all {len(entries)} runs {over:.2f} x"
+    if is_noise(over):
         says += ": nothing is left but the noise"
+    elif worst["where"]:
+        says += f"; fails most at {shown_words(worst['where'][0]['condition'])}"
     seen = [e["run"] for e in entries if e["fitted_to"]]
     judged = (
         "which it was not fitted to"
@@ -91,7 +94,7 @@ def of_compare(body: Body, runs: Sequence[Path], inputs: Sequence[Path]) -> Head
         else (f"{named(seen)} of them it was fitted to")
     )
     rests = f"a free run over {counted(len(entries), 'run')}, {judged}"
-    return Headline(says, rests, after_compare(body["model"], axis, bool(worst["failing"]), runs, inputs))
+    return Headline(says, rests, after_compare(body["model"], axis, not is_noise(over), runs, inputs))
 
 
 def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inputs: Sequence[Path]) -> str:
@@ -134,14 +137,10 @@ def _searched(model: Path) -> bool:
     )
 
 
-def _leading(entry: Body) -> float:
-    return float(entry["over_floor"][entry["judged_by"]])
-
-
 def _badness(entry: Body) -> tuple[float, float]:
     from fieldsid.comparison.compare import badness
 
-    return badness(_leading(entry), float(entry[f"{entry['judged_by']}_fit_percent"]))
+    return badness(float(entry["over_noise"]), float(entry[f"{entry['judged_by']}_fit_percent"]))
 
 
 def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: Sequence[Path], *, close: float) -> Headline:
@@ -155,13 +154,11 @@ def of_several(body: Body, names: Sequence[str], runs: Sequence[Path], inputs: S
     seen = [f"{n} was fitted to {to}: no fair judge of it" for n, to in fitted]
     if len(fitted) == len(names) and len({to for _, to in fitted}) == 1:
         seen = [f"every one was fitted to {fitted[0][1]}: no fair judge"]
-    rests = f"{counted(len(over), 'run')}, geometric mean of the worse channel of each" + (f"; {'; '.join(seen)}" if seen else "")
-    entry = next(m for m in body["models"] if m["model"] == body["best"])
-    fails = any(e["failing"] for e in entry["runs"])
+    rests = f"{counted(len(over), 'run')}, angle and rate pooled" + (f"; {'; '.join(seen)}" if seen else "")
     return Headline(
         f"{best} {word}: {times_noise(least)}; {others}",
         rests,
-        after_compare(body["best"], str(body["axis"]), fails, runs, inputs),
+        after_compare(body["best"], str(body["axis"]), not is_noise(least), runs, inputs),
     )
 
 

@@ -50,7 +50,7 @@ def of_plan(body: Body, model: Path | None) -> Headline:
 def of_status(body: Body) -> Headline:
     """Return what a folder holds and what to do next."""
     lines = counted(len(body["journal"]), "line")
-    rests = f"{counted(len(body['files']), 'file')} by their hashes, {lines} of the journal; {body['next']['why']}"
+    rests = f"{counted(len(body['files']), 'file')}, {lines} of the journal; {body['next']['why']}"
     return Headline(str(body["verdict"]), rests, str(body["next"]["command"]))
 
 

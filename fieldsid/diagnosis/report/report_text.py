@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +94,8 @@ def _named(search: Search, verdict: Verdict, found: ScoredModel, left: Left, flo
     unusual, own = apart_from_the_hulls_own(verdict.effects)
     with_own = f"with the hull's own {', '.join(own)}" if own else ""
     names = " ".join(part for part in (" and ".join(unusual), with_own) if part) if unusual else " and ".join(own)
-    says = "; ".join(_says(found, n) for n in (*unusual, *own))
+    held = {c.name for e in found.effects for c in e.coefficients}
+    says = "; ".join(what_it_does(n, held) for n in (*unusual, *own))
     fall = _fall(search, found, floor, _judged(search))
     if verdict.word == "undecided":
         others = {"+".join(names_added(search, r)): r for r in verdict.rivals}
@@ -190,11 +191,10 @@ def _disturbance(noise: Noise) -> str:
     return f"sensors that wander by {wander} with a time constant of {noise.coloured_time:.2g} s"
 
 
-def _says(h: ScoredModel, name: str) -> str:
-    """Return what an effect of a model does, with its variant where that is not the textbook's."""
+def what_it_does(name: str, held: Collection[str]) -> str:
+    """Return what an effect does in a model that holds these coefficients, with its variant where it is not the textbook's."""
     effect = effect_named(name)
-    fitted = {c.name for e in h.effects if e.name == name for c in e.coefficients}
-    form = variant_of(effect, fitted)
+    form = variant_of(effect, held)
     return effect.says if form is None else f"{effect.says}: {form.says}"
 
 

@@ -33,7 +33,6 @@ MAX_SPEED_ITERATIONS, CONVERGED_STD_ERRORS = 4, 0.02
 """Rounds, each with the weights of what the last one has left, and the change in errors of the measurement that ends them."""
 STEP_PARTS = (1.0, 0.5, 0.25)
 """Parts of a step that are tried until the cost falls."""
-MIN_REPORTED_SHARE = 0.001
 SURPRISING_STD_ERRORS = 2.0
 """Standard errors from which on a speed that is off is a finding of its own."""
 
@@ -63,12 +62,12 @@ def correct_speed(problem: Problem, x: FloatArray, floor: Noise) -> tuple[Proble
 
 
 def is_worth_reporting(faster: float) -> bool:
-    """Whether a share is worth telling of."""
-    return abs(faster) >= MIN_REPORTED_SHARE
+    """Whether a share is worth telling of: within one error of its measurement a speed is as measured."""
+    return abs(faster) > MEASURED_SPEED_STD_ERROR
 
 
 def speed_note(record: Record, faster: float) -> Note | None:
-    """Return the note on a run that was flown at another speed than its log has, None where that is next to nothing.
+    """Return the note on a run that was flown at another speed than its log has, None within an error of its measurement.
 
     One that is off by more than its measurement should be is a finding: of the log's scale, or of the model.
     """

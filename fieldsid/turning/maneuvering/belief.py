@@ -166,7 +166,7 @@ def like_no_vehicle(fitted: Fitted, length: float | None) -> Note:
     hint = "" if length is not None else "state `length_m` in vehicle.yaml, "
     words = (
         "what all runs together make of surge, sway and yaw lies where no vehicle does: "
-        f"{away:.0f} from the vehicles known, 999 of 1000 lie below {FARTHEST_COST:.0f} ({', '.join(runs)}); "
+        f"{away:.0f} from the vehicles known, limit {FARTHEST_COST:.0f} ({', '.join(runs)}); "
         f"each speed's own model is taken instead: {hint}look at the runs with `sysid inspect`, or fly a zig-zag"
     )
     return Note("like_no_vehicle", words, {"runs": runs, "value": away, "limit": FARTHEST_COST})

@@ -39,6 +39,11 @@ class MeasuredTurn(Plotted):
     track: tuple[FloatArray, FloatArray]
     settled: tuple[FloatArray, FloatArray]
 
+    @property
+    def flown_at(self) -> float:
+        """The speed (m/s) that the turn was entered with; where that is unknown, the one along the circle."""
+        return self.entry_speed if np.isfinite(self.entry_speed) else self.path_speed
+
 
 def measure_turn(run: Run, *, start_s: float | None = None, end_s: float | None = None) -> MeasuredTurn:
     """Fit the circle of a run's settled turn, found in the yaw rate (or between start_s and end_s).

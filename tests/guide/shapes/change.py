@@ -143,7 +143,7 @@ class OneOfSeveral(Shape):
     model: str
     """Its file."""
     over_floor: float
-    """Error over the noise, geometric mean of the worse channel of each run."""
+    """Error over the noise, angle and rate and the runs pooled."""
     fitted_to: list[str]
     """Runs that it was fitted to, which are no fair judge."""
     runs: list[ComparedRun]

@@ -204,10 +204,12 @@ class ComparedRun(Merit):
     """Where it fails, the worst first."""
     worst: list[Stretch]
     """The worst stretches of two seconds."""
+    over_noise: float
+    """Error over the noise floor, the measured channels pooled: what says whether the run fails."""
     over_floor: dict[str, float]
     """By channel, rms over the noise floor."""
     failing: list[Failing]
-    """The channels that have more left than their noise, the worst first."""
+    """The channels that have more left than their noise, the worst first; none where the run as a whole has not."""
     moves_with: list[MovesWith]
     """What the missing moment moves with, the most first."""
     figure: str | None

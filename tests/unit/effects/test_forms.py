@@ -19,7 +19,7 @@ NEUTRAL = {
     "stall_blend": 0.0, "deadband_blend": 0.0, "deadband_jump": 0.0, "levelling": 0.0, "ramp": 0.0,
     "deviation_sin2": 0.0, "deviation_cos2": 0.0, "cross_quadratic": 0.0, "cross_fin": 0.0, "cross_exponent": 1.0,
     "second_period": 5.0, "second_sin": 0.0, "second_cos": 0.0, "sweep": 0.0, "release": 1.0, "rate_power": 2.0,
-    "falling_share": 1.0, "slackening": 1.0, "off_middle": 0.0, "lift_bend": 0.0, "prop_square": 0.0, "build_up": 0.0,
+    "falling_share": 1.0, "lag_ratio": 1.0, "off_middle": 0.0, "lift_bend": 0.0, "prop_square": 0.0, "build_up": 0.0,
     "roll_rate_moment": 0.0, "scale_cubic": 0.0, "clock_drift": 0.0, "depth_square": 0.0, "current_sin2": 0.0,
     "current_cos2": 0.0, "current_turn": 0.0, "stall_drop": 0.0, "munk_exponent": 2.0, "prop_trimmed": 0.0,
     "scale_side": 0.0, "bias_drift": 0.0, "roll_cubic": 0.0, "speed_power": 2.0, "current_power": 0.0,

@@ -38,18 +38,15 @@ def table(folder, text="speed_m_s,a22,b2,C0\n1.4,1.1,-1.2,-0.12\n"):
 
 def test_the_fin_limit_advised_is_that_of_the_runs_and_serves_at_every_speed(tmp_path):
     known = source(tmp_path, 0.05, 0.12, fin_max=0.26543)
-    for refused, option in (
-        (lambda: turn_radius(known, [1.2, 1.5], 0.08), "--rudder-max"),
-        (lambda: design_schedule(known, 0.08), "--fin-limit"),
-    ):
+    for refused in (lambda: turn_radius(known, [1.2, 1.5], 0.08), lambda: design_schedule(known, 0.08)):
         with pytest.raises(UsageError, match=r"offset at 1\.5 m/s") as caught:
             refused()
-        assert caught.value.hint == f"the models' runs had the fin at up to 0.2655 rad: `{option} 0.2655`"
+        assert caught.value.hint == "the models' runs had the fin at up to 0.2655 rad: `--fin-max 0.2655`"
 
 
 @pytest.mark.parametrize("fin_max", [0.1, 0.0])
 def test_where_the_runs_do_not_tell_a_limit_the_least_is_said(tmp_path, fin_max):
-    assert wider_fin("--fin-limit", 0.12, source(tmp_path, 0.12, fin_max=fin_max)) == (
+    assert wider_fin("--fin-max", 0.12, source(tmp_path, 0.12, fin_max=fin_max)) == (
         "trim the fin: a limit has to be above 0.12 rad, 6.9 deg"
     )
     with pytest.raises(UsageError) as caught:

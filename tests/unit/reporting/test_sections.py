@@ -6,14 +6,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from fieldsid.comparison.compare import Channel
+from fieldsid.comparison.compare import Channel, Comparison
 from fieldsid.comparison.metrics import Metrics
 from fieldsid.reporting.sections import _followed, _vehicle, _without_noise
 from fieldsid.vehicle import vehicle_of
 
 
-def channel(name, over, fit):
-    return Channel(name, over, fit, Metrics(0.1, 0.9, 0.5), (), ())
+def run(name, over, fit):
+    channel = Channel(name, over, fit, Metrics(0.1, 0.9, 0.5), (), ())
+    return Comparison(None, None, None, (channel,), (), None)
 
 
 @pytest.mark.parametrize(
@@ -25,14 +26,14 @@ def channel(name, over, fit):
     ],
 )
 def test_an_error_is_told_over_the_noise_where_there_is_some_and_else_as_the_fit(name, over, fit, says):
-    found = SimpleNamespace(leading=channel(name, over, fit))
+    found = run(name, over, fit)
     assert _followed(found.leading) == says
     if over > 100.0:
         assert _without_noise([found], "1 run") == f"{says} on 1 run; the log has next to no noise"
 
 
 def test_of_runs_without_noise_the_worst_is_that_of_the_least_fit_whatever_their_digits():
-    runs = [SimpleNamespace(leading=channel("rate", 25000.0, 93.3)), SimpleNamespace(leading=channel("angle", 5600.0, 65.4))]
+    runs = [run("rate", 25000.0, 93.3), run("angle", 5600.0, 65.4)]
     assert _without_noise(runs, "2 runs") == "angle fit 65.4 % on 2 runs, the worst; the log has next to no noise"
 
 

@@ -130,9 +130,9 @@ def test_what_was_measured_is_not_asked_for_again(tmp_path):
 
 def test_circles_of_another_rudder_are_named_with_how_to_ask_for_them(tmp_path):
     said = asked_of(tmp_path, circle("c1", fin=0.4), circle("c2", fin=0.4, speed=1.0)).settling
-    assert said[0] == "with `--rudder-max 0.4`, the rudder of those turns, c1, c2 count as measured"
+    assert said[0] == "with `--fin-max 0.4`, the rudder of those turns, c1, c2 count as measured"
     alone = asked_of(tmp_path, circle("c1", fin=0.4)).settling
-    assert alone[0] == "with `--rudder-max 0.4`, the rudder of that turn, c1 counts as measured"
+    assert alone[0] == "with `--fin-max 0.4`, the rudder of that turn, c1 counts as measured"
     assert said[1].startswith("turning_circle to port at 1.00, 1.50 m/s, to starboard at 1.00, 1.50 m/s with 0.3 rad")
     trusted = [r.trust for r in asked_of(tmp_path, circle("c1", fin=0.4), circle("c2", fin=0.4, speed=1.0), rudder=0.4).rows]
     assert trusted.count("measured") == 2

@@ -80,9 +80,15 @@ def test_a_heading_once_a_second_and_no_rate_tell_the_speed_as_well():
 
 def test_a_speed_that_is_right_is_left_where_it_is():
     shown = predict(TRUE, logged(0.0))
-    assert abs(shown.faster) < speed_correction.MIN_REPORTED_SHARE
+    assert abs(shown.faster) < 0.001
     assert shown.as_logged is None
     assert speed_note(shown.record, shown.faster) is None
+
+
+@pytest.mark.parametrize("errors", [-0.9, 0.9, 1.1, -1.1])
+def test_a_speed_within_an_error_of_its_measurement_is_no_note(errors):
+    note = speed_note(logged(0.0), errors * MEASURED_SPEED_STD_ERROR)
+    assert (note is None) is (abs(errors) < 1.0)
 
 
 def test_a_speed_is_moved_by_three_errors_of_its_measurement_at_most():
