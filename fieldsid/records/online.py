@@ -7,14 +7,15 @@ from fieldsid.records.check import AXES, Shape, above_zero, each, flag, maybe, n
 ANY = number(-1e60, 1e60)
 """A number whose squares are numbers still."""
 NOT_MEASURED = maybe(ANY)
+LINE = maybe((ANY, ANY))
 COUNT = number(0.0, 1e15)
 RECENT = 256
 GATE: Shape = {"recent": times(RECENT, NOT_MEASURED), "seen": whole, "limit": maybe(number(0.0)), "spikes": whole}
 FILTER: Shape = {
     "memory": times(30, ANY),
     "packed": times(14, ANY),
-    "late": [(ANY, NOT_MEASURED, flag)],
-    "moves": [(ANY, ANY)],
+    "late": [(ANY, NOT_MEASURED, flag, LINE)],
+    "moves": [(ANY, ANY, LINE)],
     "numbers": {"fin": NOT_MEASURED, "last_angle": NOT_MEASURED},
     "counts": dict.fromkeys(("used", "missing", "repeated", "gaps", "restarts", "late"), whole),
     "colour": {

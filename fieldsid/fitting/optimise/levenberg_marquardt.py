@@ -273,4 +273,4 @@ def _directions(normal: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray,
         )  # fmt: skip
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-60))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    return scale, values, vectors, 1e-13 * max(float(values[-1]), 1e-300)
+    return scale, values, vectors, 1e-13 * max(float(values[-1]), 1.0)
