@@ -24,11 +24,11 @@ def parse_quantity(text: str, option: str, units: Mapping[str, float], example: 
         value = math.nan
     if not math.isfinite(value):
         known = " or ".join(f"`{u}`" for u in units)
-        raise UsageError(f"{word!r} is no number with {known}", found=f"{option} {word}", hint=f"write `{option} {example}`")
+        raise UsageError(f"`{option}` must be a number, in {known}", found=f"{option} {word}", hint=f"write `{option} {example}`")
     return value * units[unit]
 
 
-def parse_time(text: str, option: str, example: str = "4s") -> float:
+def parse_time(text: str, option: str, example: str = "0.1s") -> float:
     """Read a time in s: `4s`, `400ms`, or a bare number, which is s."""
     return parse_quantity(text, option, TIME, example)
 

@@ -151,7 +151,7 @@ def test_a_file_that_an_export_replaces_is_shown_and_kept(run_cli, gains, tmp_pa
     ("option", "said"),
     [
         ("--settling=0.5s", "no gains settle a 20 deg step within 0.5 s"),
-        ("--settling=soon", "'soon' is no number with `s` or `ms`"),
+        ("--settling=soon", "`--settling` must be a number, in `s` or `ms`"),
         ("--bandwidth=50", "no gains have a bandwidth of 50 rad/s"),
         ("--overshoot=0.2", "is 0.2 % or 20 %"),
         ("--fin-use=300%", "the share of the fin must lie in 1 .. 100 %"),

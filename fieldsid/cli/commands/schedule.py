@@ -195,7 +195,7 @@ def design(
             margin,
             step=None if step is None else parse_angle(step, "--step", TILT, HEADING),
             bandwidth=None if bandwidth is None else parse_quantity(bandwidth, "--bandwidth", BANDWIDTH, "1rad/s"),
-            settling=QUICKEST if settling == "quickest" else _time(settling, "--settling"),
+            settling=QUICKEST if settling == "quickest" else _time(settling, "--settling", "4s"),
             overshoot=None if overshoot is None else parse_share(overshoot, "--overshoot"),
             fin_use=None if fin_use is None else parse_share(fin_use, "--fin-use"),
         ),
@@ -349,10 +349,10 @@ def _export_into(known: Schedule, schedule: Path, into: Path, key: str, *, write
     return emit(body, as_json=as_json, render=lambda out: print_file(out, patch.difference), headline=headline, is_file=not write)
 
 
-def _time(text: str | None, option: str) -> float | None:
+def _time(text: str | None, option: str, example: str = "0.1s") -> float | None:
     from fieldsid.face.quantities import parse_time
 
-    return None if text is None else parse_time(text, option)
+    return None if text is None else parse_time(text, option, example)
 
 
 def _limits(

@@ -245,7 +245,7 @@ def refuse_endless(definitions: Definitions, type_name: str) -> None:
         raise LogError(
             f"message type `{type_name}` is none that is recorded: it comes to {count} parts",
             found=f"more than {MOST_PARTS}",
-            hint="give the definition the vehicle was built with: `--msg-path DIR`",
+            hint="give the definitions the vehicle was built with: `--msg-path DIR`",
         )
 
 
