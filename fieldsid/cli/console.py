@@ -151,10 +151,8 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Renderable
     )
     rows = list(rows)
     for i, column in enumerate(columns):
-        justify, whole = (
-            ("left", False) if i < left else ("right", any(_is_number(cell) for row in rows for cell in row[i : i + 1]))
-        )
-        made.add_column(column, justify=justify, header_style="dim", overflow="fold", no_wrap=whole)
+        whole = i >= left and any(_is_number(cell) for row in rows for cell in row[i : i + 1])
+        made.add_column(column, justify="left" if i < left else "right", header_style="dim", overflow="fold", no_wrap=whole)
     for row in rows:
         made.add_row(*row)
     return made
