@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from fieldsid.fitting.covariance.noise_selection import residual_whiteness
 from fieldsid.fitting.estimates import estimates
 from fieldsid.fitting.fin_sense import fin_sense
 from fieldsid.fitting.initial.trim_speed_law import groups_by_trim
+from fieldsid.fitting.predict.goodness_of_fit import goodness_of_fit
 from fieldsid.fitting.predict.predict import Prediction, refit_nuisances
 from fieldsid.fitting.problem.estimator import Estimator, History, Options, Solution
 from fieldsid.fitting.problem.parameters import layout_of
@@ -173,7 +175,15 @@ def fitted(problem: Problem, solution: Solution) -> Fit:
     sigma = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(sigma, sigma)
     order = [names.index(n) for n in model.free]
+    model = replace(model, info={**model.info, "left": _left(predictions, floor)})
     return Fit(model, predictions, floor, correlation[np.ix_(order, order)], notes, solution.history)
+
+
+def _left(predictions: Sequence[Prediction], floor: Noise) -> dict[str, Any]:
+    """Return what a fit leaves of its runs and the noise of their sensors, for a model to keep."""
+    merit = goodness_of_fit(predictions)
+    noise = {"angle_rad": floor.angle, "rate_rad_s": floor.rate}
+    return {"angle_rms_rad": merit.angle_rms, "rate_rms_rad_s": merit.rate_rms, "noise_floor": noise}
 
 
 def prediction_of(problem: Problem, x: FloatArray, run: int) -> Prediction:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from fieldsid.comparison.sufficient import is_noise, over_noise
+from fieldsid.comparison.left_by import left_by_addition
+from fieldsid.comparison.sufficient import is_noise
 from fieldsid.logs.several.run_names import stem_of
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.records.named_inputs import sha256_of
@@ -157,10 +157,7 @@ def _searched_on(state: FolderState, best: Item) -> tuple[str, str] | None:
 
 def left_by(model: Mapping[str, Any]) -> float:
     """Return the error over the noise floor that an extended model leaves, the larger of fitted and unseen runs; else NaN."""
-    record = (model.get("info") or {}).get("extension") or {}
-    floor = record.get("noise_floor") or {}
-    over = (over_noise(errors, floor) for errors in (record.get("after") or {}).values())
-    return max((o for o in over if isfinite(o)), default=float("nan"))
+    return left_by_addition(model.get("info") or {})
 
 
 def _unsettled(state: FolderState, diagnosis: Entry | None) -> tuple[str, str] | None:

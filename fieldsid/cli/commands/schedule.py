@@ -11,7 +11,7 @@ import typer
 
 from fieldsid.cli.commands._schedule_tables import render_design, render_export, render_verify
 from fieldsid.cli.console import emit, print_file, say
-from fieldsid.cli.headlines.gains import of_design, of_export, of_patch, of_verification
+from fieldsid.cli.headlines.gains import caveat, of_design, of_export, of_patch, of_verification
 from fieldsid.cli.options import LIMITS, Force, JsonFlag, ModelFiles, OutputFile, VehicleFile
 from fieldsid.cli.progress import refuse_existing, refuse_figure
 from fieldsid.cli.session import tasks_of
@@ -209,7 +209,7 @@ def design(
     if output is not None:
         inputs = [p for p in source.paths if p.is_file()]
         body["file"] = str(save_schedule(schedule, output, inputs=inputs, force=force))
-    headline = of_design(body, models)
+    headline = of_design(body, models, caveat(source.models, models))
     return emit(
         body,
         as_json=as_json,

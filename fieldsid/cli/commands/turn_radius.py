@@ -77,7 +77,7 @@ def command(
     Example: sysid turn-radius models/*.yaml --fin-max 0.35 --measured circle.parquet -o turning/
     """
     from fieldsid.angles import FIN, parse_angle
-    from fieldsid.cli.headlines.gains import of_turn
+    from fieldsid.cli.headlines.gains import caveat, of_turn
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import length_of
@@ -104,7 +104,7 @@ def command(
     body["skipped_runs"] = skips.records
     if output is not None:
         body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
-    headline, notes = of_turn(body, models), prediction.notes
+    headline, notes = of_turn(body, models, caveat(source.models, models)), prediction.notes
     result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
     return result

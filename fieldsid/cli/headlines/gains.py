@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.headlines.typed import pasted, typed_with
-from fieldsid.cli.headlines.words import Body, counted, named
+from fieldsid.cli.headlines.words import Body, counted, named, times
 from fieldsid.cli.voice import shown_in
-from fieldsid.rounding import number, with_error
+from fieldsid.rounding import MANY, number, with_error
 from fieldsid.trial_folder.journal import is_trial
+
+if TYPE_CHECKING:
+    from fieldsid.models.model import Model
 
 TARGET = "ros2"
 SLOWER = 60.0
@@ -37,7 +41,23 @@ def of_fit(body: Body) -> Headline:
     return Headline(says, rests, pasted("schedule", "design", body["file"], "-o", "gains.yaml"))
 
 
-def of_turn(body: Body, models: Sequence[Path]) -> Headline:
+def caveat(models: Iterable[Model], files: Sequence[Path]) -> str:
+    """Return how a result begins that is made of models whose own records say that they lack something; empty where none does.
+
+    Where a diagnosis has asked that already, it is not sent back to one.
+    """
+    from fieldsid.cli.headlines.models import searched
+    from fieldsid.comparison.left_by import lacking
+
+    over = lacking(models)
+    if not isfinite(over):
+        return ""
+    first = "" if any(p.is_file() and searched(p) for p in files) else "; `sysid diagnose` first"
+    left = f"{times(over)} x the noise" if over < MANY else "more than the noise"
+    return f"from a model that lacks something ({left}{first}): "
+
+
+def of_turn(body: Body, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the tightest turn of both sides with its band; where the band alone is known, what tells the radius."""
     from fieldsid.turning.known_radius import turn_words
     from fieldsid.turning.prediction import found_by
@@ -55,10 +75,10 @@ def of_turn(body: Body, models: Sequence[Path]) -> Headline:
     rudder = f"rudder {number(times * body['rudder_max_rad'], 3)} {unit}"
     rests = f"{named([str(m) for m in models])}, {rudder}; {found_by(methods)}, {counted(len(speeds), 'speed')}; {circles}"
     says += ": one and a half circles tell it" if tightest["band_only"] else ""
-    return Headline(says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
+    return Headline(caveat + says, rests, pasted("schedule", "design", models, "-o", "gains.yaml"))
 
 
-def of_design(body: Body, models: Sequence[Path]) -> Headline:
+def of_design(body: Body, models: Sequence[Path], caveat: str = "") -> Headline:
     """Return the span of the gains and the least margin."""
     rows = body["rows"]
     first, last = rows[0], rows[-1]
@@ -74,7 +94,7 @@ def of_design(body: Body, models: Sequence[Path]) -> Headline:
     drawn = f"{counted(int(body['provenance']['draws']), 'draw')} of {body['provenance']['draws_of']}"
     rests = f"{named([str(m) for m in models])}, {drawn}" + (f"; {beyond} of {len(rows)} rows without data" if beyond else "")
     next_ = pasted("schedule", "verify", body["file"]) if body["file"] else typed_with("-o", "gains.yaml")
-    return Headline(says, rests, next_)
+    return Headline(caveat + says, rests, next_)
 
 
 def of_verification(body: Body, schedule: Path, models: Sequence[Path]) -> Headline:

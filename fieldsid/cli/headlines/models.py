@@ -104,7 +104,7 @@ def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inpu
     from fieldsid.trial_folder.next_step import left_by
 
     more = fails or not is_noise(left_by(read_yaml(Path(model))))
-    if not more or _searched(Path(model)):
+    if not more or searched(Path(model)):
         return used(axis, model)
     fitted = [p for p in inputs if is_there(p)]
     unseen = [p for p in runs if p.resolve() not in {f.resolve() for f in fitted}]
@@ -113,7 +113,7 @@ def after_compare(model: str, axis: str, fails: bool, runs: Sequence[Path], inpu
     return pasted("diagnose", fitted or list(runs), "--axis", axis, *known, *judged)
 
 
-def _searched(model: Path) -> bool:
+def searched(model: Path) -> bool:
     """Whether a diagnosis beside a model asked since it was written what it lacks, and named nothing to add.
 
     A model without effects is what a diagnosis of its own runs begins with, whether it is named there or not.
@@ -185,7 +185,7 @@ def of_history(body: Body, inputs: Sequence[Path]) -> Headline:
     """Return how the error fell along a model's line; inputs: what it was fitted to."""
     steps = [g for g in body["generations"] if g.get("over_floor")]
     axis, model = str(body["axis"]), str(body["model"])
-    is_searched = _searched(Path(model))
+    is_searched = searched(Path(model))
     logs = [] if is_searched else [p for p in inputs if is_there(p)]
     if not steps:
         next_ = used(axis, model) if is_searched else pasted("diagnose", logs, "--axis", axis) if logs else pasted("status")
