@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fieldsid.errors import DataError, UsageError
+from fieldsid.logs.convert.settling import settling_of
 from fieldsid.logs.run import Run
 from fieldsid.numerics.arrays import BoolArray, FloatArray
-from fieldsid.numerics.first_order_lag import settling_of
 
 BEFORE_S = 2.0
 AFTER_S = 10.0

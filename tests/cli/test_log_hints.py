@@ -191,6 +191,7 @@ BY_OTHERS = {
 UNREACHED = (
     "change `--from` and `--to`",
     "import the log again with `sysid import`", "give a clean one: ", "give the definitions the vehicle was built with",
+    "give a definition that ends",
     "give its folder: ", "if it is one, say in a mapping how it is written, as ", "`--force`, or name another output",
 )  # fmt: skip
 """Options without a value, to be chosen by the times found. Of a run made in memory; of definitions that are damaged or do not

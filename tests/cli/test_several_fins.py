@@ -100,14 +100,15 @@ def test_two_rudders_with_the_same_numbers_are_one(run_cli, tmp_path):
     assert inspected["mapping"]["signals"]["rudder_rad"]["column"] == "rudder_port_deg"
 
 
-def test_a_folder_of_tables_is_identified_and_says_the_command_without_a_mapping(run_cli, tmp_path):
-    log = made.simulator(tmp_path)
-    refused = run_cli("identify", str(log), "--axis", "yaw", "--no-figures")
-    assert refused.code == 2
-    assert f"sysid inspect {log} --write-mapping mapping.yaml" in refused.err
+def test_a_folder_of_tables_is_identified_as_recognised_and_by_its_mapping(run_cli, tmp_path):
+    log, asked = made.simulator(tmp_path), ("--axis", "yaw", "--no-figures", "--json")
+    recognised = run_cli("identify", str(log), *asked)
+    assert "read as: " in recognised.err
     run_cli("inspect", str(log), "--write-mapping", str(tmp_path / "m.yaml"))
-    done = run_cli("identify", str(log), "-m", str(tmp_path / "m.yaml"), "--axis", "yaw", "--no-figures", "--json")
-    assert done.json["fits"][0]["parameters"]["a22"]["value"] == pytest.approx(made.A22, rel=0.01)
+    mapped = run_cli("identify", str(log), "-m", str(tmp_path / "m.yaml"), *asked)
+    assert "read as: " not in mapped.err
+    for done in (recognised, mapped):
+        assert done.json["fits"][0]["parameters"]["a22"]["value"] == pytest.approx(made.A22, rel=0.01)
 
 
 def test_tables_are_joined_by_name(run_cli, tmp_path):

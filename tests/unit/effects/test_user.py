@@ -242,7 +242,7 @@ def test_a_folder_gives_its_effects_and_a_broken_file_only_its_error(tmp_path):
     with pytest.raises(EffectError, match=r"two.yml`: there is no signal"):
         pick_effect("two")
     assert folder_of(tmp_path, "name: [one\n") == ({"one"}, [f"`{tmp_path}/two.yml` is not valid YAML"])
-    assert folder_of(tmp_path, ONE + "source: 2001-99-99\n") == (
+    assert folder_of(tmp_path, ONE + 'source: "\\UFFFFFFFF"\n') == (
         {"one"},
         [f"`{tmp_path}/two.yml` holds a value that YAML cannot read"],
     )
@@ -262,7 +262,7 @@ def test_a_folder_or_a_file_that_the_system_does_not_give_is_kept_as_an_error(tm
     def denied(*_arguments, **_options):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_text", denied)
+    monkeypatch.setattr(os, "open", denied)
     assert folder_of(tmp_path, ONE)[1] == [f"`{tmp_path}/{n}` cannot be read: Permission denied" for n in ("one.yaml", "two.yml")]
     monkeypatch.setattr(Path, "iterdir", denied)
     assert folder_of(tmp_path, ONE)[1] == [f"the folder `{tmp_path}` cannot be read: Permission denied"]

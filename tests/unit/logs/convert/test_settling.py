@@ -5,11 +5,11 @@ import pytest
 
 from fieldsid.errors import DataError
 from fieldsid.fitting.fit import check
+from fieldsid.logs.convert.settling import settling_of
 from fieldsid.logs.run import Run
 from fieldsid.logs.segments import segment
 from fieldsid.models.axis import Axis
 from fieldsid.models.record import record_of
-from fieldsid.numerics.first_order_lag import settling_of
 
 TIME = np.arange(0.0, 100.0, 0.2)
 
