@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fieldsid.runtime.evaluation_counter import EvaluationCounter
 
-MAX_EVALUATIONS_PER_RUN, MAX_EVALUATIONS_WHERE_UNEXPLAINED = 1000, 6500
+MAX_EVALUATIONS_PER_RUN, MAX_EVALUATIONS_WHERE_UNEXPLAINED = 2500, 6500
 """Simulations, linearisations and filter passes of each run, on average: where what is found could stand as a verdict, and where
 it leaves a visible error, or most of one unexplained. Both are those of usual runs."""
 USUAL_SAMPLES, FIXED_COST_SAMPLES = 1000, 1800

@@ -100,13 +100,16 @@ class Search:
     def _eliminate(self, found: ScoredModel) -> bool:
         """Fit what is found without each of its effects, the others in their variants; return whether anything was fitted.
 
-        An effect may stand for a variant of another: a dead time for the inertia of a servo.
+        An effect may stand for a variant of another, beside it or in its place: a dead time for the inertia of a servo.
         """
         if drop_each(found, self.tried, self.grounds):
             asked = []
             for gone, without in self.tried.without_each(found):
-                alike = {e.name for e in without.effects if e.name in self._mistaken_for(gone) and e.variants}
-                asked += [VariantRequest(without, alike)] if alike else []
+                alike = self._mistaken_for(gone)
+                own = {e.name for e in without.effects if e.name in alike and e.variants}
+                asked += [VariantRequest(without, own)] if own else []
+                swapped = {n: self.tried.get(frozenset((*without.names, n))) for n in alike - set(found.names)}
+                asked += [VariantRequest(h, {name}) for name, h in swapped.items() if h is not None]
             try_variants(asked, self.tried, self.grounds)
             return True
         return self._refit_leading()

@@ -2,8 +2,8 @@
 
 Every real hull has a cross state, a servo with a lag, drag that grows with the square of the rate, and loses speed in a turn.
 Steps from the bare model lose their way among the four: each takes up a part of the others. So they are added one after another
-whatever each is worth alone, each from the best few of its scan points at the fit before it, and in the variant that the data
-show. What they do not show is dropped again.
+whatever each is worth alone, each from the best few of its scan points at the fit before it, and the whole is tried in its
+variants: alone, a part that is free enough takes up the others. What the data do not show is dropped again.
 """
 
 from __future__ import annotations
@@ -34,10 +34,9 @@ def whole_hull(base: ScoredModel, effects: Sequence[Effect], tried: Archive, gro
         fits = [fit for fit in _fits_with(h, effect, grounds) if np.isfinite(fit.log_likelihood)]
         if fits:
             key = frozenset((*h.names, effect.name))
-            tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
-            try_variants([VariantRequest(tried[key], {effect.name})], tried, grounds)
-            h = tried[key]
-    return h
+            h = tried[key] = grounds.better(tried.get(key), max(fits, key=lambda fit: fit.log_likelihood))
+    try_variants([VariantRequest(h)], tried, grounds)
+    return tried[frozenset(h.names)]
 
 
 def _fits_with(h: ScoredModel, effect: Effect, grounds: Grounds) -> list[LikelihoodFit]:
