@@ -17,6 +17,8 @@ from fieldsid.models.model import Model
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 
+OF_LAW = "damping_exponent"
+"""The parameter of the speed law that a model of runs at several speeds has among its values."""
 LIMITING_EFFECT = "quadratic_damping"
 """The effect that holds a rate which the damping alone lets grow."""
 
@@ -38,12 +40,14 @@ def effects_of(model: Model) -> tuple[Effect, ...]:
     Raises EffectError for one not known here or not in this form, ModelError where the model does not give a coefficient of one.
     """
     held = tuple(as_fitted(effect_held(name, model.own), model.values) for name in model.effects)
-    known = {*NAMES[model.axis].base, *(c.name for e in held for c in e.shared)}
+    known = {*NAMES[model.axis].base, OF_LAW, *(c.name for e in held for c in e.shared)}
+    strange = [n for n in model.values if n not in known and "@" not in n]
     for effect in held:
         lacking = [c.name for c in effect.shared if c.name not in model.values]
-        if lacking and (strange := [n for n in model.values if n not in known]):
+        if strange:
+            without = f", without `{lacking[0]}`" if lacking else ""
             raise EffectError(
-                f"the model holds `{effect.name}` in a form that is no longer known: with `{strange[0]}`, without `{lacking[0]}`",
+                f"the model holds `{effect.name}` in a form that is no longer known: with `{strange[0]}`{without}",
                 found=", ".join(model.values),
                 hint=f"identify again: `sysid identify RUN... --axis {model.axis.value} --effects {','.join(model.effects)}`",
             )

@@ -30,7 +30,7 @@ from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grounds import Grounds
 from fieldsid.diagnosis.moves.grow import Growth
 from fieldsid.diagnosis.moves.refit import refit_from_parts
-from fieldsid.diagnosis.moves.speed_law_search import error_product, fit_base_output_error, other_law, speed_laws
+from fieldsid.diagnosis.moves.speed_law_search import error_product, fit_base_output_error, other_speed_law, speed_laws
 from fieldsid.diagnosis.moves.variant_search import VariantRequest, try_variants
 from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
@@ -196,8 +196,8 @@ class Search:
         return self.tried[self.root]
 
     def _under_other_law(self, h: ScoredModel) -> ScoredModel | None:
-        """Return a model under another law where that has more evidence, None elsewhere."""
-        other = other_law(h, self.grounds)
+        """Return a model under the other speed law where that has more evidence, None elsewhere."""
+        other = other_speed_law(h, self.grounds)
         return None if other is None else self.grounds.flown(other)
 
     # ----- the grounds that models are compared on
