@@ -87,3 +87,11 @@ def test_least_squares_of_filtered_signals_has_a_covariance_too(spread):
     sigma = np.sqrt(np.diag(found))
     assert np.all(sigma > 0.0)
     assert np.max(np.abs(found / np.outer(sigma, sigma))) < 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("normal", [np.zeros((2, 2)), np.diag([1e-80, 1e-90])])
+def test_without_any_information_an_error_is_a_number_beyond_all_bounds(normal):
+    with np.errstate(all="raise", under="ignore"):
+        spread = covariance(normal)
+    assert np.isfinite(spread).all()
+    assert (np.sqrt(np.diag(spread)) > 1e30).all()
