@@ -117,9 +117,13 @@ class Rows(Table):
     """A table that is shown row by row, a line for each cell, where its numbers do not fit: folded, a number cannot be read."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the table where it fits, or on a page that is no narrow one with its words folded."""
+        """Yield the table where it fits, if with one blank between columns, or on a page that is no narrow one with words folded."""
         far = options.update(max_width=FAR)
         wanted = Measurement.get(console, far, self).maximum
+        if wanted > options.max_width >= wanted - (len(self.columns) - 1):
+            self.padding = (0, 1, 0, 0)
+            yield from super().__rich_console__(console, options)
+            return
         widths = [(Measurement.get(console, far, Group(c.header, *c.cells)).maximum, c.no_wrap) for c in self.columns]
         least = sum(width if whole else min(width, LEAST_WORDS) for width, whole in widths) + 2 * (len(widths) - 1)
         if wanted <= options.max_width or (options.max_width >= NARROW and least <= options.max_width):

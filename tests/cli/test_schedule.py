@@ -67,7 +67,8 @@ def test_verify_begins_with_its_verdict_and_what_that_rests_on(run_cli, gains):
     assert body["verdict"] == "holds"
     assert lines[0] == f"holds: {body['says']}"
     assert f"{body['worst']['phase_margin_deg']:.1f} deg" in lines[0]
-    assert lines[1] == body["rests_on"]
+    begun = lines[1].removesuffix(" ...")
+    assert body["rests_on"].startswith(begun)
     assert lines[1].startswith("rests on yaw.csv with no effects; ")
     assert "lag 0.200 s" in lines[1]
     table_at = next(i for i, line in enumerate(lines) if line.startswith("deg, dB, s of margin"))

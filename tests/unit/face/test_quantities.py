@@ -29,7 +29,7 @@ def test_shares(text, share):
 @pytest.mark.parametrize("text", ["soon", "4m", "", "nan", "infs", "10deg"])
 def test_what_is_no_time_is_refused_with_an_example(text):
     with pytest.raises(UsageError) as caught:
-        parse_time(text, "--settling")
+        parse_time(text, "--settling", "4s")
     assert caught.value.hint == "write `--settling 4s`"
 
 

@@ -32,4 +32,4 @@ def test_a_schedule_keeps_the_fins_and_says_them(source, tmp_path):
 def test_a_limit_beyond_what_the_fins_follow_is_refused_with_theirs(source):
     with pytest.raises(UsageError, match="more than the fins reach") as caught:
         design_schedule(source, 0.26, fins=FINS)
-    assert "`--fin-limit 0.25`" in caught.value.hint
+    assert "`--fin-max 0.25`" in caught.value.hint

@@ -30,7 +30,7 @@ def table(folder, rows=YAW, offset=True):
 
 def source_of(folder, trained, effects=("quadratic_damping",), **values):
     own = {"a22": 1.2, "b2": -1.6, "C0": 0.01, "quadratic": 1.0} | values
-    if not effects:
+    if "quadratic_damping" not in effects:
         own.pop("quadratic")
     covariance = np.diag([(0.02 * abs(v)) ** 2 for v in own.values()])
     model = Model(Axis.YAW, effects, own, {}, tuple(own), covariance, SpeedLaw(1.5), Noise(0.005, 0.005), trained)

@@ -21,7 +21,7 @@ PATHS = {
     "hull": {},
     "lag": {"lag": 0.25},
     "lag and delay": {"lag": 0.25, "delay": 0.2},
-    "sway": {"cross_damping": 0.9, "cross_rate": -0.3, "cross_fin": 0.4, "lag": 0.2},
+    "sway": {"cross_damping": 0.9, "cross_rate": -0.3, "cross_fin": 0.4, "cross_quadratic": 0.0, "lag": 0.2},
 }
 EFFECTS = {"lag": "servo_lag", "delay": "delay", "cross_damping": "sway_coupling"}
 
