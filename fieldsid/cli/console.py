@@ -117,7 +117,7 @@ class Rows(Table):
     """A table that is shown row by row, a line for each cell, where its numbers do not fit: folded, a number cannot be read."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Yield the table where it fits, if with one blank between columns, or on a page that is no narrow one with words folded."""
+        """Yield the table where it fits, if with one blank between columns, or on a page not narrow with its words folded."""
         far = options.update(max_width=FAR)
         wanted = Measurement.get(console, far, self).maximum
         if wanted > options.max_width >= wanted - (len(self.columns) - 1):
