@@ -10,6 +10,7 @@ import json
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from functools import partial
 from typing import Any, TypeVar
 
@@ -120,14 +121,14 @@ class Rows(Table):
         """Yield the table where it fits, if with one blank between columns, or on a page not narrow with its words folded."""
         far = options.update(max_width=FAR)
         wanted = Measurement.get(console, far, self).maximum
-        if wanted > options.max_width >= wanted - (len(self.columns) - 1):
-            self.padding = (0, 1, 0, 0)
-            yield from super().__rich_console__(console, options)
-            return
+        blanks = len(self.columns) - 1
         widths = [(Measurement.get(console, far, Group(c.header, *c.cells)).maximum, c.no_wrap) for c in self.columns]
-        least = sum(width if whole else min(width, LEAST_WORDS) for width, whole in widths) + 2 * (len(widths) - 1)
-        if wanted <= options.max_width or (options.max_width >= NARROW and least <= options.max_width):
-            yield from super().__rich_console__(console, options)
+        least = sum(width if whole else min(width, LEAST_WORDS) for width, whole in widths) + 2 * blanks
+        if wanted - blanks <= options.max_width or (options.max_width >= NARROW and least <= options.max_width):
+            shown = copy(self)
+            if wanted - blanks <= options.max_width < wanted:
+                shown.padding = (0, 1, 0, 0)
+            yield from Table.__rich_console__(shown, console, options)
             return
         if self.title:
             yield words(str(self.title), "bold")
