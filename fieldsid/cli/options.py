@@ -19,7 +19,6 @@ RunFiles = Annotated[
         metavar="RUN...", help="Runs or log files: .parquet, .csv, .csv.gz, a bag; `-` reads CSV from standard input."
     ),
 ]
-RunFile = Annotated[Path, typer.Argument(metavar="RUN", help="A run or a log file; `-` reads CSV from standard input.")]
 LogAndTables = Annotated[
     list[Path],
     typer.Argument(

@@ -23,7 +23,6 @@ from fieldsid.numerics.arrays import FloatArray
 
 SETTLE_S = 60.0
 STEP_S = 0.05
-SCALES = np.geomspace(0.2, 5.0, 9)
 EXPONENT = "damping_exponent"
 CORE = (
     "cross_damping", "cross_rate", "cross_fin", "cross_quadratic", "cross_share", "strip_moment", "strip_force", "strip_flow",

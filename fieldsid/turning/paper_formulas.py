@@ -13,8 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fieldsid.errors import ModelError, UsageError
-from fieldsid.models.axis import Axis
-from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 
 RISE_TIME_CONSTANTS = 2.31
@@ -74,10 +72,3 @@ def refuse_short_fin(limit: float, offset: float, where: str, hint: str) -> None
         found=f"limit {limit:.4g} rad, offset delta_r0 = {offset:.4g} rad",
         hint=hint,
     )
-
-
-def refuse_pitch(model: Model, name: str) -> None:
-    """Raise UsageError for a model of the pitch axis."""
-    if model.axis is Axis.YAW:
-        return
-    raise UsageError(f"`{name}` is a pitch model", found="axis: pitch", hint="identify yaw: `sysid identify RUN... --axis yaw`")

@@ -123,11 +123,6 @@ class ScoredModel:
         return self._errors_of("validation_runs", self.own_moment)
 
     @cached_property
-    def settled_errors(self) -> Errors | None:
-        """Errors on the validation runs at the parameters that all runs leave together, None where there are none."""
-        return self._errors_of("settled_runs", self.own_moment) if self.validation else None
-
-    @cached_property
     def errors_by_moment(self) -> dict[tuple[str, float], Errors]:
         """The errors computed so far, by the name of their free runs and the runs' own moment (rad/s^2).
 

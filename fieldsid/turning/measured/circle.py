@@ -47,11 +47,6 @@ class Circle(Brief):
         half = t_factor(round(self.effective_samples)) * self.radius_std_error
         return self.radius - half, self.radius + half
 
-    @property
-    def residual_sd(self) -> float:
-        """Robust scatter of the track about the circle, m."""
-        return _robust_sd(self.residual)
-
 
 def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray | None = None) -> Circle:
     """Fit a circle to a track (n,) in s and m; the current is fitted too where most of a circle was turned.
