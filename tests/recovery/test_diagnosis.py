@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from truth import maneuvers
 from truth.bank import Case, make_case
+from truth.logbook import flown
+from truth.noise import Clock
+from truth.physics import Physics
 
 from fieldsid.diagnosis import Diagnosis, diagnose
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
@@ -172,6 +176,23 @@ def test_a_current_is_found_from_runs_of_several_speeds_and_none_is_moved_to_ano
     assert (found.verdict, found.effects) == ("effect", case.effects)
     assert found.final.validation.angle_rms_rad < 1.06 * case.floor["angle_rad"]
     assert "own_speed" not in {n.code for n in found.notes}
+
+
+def test_a_dead_zone_is_named_beside_a_lag_of_more_evidence_that_lowers_no_error() -> None:
+    """The lag of a servo has more evidence than the dead zone, which has the error: neither hides the other."""
+    physics, clock = Physics(damping=0.95, authority=-1.7, deadband_width=0.011, servo_tau=0.06), Clock(0.05, 1500)
+    plans = (
+        maneuvers.pulses(clock.time, 0.18, 0.12),
+        maneuvers.three_two_one_one(clock.time, 0.12),
+        maneuvers.circle(clock.time, 0.12),
+        maneuvers.zigzag(clock.time, 0.12, 0.1),
+    )
+    logs = [
+        flown(physics, clock, plan, angle_noise=0.005, rate_noise=0.006, gust=0.01, seed=seed) for seed, plan in enumerate(plans)
+    ]
+    kept = [{name: log[name] for name in ("time_s", "yaw_rad", "yaw_rate_rad_s", "rudder_rad", "surge_m_s")} for log in logs]
+    found = diagnose(runs_of(kept[:3], "train"), Axis.YAW, runs_of(kept[3:], "unseen"))
+    assert set(found.effects) == {"deadband", "servo_lag"}
 
 
 @pytest.mark.forks

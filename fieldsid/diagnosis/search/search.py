@@ -1,9 +1,11 @@
 """The search over sets of effects: one best-first queue over one archive, entered from the bare model and from the whole hull.
 
 A model that is taken from the queue is expanded: an effect is added to it, the best of what comes of that is tried in other
-variants and under other laws of the speed, and what leads then is fitted without each of its effects. The two entries lead to the
-same sets from below and from above, and of each set the better optimum is kept, wherever it came from. At the end what is found
-is fitted without each of its effects until none is idle.
+variants and under other laws of the speed, and what leads then is fitted without each of its effects. Where one effect alone
+comes near the noise, the queue goes a step from below before the whole hull is fitted: a lag of much evidence and little error
+would else hide that effect, and a cross state, free enough, take it up. The two entries lead to the same sets from below and
+from above, and of each set the better optimum is kept, wherever it came from. At the end what is found is fitted without each of
+its effects until none is idle.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ from fieldsid.diagnosis.parallel_map import ParallelMap
 from fieldsid.diagnosis.search.accepted_sets import AcceptedSets, core_of
 from fieldsid.diagnosis.search.budget import Budget
 from fieldsid.diagnosis.search.whole_hull import whole_hull
-from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, SUFFICIENT_ERROR_RATIO
+from fieldsid.diagnosis.thresholds import MAX_ERROR_RATIO, MIN_EXPLAINED_SHARE, MISSING_ERROR_RATIO, SUFFICIENT_ERROR_RATIO
 from fieldsid.fitting.covariance.noise_selection import residuals_of
 from fieldsid.fitting.optimise.unbounded_motion import refuse_unbounded_motion
 from fieldsid.fitting.problem.problem import Problem
@@ -87,6 +89,8 @@ class Search:
     def best(self) -> ScoredModel:
         """Return the accepted set of effects with the highest log evidence."""
         self.expand(self.base())
+        if self.leaves_visible_error() and self._nears_from_below() and (leading := self._next_to_expand()) is not None:
+            self.expand(leading)
         if self.leaves_visible_error():
             hull = whole_hull(self.base(), self.catalogue, self.tried, self.grounds)
             drop_each(hull, self.tried, self.grounds)
@@ -96,6 +100,10 @@ class Search:
         while self._eliminate(found := self.best_admissible()):
             self.share_own_moments()
         return found
+
+    def _nears_from_below(self) -> bool:
+        """Whether one effect alone may be all that is missing, though another of more evidence, a small one, is there too."""
+        return any(worst_error(h, self.floor) <= MISSING_ERROR_RATIO for h in self.tried.children(self.root))
 
     def _eliminate(self, found: ScoredModel) -> bool:
         """Fit what is found without each of its effects, the others in their variants; return whether anything was fitted.
