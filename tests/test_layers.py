@@ -54,6 +54,8 @@ ONLY = {
     "pydantic": ("fieldsid/strict", "fieldsid/vehicle", "fieldsid/logs/mapping/mapping_file"),
     "numba": ("fieldsid/numerics/jit.py",),
 }
+LATE = ("control", "pandas", "pyarrow", "scipy.optimize", "scipy.signal", "scipy.stats")
+"""What no file imports when it is loaded itself: each costs as much as NumPy, and most commands need few of them."""
 TOP = {"pyproject.toml", "README.md", "LICENSE", "CONTRIBUTING.md", "CHANGELOG.md", "templates", "fieldsid", "tests"}
 WRITTEN_BY_TOOLS = ("build", "dist", "sysid-demo")
 LONGEST = 400
@@ -190,6 +192,11 @@ def test_a_circle_of_files_is_seen():
 def test_a_heavy_library_is_known_in_its_room_only(library):
     users = [p.relative_to(ROOT).as_posix() for p in FILES if library in libraries_of(p)]
     assert [u for u in users if not u.startswith(ONLY[library])] == []
+
+
+def test_what_takes_long_to_load_is_imported_where_it_is_used():
+    early = {p.relative_to(ROOT).as_posix(): [n for n in imports_at_start(p) if n.startswith(LATE)] for p in FILES}
+    assert {path: names for path, names in early.items() if names} == {}
 
 
 @pytest.mark.parametrize(
