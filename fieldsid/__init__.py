@@ -72,8 +72,7 @@ def __getattr__(name: str) -> "Any":
     room = next((room for room, names in _ROOMS.items() if name in names), None)
     if room is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = found = getattr(import_module(room), name)
-    return found
+    return getattr(import_module(room), name)
 
 
 def __dir__() -> list[str]:

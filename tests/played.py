@@ -11,7 +11,7 @@ import json
 import re
 
 import numpy as np
-from lua import execute
+from lupa.lua53 import LuaRuntime
 from moos_helm import Helm, holds, script
 from rosbags.highlevel import AnyReader
 
@@ -117,26 +117,23 @@ def moos(script_path, helm_path, course):
     return Moos(script_path.read_text(), helm_path.read_text(), course)
 
 
-class Milliseconds(int):
-    """A time as the script sees it: differences know `tofloat`."""
-
-    def __sub__(self, other):
-        return Milliseconds(int(self) - int(other))
-
-    def tofloat(self):
-        return float(self)
-
-
-class Vector(tuple):
-    """Components by name, as a script's vectors have them."""
-
-    __slots__ = ()
-
-    def x(self):
-        return self[0]
-
-    def y(self):
-        return self[1]
+AROUND = """
+local host = host
+local time = {__index = {tofloat = function(t) return t.ms + 0.0 end}}
+function time.__sub(a, b) return setmetatable({ms = a.ms - b.ms}, time) end
+function millis() return setmetatable({ms = host.millis()}, time) end
+local function vector(axes) return {x = function() return axes[0] end, y = function() return axes[1] end} end
+local wrapped = {
+    get_velocity_NED = function() return vector(host.velocity()) end,
+    get_relative_position_NED_origin = function() return vector(host.position()) end,
+}
+local vehicle = setmetatable({}, {__index = function(_, name)
+    return wrapped[name] or function(_, ...) return host[name](...) end
+end})
+for _, name in ipairs({"ahrs", "baro", "rc", "arming", "gcs", "SRV_Channels"}) do _G[name] = vehicle end
+setmetatable(_G, {__index = function(_, name) error("nobody set " .. name) end})
+"""
+"""What a script finds in the vehicle: times whose differences know `tofloat`, vectors, and the host's own methods by name."""
 
 
 class ArduPilot:
@@ -153,8 +150,10 @@ class ArduPilot:
             assert count == 1, name
         self.course, self.time, self.seen, self.before, self.fin = course, 0.0, None, None, None
         self.switched, self.aborted, self.said = True, None, []
-        own = {"millis": self.millis} | dict.fromkeys(("ahrs", "baro", "rc", "arming", "gcs", "SRV_Channels"), self)
-        _, (self.update, self.step_ms) = execute(text, **own)
+        lua = LuaRuntime()
+        lua.globals().host = self
+        lua.execute(AROUND)
+        self.update, self.step_ms = lua.execute(text)
 
     def step(self, t, seen):
         self.before, self.seen, self.time, self.fin = self.seen and (self.time, self.seen), seen, t, None
@@ -162,19 +161,19 @@ class ArduPilot:
         return self.fin
 
     def millis(self):
-        return Milliseconds(round(1000.0 * self.time))
+        return round(1000.0 * self.time)
 
     def turned(self, along, side):
         sin, cos = np.sin(self.course), np.cos(self.course)
-        return Vector((along * cos - side * sin, along * sin + side * cos))
+        return float(along * cos - side * sin), float(along * sin + side * cos)
 
-    def get_velocity_NED(self):  # noqa: N802  the vehicle's own name
+    def velocity(self):
         if self.before is None:
             return self.turned(self.seen.surge, 0.0)
         then, seen = self.before
         return self.turned(*((a - b) / (self.time - then) for a, b in ((self.seen.x, seen.x), (self.seen.y, seen.y))))
 
-    def get_relative_position_NED_origin(self):  # noqa: N802  the vehicle's own name
+    def position(self):
         return self.turned(self.seen.x, self.seen.y)
 
     def get_yaw_rad(self):

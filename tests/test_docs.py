@@ -50,6 +50,12 @@ def test_every_folder_a_page_names_is_there(page):
     assert [n for n in named if not (ROOT / n.rsplit("/", 1)[0]).is_dir()] == []
 
 
+def test_the_rooms_are_named_as_they_are():
+    page = (ROOT / "CONTRIBUTING.md").read_text()
+    rooms = {p.parent.name for p in (ROOT / "fieldsid").glob("*/*.py")}
+    assert {room for room in rooms if f"`{room}/`" not in page} == set()
+
+
 def test_the_python_example_of_the_readme_runs_as_written(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs").mkdir()

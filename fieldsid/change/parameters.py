@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from fieldsid.change.estimates import Known, known_at, shared_values
 from fieldsid.change.holm import adjusted
@@ -107,11 +107,11 @@ def _mean(quantity: _Quantity) -> tuple[float, float]:
 
 
 def _p(change: float, error: float) -> float:
-    return float(2.0 * norm.sf(abs(change) / error)) if error > 0 else float("nan")
+    return float(2.0 * ndtr(-abs(change) / error)) if error > 0 else float("nan")
 
 
 def _judged(quantity: _Quantity, rows: tuple[AtSpeed, ...], change: float, error: float, p: float) -> ParameterChange:
-    reach = float(norm.isf(0.5 * LEVEL)) * error
+    reach = -float(ndtri(0.5 * LEVEL)) * error
     low, high = change - reach, change + reach
     least = min([v for v in (p, *(r.p_adjusted for r in rows)) if np.isfinite(v)], default=float("nan"))
     state = CHANGED if least < LEVEL else UNCHANGED if max(abs(low), abs(high)) <= _matters(quantity) else UNCLEAR

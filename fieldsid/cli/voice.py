@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from contextvars import ContextVar
+from dataclasses import dataclass
 from itertools import takewhile
 from math import pi
 from re import Match
@@ -31,20 +32,21 @@ class Voice:
     is_in_degrees: bool = False
 
 
-_VOICE = [Voice()]
+AS_USUAL = Voice()
+_VOICE = ContextVar("voice", default=AS_USUAL)
 _ANGLE = pattern(r"(?P<low>-?[\d.]+)(?: \.\. (?P<high>-?[\d.]+))? rad\b(?P<rest>(?:/s(?:\^2)?)?)")
 
 
 def voice() -> Voice:
     """Return how much the command under way says."""
-    return _VOICE[0]
+    return _VOICE.get()
 
 
 def take(arguments: Sequence[str]) -> list[str]:
     """Set the voice by a command line and return the line without what set it; what follows `--` is left as it is."""
     end = arguments.index("--") if "--" in arguments else len(arguments)
     own, rest = arguments[:end], arguments[end:]
-    _VOICE[0] = replace(Voice(), is_quiet=QUIET in own, is_verbose=VERBOSE in own, is_in_degrees=DEGREES in own)
+    _VOICE.set(Voice(is_quiet=QUIET in own, is_verbose=VERBOSE in own, is_in_degrees=DEGREES in own))
     taken = set(SAYS) - ({VERBOSE} if arguments and arguments[0] in HAS_OWN_V else set())
     return [*(a for a in own if a not in taken), *rest]
 

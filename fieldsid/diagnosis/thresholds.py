@@ -2,7 +2,7 @@
 
 Log odds are natural logarithms, p probabilities; an error ratio is a free-run error over another, or over the noise floor. What
 20 % more or less of each costs is printed by `python tests/benchmarks/threshold_sensitivity.py`, on cases of the repository's own
-bank and, where its folder is given, of one written by other hands; README gives the table.
+bank and, where its folder is given, of one written by other hands.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ GUIDE = Path(__file__).resolve().parent
 INDEX = "index"
 READING_ORDER = (
     INDEX, "trial", "mapping", "theory", "effects", "commands", "parameters", "codes", "figures", "python", "extending", "limits",
-    "schemas",
+    "measured", "schemas",
 )  # fmt: skip
 """Topics at the top, in the order of reading; the pages of a folder follow its index in the order of their names."""
 SHORT_IN = ("effects", "commands")

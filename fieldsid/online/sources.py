@@ -104,15 +104,15 @@ def lines_of(stream: BufferedIOBase, reader: MessageReader) -> Iterator[Sample |
 
 def _lines(stream: BufferedIOBase) -> Iterator[bytes]:
     """Yield lines as their ends come; of one that is too long no more is kept than shows that."""
-    kept = b""
-    while piece := stream.read1(PIECE_BYTES):
-        if len(kept) > LONGEST_LINE and b"\n" not in piece:
+    kept, piece = b"", bytearray(PIECE_BYTES)
+    while size := stream.readinto1(piece):
+        if len(kept) > LONGEST_LINE and piece.find(b"\n", 0, size) < 0:
             continue
-        first, *others = piece.split(b"\n")
-        kept = kept if len(kept) > LONGEST_LINE else kept + first
+        first, *others = bytes(memoryview(piece)[:size]).split(b"\n")
+        kept = (kept + first)[: LONGEST_LINE + 1]
         for line in others:
             yield kept
-            kept = line
+            kept = line[: LONGEST_LINE + 1]
     yield kept
 
 

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from fieldsid.errors import DataError, FieldsidError
 from fieldsid.logs.mapping.canonical_names import canonical
@@ -17,6 +17,9 @@ from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.wrong_file import if_log
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.plant.points import Point
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SPEED = "speed_m_s"
 
@@ -52,6 +55,8 @@ def _no_speed(path: Path, table: pd.DataFrame) -> FieldsidError:
 
 
 def _frame(path: Path) -> pd.DataFrame:
+    import pandas as pd
+
     try:
         source = io.StringIO(sys.stdin.read()) if str(path) == "-" else path
         table = pd.read_csv(source, comment="#", skipinitialspace=True)
@@ -87,6 +92,8 @@ def _axis_of(table: pd.DataFrame, path: Path) -> Axis:
 
 
 def _check_numbers(table: pd.DataFrame, path: Path, axis: Axis) -> None:
+    import pandas as pd
+
     names = NAMES[axis]
     for column in (SPEED, *names.base, f"{names.trim_fin}_rad", *(f"{n}_std_error" for n in names.base)):
         if column not in table.columns:

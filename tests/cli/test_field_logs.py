@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from lookalikes import LENGTH_S, STEP, TABLES, A, B, flight
+from look_alikes import LENGTH_S, STEP, TABLES, A, B, flight
 
 from fieldsid.logs import load_run
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
-import lookalikes
 import numpy as np
 from bags import MAPPING, write_bag
 from binary_logs import write_alog, write_dataflash, write_dbd, write_lsf, write_mat, write_ulog
@@ -30,7 +29,7 @@ from fuzz.mutate import (
     spoil_text,
     spoil_yaml,
 )
-from look_alikes import write_key_value, write_text_dataflash
+from look_alikes import units_row, write_key_value, write_text_dataflash
 
 from fieldsid.artifacts import plain, to_yaml
 from fieldsid.cli.app import run as command
@@ -507,7 +506,7 @@ KINDS = (
     Kind("parquet", as_run, (spoil_parquet, spoil_parquet, spoil_parquet, spoil_bytes), LOG),
     Kind("csv", as_csv, TABLE, LOG),
     Kind("foreign_csv", as_foreign_csv, TABLE, (inspected,)),
-    Kind("units_row", lookalikes.units_row, (spoil_text, spoil_bytes), (inspected,), slow=True),
+    Kind("units_row", units_row, (spoil_text, spoil_bytes), (inspected,), slow=True),
     Kind("db3", bag("db3"), (spoil_sqlite, spoil_sqlite, spoil_bytes), BAG, part="*.db3"),
     Kind("bag_metadata", bag("db3"), (spoil_yaml, spoil_text), BAG, part="metadata.yaml"),
     Kind("mcap", bag("mcap"), (spoil_bytes,), BAG, part="*.mcap"),

@@ -12,7 +12,7 @@ from guide.sameness import same
 from guide.session import Session, begun
 
 GUIDE = Path(__file__).resolve().parents[2] / "fieldsid" / "guide"
-WRITTEN = ("index.md", "trial.md", "theory.md", "figures.md", "python.md", "extending.md", "limits.md")
+WRITTEN = ("index.md", "trial.md", "theory.md", "figures.md", "python.md", "extending.md", "limits.md", "measured.md")
 """Pages written by hand; what their command lines say is filled in."""
 EXACT = ("effects", "schemas")
 """Folders whose pages hold nothing that was computed."""

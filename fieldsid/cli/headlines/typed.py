@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from contextvars import ContextVar
 from itertools import groupby
 from pathlib import Path
 
 from fieldsid.cli.trial.spared import without_the_filled
 from fieldsid.trial_folder.patterns import FEW, pattern_of
 
-_WORDS: list[tuple[str, ...]] = [()]
+_WORDS: ContextVar[tuple[str, ...]] = ContextVar("words", default=())
 
 
 def remember(words: Sequence[str]) -> None:
     """Keep the words of the command that is about to run, `sysid` left out."""
-    _WORDS[0] = tuple(words)
+    _WORDS.set(tuple(words))
 
 
 def typed_with(*more: str) -> str:
     """Return the command line under way with more words behind it; `--json` is left out."""
-    words = [w for w in _WORDS[0] if w != "--json"]
+    words = [w for w in _WORDS.get() if w != "--json"]
     groups = [list(group) for _, group in groupby(words, key=lambda w: not w.startswith("-") and _is_file(w))]
     parts = [part for g in groups for part in ([g] if len(g) > FEW and _is_file(g[0]) else g)]
     return pasted(*parts, *more)

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fieldsid.errors import FieldsidError
 from fieldsid.fitting.initial.effect_screen import carry_parameters
@@ -92,6 +91,8 @@ class _Profile:
 
     def best(self) -> SlopeAtRest | None:
         """Return what the power of the largest likelihood gives."""
+        from scipy.optimize import minimize_scalar
+
         found = minimize_scalar(lambda p: self.refit(float(p))[0], bounds=POWERS, method="bounded", options={"xatol": 0.02})
         power = float(np.clip(found.x, POWERS[0] + APART, POWERS[1] - APART))
         low, high = self.refit(power - APART), self.refit(power + APART)

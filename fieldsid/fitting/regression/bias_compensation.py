@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fieldsid.fitting.regression.state_variable_filter import hold_weights
+from fieldsid.fitting.regression.state_variable_filter import filtered, hold_weights
 from fieldsid.fitting.regression.svf_equation import RegressionParameters
 from fieldsid.numerics.arrays import FloatArray
 
@@ -68,12 +68,9 @@ def inverse_of(transfer: Transfer, h: float) -> Transfer:
 
 def noise_share(order: int, bandwidth: float, h: float, angle: float, rate: float) -> NoiseShare:
     """Return the share of white noise of standard deviation angle (rad) and rate (rad/s) in a row's products."""
-    from scipy.signal import lfilter
-
-    one, two, pole = filter_polynomials(bandwidth, h)
     impulse = np.zeros(max(64, int(12.0 / (bandwidth * h))))
     impulse[0] = 1.0
-    g1, g2 = lfilter(one, pole, impulse), lfilter(two, pole, impulse)
+    g1, g2 = filtered(np.full(impulse.size, h), np.append(0.0, impulse[:-1]), impulse, bandwidth)[1:].T
     gram, cross = np.zeros((4, 4)), np.zeros(4)
     if order == 1:
         power = bandwidth**2 * float(g1 @ g1)

@@ -6,7 +6,6 @@ Source: Golub and Pereyra 2003, Inverse Problems 19(2). Nothing is compiled here
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fieldsid.numerics.arrays import FloatArray
 
@@ -18,6 +17,8 @@ TOLD = 0.5
 
 def settling_of(time: FloatArray, values: FloatArray, *, integrated: bool = False) -> tuple[float, float] | None:
     """Return pole (1/s) and end of a signal (n,), or of the rate of an angle (n,); None where they cannot be told."""
+    from scipy.optimize import minimize_scalar
+
     if time.size < 4:
         return None
     t = time - time[0]

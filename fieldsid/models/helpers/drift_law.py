@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
@@ -36,6 +35,8 @@ def reference_speed(records: Sequence[Record]) -> float:
 
 def drift_law(records: Sequence[Record], reference: float) -> DriftLaw | None:
     """Return the drift law of the runs with a measured cross speed, None where no run has one; `reference` in m/s or NaN."""
+    from scipy.optimize import minimize_scalar
+
     seen = [r for r in records if r.cross_ok.any()]
     if not seen:
         return None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fieldsid.models.model import Noise
 from fieldsid.numerics.arrays import FloatArray
@@ -19,6 +18,8 @@ LEG_SEED = 5
 
 def disturbance_moment(noise: Noise | None, pace: Pace | None = None) -> FloatArray:
     """Return a moment (t,) in rad/s^2, one value for each time step of a pace: zero where no model has measured any."""
+    from scipy.signal import lfilter
+
     pace = pace or Pace()
     count = round(pace.leg / pace.step) + 1
     if noise is None or not noise.disturbance > 0.0:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from math import exp, log
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fieldsid.schedule.controller import Gains
 from fieldsid.schedule.search.formulas import Formula, formula_of
@@ -148,4 +147,6 @@ def minimum(cost: Callable[[float], float], low: float, high: float) -> float:
 
 def least(cost: Callable[[float], float], low: float, high: float) -> float:
     """Return where a cost with one valley between two places is least, by Brent's method."""
+    from scipy.optimize import minimize_scalar
+
     return float(minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": PLACE_ROUNDING}).x)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from fieldsid.display import Brief
 from fieldsid.errors import DataError
@@ -90,6 +89,8 @@ def fit_circle(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArr
 def _refined(
     t: FloatArray, track: FloatArray, middle: FloatArray, scale: float, start: FloatArray, free: int, turned: float
 ) -> Circle:
+    from scipy.optimize import least_squares
+
     span = float(t[-1]) or 1.0
     points, share = (track - middle) / scale, t / span
 

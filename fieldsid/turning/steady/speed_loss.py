@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from fieldsid.display import Brief
 from fieldsid.logs.run import Run
@@ -200,6 +199,8 @@ def _simulated(case: _Case, drag: float, turn: float, fin: float, straight: floa
 
 
 def _fit_loss(cases: Sequence[_Case]) -> tuple[tuple[float, float, float], FloatArray, float]:
+    from scipy.optimize import least_squares
+
     firsts = [float(np.median(c.surge[:10])) for c in cases]
 
     def residual(p: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import datetime as dt
 
 import numpy as np
 import pytest
-from lookalikes import flight
+from look_alikes import flight
 
 from fieldsid.logs.inspection import inspect_log
 from fieldsid.logs.load import load_run

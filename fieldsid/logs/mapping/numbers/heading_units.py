@@ -16,6 +16,8 @@ WRAPPING = ("deg", "gon", "ddeg", "cdeg")
 """Units in which headings are logged from nil to a turn, besides radians."""
 OF_A_TURN = 0.9
 """Share of a turn by which a heading jumps at least where it wraps: a vehicle does not turn by a tenth between two samples."""
+TO_A_TURN = 1.01
+"""Turns that a heading which wraps spans at most: one, and what its last digit is rounded up by."""
 OFTEN = 0.05
 """Share of the samples that must be beyond a turn in degrees: fewer may be damage."""
 MOST_TURNS = 10.0
@@ -29,14 +31,14 @@ def unit_of_wraps(values: FloatArray) -> str:
         return "deg"
     jump, span = float(np.abs(np.diff(seen)).max(initial=0.0)), float(np.ptp(seen))
     turns = {unit: 2.0 * np.pi / UNITS[unit].factor for unit in WRAPPING}
-    return next((u for u, turn in turns.items() if OF_A_TURN * turn <= jump <= span <= turn), "deg")
+    return next((u for u, turn in turns.items() if OF_A_TURN * turn <= jump <= span <= TO_A_TURN * turn), "deg")
 
 
 def wraps_in_rad(values: FloatArray) -> bool:
     """Whether a heading (n,) or (n, 4) jumps by nearly a turn in rad where it wraps."""
     seen = values[np.isfinite(values)] if values.ndim == 1 else values[:0, 0]
     jump, span = float(np.abs(np.diff(seen)).max(initial=0.0)), float(np.ptp(seen)) if seen.size else 0.0
-    return 2.0 * np.pi * OF_A_TURN <= jump <= span <= 2.0 * np.pi * 1.01
+    return 2.0 * np.pi * OF_A_TURN <= jump <= span <= 2.0 * np.pi * TO_A_TURN
 
 
 def heading_in_doubt(values: FloatArray, signals: Mapping[str, Any]) -> list[Note]:

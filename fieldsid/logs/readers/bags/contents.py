@@ -13,7 +13,7 @@ from fieldsid.errors import LogError
 from fieldsid.logs.reader import MOST_CHANNELS, ChannelInfo, FieldInfo, Inventory, ReadOptions, span_of
 from fieldsid.logs.readers.bags.messages.definitions import AnyDecoder, DefinitionSearch, decoder_of
 from fieldsid.logs.readers.bags.packets import CDR, ROS1, Collector, Connection, TopicPackets, keep_first
-from fieldsid.logs.readers.bags.signals import check_not_empty, not_decodable
+from fieldsid.logs.readers.bags.signals import check_not_empty, undecodable
 from fieldsid.logs.run import Note
 
 MOST_NUMBERS = 200
@@ -25,12 +25,13 @@ Span = tuple[float, float]
 
 @dataclass(slots=True)
 class _Topic:
-    """The numbers of one topic: first values by path, and the ranges seen so far; or the note on why there are none."""
+    """The numbers of one topic: first values by path, and the ranges seen so far; or the error that says why there are none."""
 
     decoder: AnyDecoder | None = None
     first: dict[str, Any] = field(default_factory=dict)
     spans: dict[str, Span] = field(default_factory=dict)
     note: Note | None = None
+    error: LogError | None = None
 
     def see(self, payloads: Sequence[bytes]) -> None:
         """Widen the ranges by some messages."""
@@ -67,19 +68,20 @@ class Contents:
         keep_first(connection, packets)
 
     def _begun(self, connection: Connection, payload: bytes) -> _Topic:
-        if not connection.is_decodable:
-            message = f"{connection.topic}: {not_decodable(connection)}"
-            return _Topic(note=Note("serialization", message, {"topic": connection.topic}))
         try:
+            if not connection.is_decodable:
+                raise undecodable(connection)
             decoder, note = decoder_of(connection, payload, self.search)
             return _Topic(decoder, decoder.first_values(payload), note=note)
         except LogError as error:
+            code = "definition" if connection.is_decodable else "serialization"
             data = {"topic": connection.topic, "found": error.found, "hint": error.hint}
-            return _Topic(note=Note("definition", f"{connection.topic}: {error.what}; {error.hint}", data))
+            return _Topic(note=Note(code, f"{connection.topic}: {error.what}; {error.hint}", data), error=error)
 
     def inventory(self, collector: Collector) -> Inventory:
-        """Return the inventory of a bag whose topics were all caught; raises LogError for a bag without messages."""
+        """Return the inventory of a bag whose topics were all caught; raises LogError for a bag of which nothing can be read."""
         check_not_empty(self.path, collector)
+        self._refuse_unreadable()
         names = sorted(t for t in collector.connections if t in self.topics)
         channels = [self._channel(collector.connections[t], collector.packets[t]) for t in names]
         notes = [*collector.notes, *(found.note for _, found in sorted(self.topics.items()) if found.note is not None)]
@@ -88,6 +90,12 @@ class Contents:
         serialization = next((c.serialization for c in collector.connections.values()), "")
         form = {ROS1: "ROS 1 bag", CDR: "ROS 2 bag"}.get(serialization, "bag")
         return Inventory(self.path, form, duration, tuple(channels), notes=tuple(notes))
+
+    def _refuse_unreadable(self) -> None:
+        """Raise the error of the first topic where no topic can be read: such a bag is no log yet."""
+        errors = [found.error for _, found in sorted(self.topics.items()) if found.error is not None]
+        if errors and len(errors) == len(self.topics):
+            raise errors[0]
 
     def _channel(self, connection: Connection, packets: TopicPackets) -> ChannelInfo:
         known = self.topics.get(connection.topic, _Topic())

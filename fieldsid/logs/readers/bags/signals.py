@@ -89,18 +89,22 @@ def _topic(path: Path, collector: Collector, signal: str, source: Source) -> Non
         hint = f"map `{signal}` to another topic"
         raise LogError(f"topic `{source.topic}` has no messages", found="0 messages", hint=hint, signal=signal)
     connection = collector.connections[source.topic]
-    if not connection.is_decodable or source.topic in collector.mixed:
-        if source.topic in collector.mixed:
-            found, hint = "messages of two types", f"map `{signal}` to another topic"
-        else:
-            found = not_decodable(connection)
-            hint = "convert it with `ros2 bag convert` where that format is installed, or record with `rmw_fastrtps_cpp`"
-        raise LogError(f"topic `{source.topic}` cannot be decoded", found=found, hint=hint, signal=signal)
+    if source.topic in collector.mixed:
+        hint = f"map `{signal}` to another topic"
+        raise LogError(f"topic `{source.topic}` cannot be decoded", found="messages of two types", hint=hint, signal=signal)
+    if not connection.is_decodable:
+        raise undecodable(connection, signal)
 
 
-def not_decodable(connection: Connection) -> str:
-    """Say why messages cannot be decoded."""
-    return f"its messages are serialized as `{connection.serialization}`, and only `{CDR}` and `{ROS1}` are known"
+def undecodable(connection: Connection, signal: str = "") -> LogError:
+    """Return the error of messages in a serialization that is not known."""
+    return LogError(
+        f"the messages of `{connection.topic}` are serialized as `{connection.serialization}`, and only `{CDR}` and `{ROS1}` are "
+        "known",
+        found=f"type `{connection.type_name}`",
+        hint="convert it with `ros2 bag convert` where that format is installed, or record with `rmw_fastrtps_cpp`",
+        signal=signal,
+    )
 
 
 def _two_clocks(topics: list[TopicSeries], asked: Stamp | None) -> list[Note]:

@@ -13,8 +13,7 @@ import pytest
 from fieldsid.diagnosis.data.applicable_effects import applicable_effects
 from fieldsid.diagnosis.evidence.likelihood_fit import MIN_LIKELIHOOD_GAIN, likelihood_at
 from fieldsid.diagnosis.evidence.scored_model import score_model
-from fieldsid.diagnosis.moves import grow
-from fieldsid.diagnosis.moves.add_effect import Addition, by_effects, foremost, mechanisms, screen_addition
+from fieldsid.diagnosis.moves.add_effect import Addition, mechanisms, screen_addition
 from fieldsid.diagnosis.moves.archive import Archive
 from fieldsid.diagnosis.moves.drop_effect import drop_each
 from fieldsid.diagnosis.moves.grow import Growth
@@ -121,12 +120,6 @@ def test_an_effect_pays_its_prior_odds_at_the_temperature_of_the_evidence():
     assert lag.trial_penalty - alone.trial_penalty == pytest.approx(paid - ALTERNATIVE_LOG_ODDS)
 
 
-def test_a_model_that_diverges_is_not_expanded(base):
-    h = base.base()
-    assert base._is_expandable(h)
-    assert not base._is_expandable(replace(h, validation_log_density=np.full(1, -np.inf)))
-
-
 def test_a_model_that_diverges_has_no_moves(base):
     h = base.base()
     lost = replace(h, likelihood_fit=replace(h.likelihood_fit, log_likelihood=-np.inf))
@@ -206,20 +199,6 @@ def test_an_effect_proven_beside_a_small_one_stays_when_that_is_left_out():
     assert core_of(models[4], tried, Noise(0.004, 0.002)) == frozenset(both)
 
 
-@pytest.mark.parametrize(
-    ("evidence", "train", "unseen", "stays"),
-    [(-1.0, 2.0, 2.0, True), (-9.0, 2.0, 2.0, False), (-9.0, 1.7, 1.7, True), (-9.0, 1.7, 2.0, False), (-9.0, 2.0, 1.7, False)],
-)
-def test_a_child_stays_in_question_by_its_evidence_or_by_a_clearly_lower_error(evidence, train, unseen, stays):
-    def child(evidence, train, unseen):
-        errors = (Errors(0.004 * over, 0.002 * over) for over in (train, unseen))
-        return SimpleNamespace(log_evidence=evidence, **dict(zip(("train", "selection_errors"), errors, strict=True)))
-
-    work = SimpleNamespace(grounds=SimpleNamespace(floor=Noise(0.004, 0.002)))
-    best, other = child(0.0, 2.0, 2.0), child(evidence, train, unseen)
-    assert Growth._stays_in_question(work, other, best) is stays
-
-
 def test_what_does_without_the_textbooks_numbers_is_screened_beside_it():
     assert [[c.name for c in e.coefficients] for e in mechanisms([YAW["current"]])] == [
         ["current_sin", "current_cos"],
@@ -240,29 +219,3 @@ def test_a_hull_that_its_sway_alone_holds_straight_is_left_without_it_from_the_b
     assert drop_each(replace(base, likelihood_fit=at), made.tried, made.grounds)
     left = made.tried[LAG]
     assert left.log_likelihood > base.log_likelihood + 100.0
-
-
-@pytest.mark.parametrize("left", [1.1, 1.3])
-def test_what_promises_less_is_fitted_where_the_first_leave_a_visible_error_or_are_mistaken_for_it(monkeypatch, left):
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    base = made.base()
-    groups = by_effects(screen_addition(Addition(base, made.catalogue), made.parallel))
-    monkeypatch.setattr(grow, "FOREMOST_EFFECTS", 1)
-    monkeypatch.setattr(grow, "worst_error", lambda *_: left)
-    Growth(base, made.catalogue, made.tried, made.grounds, lambda: False)._evaluate_foremost(groups)
-    assert [group[0].screened.effect.name for group in foremost(groups, 1)] == ["servo_lag"]
-    fitted = {n for key in made.tried for n in key}
-    assert fitted == ({"servo_lag", "delay"} if left < 1.15 else {"servo_lag", "delay", "gyro_bias"})
-
-
-def test_the_foremost_are_those_that_come_first_on_either_screen():
-    made = search_for("servo_lag", "delay", "gyro_bias")
-    whitened = screen_addition(Addition(made.base(), made.catalogue), made.parallel)
-    flown = [
-        replace(move, by_output_error=True, screened=replace(move.screened, predicted_cost=1.0 - 0.1 * i))
-        for i, move in enumerate(whitened)
-    ]
-    groups = by_effects([*whitened, *flown])
-    last, first = flown[-1].screened.effect.name, foremost(by_effects(whitened), 1)[0][0].screened.effect.name
-    assert {group[0].screened.effect.name for group in foremost(groups, 1)} == {first, last}
-    assert foremost(groups, 5) == groups

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from lookalikes import flight
+from look_alikes import flight
 
 from fieldsid.logs import load_run
 from fieldsid.logs.inspection import inspect_log, write_proposal

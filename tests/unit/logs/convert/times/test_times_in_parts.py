@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lookalikes import flight
+from look_alikes import flight
 
 from fieldsid.logs.importing import Importer
 from fieldsid.logs.inspection import inspect_log, write_proposal

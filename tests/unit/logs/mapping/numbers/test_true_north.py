@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from lookalikes import flight
+from look_alikes import flight
 
 from fieldsid.logs.inspection import inspect_log
 

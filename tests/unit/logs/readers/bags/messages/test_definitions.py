@@ -25,19 +25,23 @@ MAPPING = mapping_of({
 TRUTH = np.arange(20) / 4
 
 
-def write(path, kind):
+def write(path, kind, *others):
+    """A bag with a topic of its own type, and other topics of a type that everybody knows."""
     with BagWriter(path, kind, types=OWN) as bag:
         for k in range(20):
             inner = [bag.make("my_auv/Inner", 0.5 * k), bag.make("my_auv/Inner", -0.25 * k)]
             angles = np.array([0.0, k / 4], dtype=np.float32)
             message = bag.make("my_auv/Fins", k, "auto" if k % 2 else "hand", angles, inner)
             bag.write("/fins", "my_auv/msg/Fins", message, EPOCH_NS + k * 10**8)
+            for other in others:
+                bag.write(other, "std_msgs/msg/Float64", bag.make("std_msgs/Float64", 0.0), EPOCH_NS + k * 10**8)
     return bag.path
 
 
-def bare(tmp_path):
+def bare(tmp_path, *others):
     """A db3 bag as recorders before 2023 wrote it: it names its types and does not define them."""
-    log = next(write(tmp_path / "logs" / "bag", "db3").glob("*.db3"))
+    (tmp_path / "logs").mkdir(exist_ok=True)
+    log = next(write(tmp_path / "logs" / "bag", "db3", *others).glob("*.db3"))
     with sqlite3.connect(log) as base:
         base.execute("DELETE FROM message_definitions")
     base.close()
@@ -46,7 +50,6 @@ def bare(tmp_path):
 
 @pytest.fixture
 def undefined(tmp_path):
-    (tmp_path / "logs").mkdir()
     return bare(tmp_path)
 
 
@@ -117,6 +120,7 @@ def test_two_definitions_beside_the_bag_that_differ_are_refused_and_one_can_be_c
 
 
 def test_a_wrong_definition_in_the_bag_gives_way_to_the_one_beside_it(tmp_path):
+    (tmp_path / "logs").mkdir(exist_ok=True)
     log = next(write(tmp_path / "bag", "db3").glob("*.db3"))
     with sqlite3.connect(log) as base:
         base.execute("UPDATE message_definitions SET encoded_message_definition = 'uint64 id'")
@@ -128,8 +132,24 @@ def test_a_wrong_definition_in_the_bag_gives_way_to_the_one_beside_it(tmp_path):
     assert "the definition of `my_auv/msg/Fins` does not fit its messages; the one of `" in note.message
 
 
-def test_an_inventory_says_which_topics_it_cannot_look_into_and_what_helps(undefined):
-    found = inspect_log(undefined)
+def test_an_inventory_says_which_topics_it_cannot_look_into_and_what_helps(tmp_path):
+    log = bare(tmp_path, "/known")
+    found = inspect_log(log)
     (note,) = [n for n in found.notes if n.code == "definition"]
     assert note.message.startswith("/fins: no definition of message type `my_auv/msg/Fins`; give the folder of `Fins.msg`")
-    assert found.inventory.channels[0].count == 20
+    assert [(c.name, c.count) for c in found.inventory.channels] == [("/fins", 20), ("/known", 20)]
+
+
+def test_a_bag_none_of_whose_topics_can_be_read_is_refused_with_what_helps(undefined):
+    with pytest.raises(LogError, match="no definition of message type `my_auv/msg/Fins`") as error:
+        inspect_log(undefined)
+    assert error.value.hint == f"give the folder of `Fins.msg`: `sysid inspect {undefined} --msg-path DIR`"
+
+
+@pytest.mark.parametrize(("others", "code"), [((), 2), (("/known",), 0)])
+def test_a_type_that_holds_itself_is_an_error_where_nothing_else_can_be_read(tmp_path, run_cli, others, code):
+    log = bare(tmp_path, *others)
+    put(tmp_path / "logs" / "msg", {"my_auv/Fins": "my_auv/Fins inner\n"})
+    answer = run_cli("inspect", log, "--msg-path", tmp_path / "logs" / "msg")
+    assert answer.code == code
+    assert "type `my_auv/msg/Fins` is a type that holds itself" in " ".join((answer.out + answer.err).split())
