@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from fieldsid.logs.channels import POSITION
 from fieldsid.logs.convert.servo_counts import BY_UNIT, FINS
 from fieldsid.logs.convert.units import SPELLINGS, dimension_of, find_unit
 from fieldsid.logs.mapping.name_words import ALL_UNITS, unit_said
-from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE, TIME
 from fieldsid.logs.run import LINES, SIGNALS
 
 STEMS: Mapping[str, str] = MappingProxyType(
@@ -66,7 +67,7 @@ def _splits(name: str) -> list[tuple[str, str]]:
 
 def fitting(signal: str) -> tuple[str, ...]:
     """Return the dimensions that a signal's numbers may have: a depth may be a pressure; none where any unit may be meant."""
-    dimension = "time" if signal == TIME else dimension_of(signal)
+    dimension = {TIME: "time", POSITION: "angle", LATITUDE: "angle", LONGITUDE: "angle"}.get(signal, dimension_of(signal))
     return (*((dimension,) if dimension else ()), *(("pressure",) if signal == "depth_m" else ()))
 
 
