@@ -125,6 +125,14 @@ RULES = (
 )  # fmt: skip
 """What names mean. The field's symbols are taken only where a name has no other word."""
 
+WANTED: Mapping[str, str] = MappingProxyType(
+    {s: s for s in ("rudder_rad", "elevator_rad", "thrust", "propeller_rpm", TIME)}
+    | {"yaw_rad": "yaw_goal_rad", "pitch_rad": "pitch_goal_rad"}
+)
+SEEN: Mapping[str, str] = MappingProxyType({"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"})
+"""What signals are that were commanded, all others of which are none, and what they are that were measured."""
+GROUNDED = frozenset({"yaw_rad", "surge_m_s", LATITUDE, LONGITUDE})
+"""Signals that are the vehicle's own only where they are not over ground."""
 GLIDER: Mapping[str, str] = MappingProxyType({"m": "measured", "c": "commanded"})
 """What the first letter of a glider's sensor says, as in `m_fin` and `c_fin`."""
 GREEK = word_set("phi theta psi")
