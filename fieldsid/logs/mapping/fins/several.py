@@ -90,11 +90,12 @@ def which_output(inventory: Inventory, signals: Mapping[str, Any]) -> list[Note]
     named = [f"{place['topic']} {place['field']}" for place in outputs]
     spans = {(c.name, f.path): f.span for c in inventory.channels for f in c.fields}
     topic, field = outputs[0]["topic"], outputs[0]["field"]
+    unit, shown = _unit_by_span(spans[topic, field]), ", ".join(named[:SHOWN]) + ", ..." * (len(named) > SHOWN)
     message = (
         f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{topic: {json.dumps(topic)}, "
-        f"field: {json.dumps(field)}{_unit_by_span(spans[topic, field])}}}`, of: {', '.join(named[:SHOWN])}"
+        f"field: {json.dumps(field)}{unit}}}`, of: {shown}"
     )
-    return [Note("which_output", message + ", ..." * (len(named) > SHOWN), {"signal": "rudder_rad", "others": named})]
+    return [Note("which_output", message, {"signal": "rudder_rad", "others": named})]
 
 
 def _unit_by_span(span: tuple[float, float] | None) -> str:
@@ -238,11 +239,13 @@ def _evidence(signal: str, plane: _Plane, fins: list[_Fin], found: FinShares, fa
     shares = {fin.name: _sign(used) * share for fin, share in used}
     told = " ".join(f"{'-' if share < 0.0 else '+'} {_fraction(abs(share))}{name}" for name, share in shares.items())
     rate = plane.rate.removesuffix("_rad_s").replace("_", " ")
-    message = f"{signal} is {told.removeprefix('+ ')}: {'together they explain' if len(used) > 1 else 'it explains'} "
-    message += f"{100 * found.explains:.0f} % of what the {rate}'s change has beside the rate's own"
-    if len(used) > 1:
-        was = [_sign(used) * was for was, share in zip(found.fitted, found.shares, strict=True) if share != 0.0]
-        message += f", the best one alone {100 * found.best_alone:.0f} %; fitted {', '.join(f'{value:.2g}' for value in was)}"
+    was = [_sign(used) * was for was, share in zip(found.fitted, found.shares, strict=True) if share != 0.0]
+    fitted = f", the best one alone {100 * found.best_alone:.0f} %; fitted {', '.join(f'{value:.2g}' for value in was)}"
+    each, more = ("together they explain", fitted) if len(used) > 1 else ("it explains", "")
+    message = (
+        f"{signal} is {told.removeprefix('+ ')}: {each} {100 * found.explains:.0f} % of what the {rate}'s change has beside the "
+        f"rate's own{more}"
+    )
     if found.patterns < len(used):
         ways = "together only" if found.patterns == 1 else f"in {found.patterns} patterns only"
         message += f"; they moved {ways}: how much of it each of them does is not told by this log, and taken by how far it went"
