@@ -153,6 +153,8 @@ def _recognised(found: Inventory, reader: Reader, options: ReadOptions) -> Certa
 def _unmapped(
     path: Path, reader: Reader, options: ReadOptions, found: Inventory, doubts: Mapping[str, str]
 ) -> MappingError:  # fmt: skip
+    from fieldsid.logs.readers._tables_of_run import tables_beside
+
     names = [c.name for c in found.channels]
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     files = shlex.join([*(["--join"] if options.joined else []), str(path), *map(str, options.joined)])
@@ -161,21 +163,22 @@ def _unmapped(
     if found.by_topic:
         what = "bag" if found.form.endswith("bag") else "run in several tables" if reader.name == JOINED else "log of topics"
         return MappingError(f"`{path}` is a {what} and needs a mapping", found=f"topics {shown or 'none'}", hint=hint)
-    close = _near_names(found)
+    close, is_whole = _near_names(found)
     hint += f"; {close}" if close else ""
+    hint += "" if is_whole else "".join(f"; {note.message}" for note in tables_beside(path))
     if not any((said := canonical(n)) is not None and said.signal == TIME for n in names):
         return MappingError(f"`{path}` has no column `{TIME}`", found=f"columns {shown}", hint=hint)
     return MappingError(f"`{path}` has no column of a signal that is known by its name", found=f"columns {shown}", hint=hint)
 
 
-def _near_names(found: Inventory) -> str:
-    """Say which signals columns that are none by their names probably are, as `sysid inspect` does."""
+def _near_names(found: Inventory) -> tuple[str, bool]:
+    """Say which signals columns that are none by their names probably are, as `sysid inspect` does; and whether all are there."""
     from fieldsid.logs.mapping.draft import draft_of, place_of
 
     body = draft_of(found).body
     lines = ({TIME: body["time"]} if "time" in body else {}) | body["signals"]
     pairs = [f"`{place_of(item)}` may be `{signal}`" for signal, item in lines.items() if canonical(place_of(item)) is None]
-    return ", ".join(pairs[:NEAR_SHOWN])
+    return ", ".join(pairs[:NEAR_SHOWN]), is_enough(body["signals"])
 
 
 def _from_stdin(mapping: ChannelMap | Path | None, **more: Any) -> Run:

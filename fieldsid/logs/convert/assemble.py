@@ -19,7 +19,7 @@ from fieldsid.logs.convert.heading_fills import without_fills
 from fieldsid.logs.convert.heading_unwrap import unwrapped_over
 from fieldsid.logs.convert.readings import by_reading
 from fieldsid.logs.convert.servo_counts import counts_unit, turned_from_counts
-from fieldsid.logs.convert.units import depth_of_pressure, factor_to, pick_unit, scaled
+from fieldsid.logs.convert.units import DEGREE, depth_of_pressure, factor_to, pick_unit, scaled
 from fieldsid.logs.reader import RawLog, ReadOptions, Series
 from fieldsid.logs.run import COLUMNS, PART, Note, Run, signal_of
 from fieldsid.numerics.arrays import FloatArray
@@ -170,7 +170,8 @@ def _quaternion(signal: str, series: Series, source: Source, mapping: ChannelMap
 
 
 def _position(signal: str, series: Series, source: Source, mapping: ChannelMap) -> dict[str, FloatArray]:
-    return dict(zip(("x_m", "y_m"), north_and_east(series.values), strict=True))
+    degrees = series.values if source.unit is None else scaled(series.values, pick_unit(source.unit, "angle").factor / DEGREE)
+    return dict(zip(("x_m", "y_m"), north_and_east(degrees), strict=True))
 
 
 def _distinct(notes: list[Note]) -> tuple[Note, ...]:

@@ -7,6 +7,7 @@ vehicle dives by its pitch: d(depth)/dt = -u sin(pitch) + w cos(pitch) (Fossen 2
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -55,20 +56,47 @@ def _windows(run: Run, *signals: str) -> tuple[FloatArray, int, list[FloatArray]
     return (time, width, [run[s][good] for s in signals]) if time.size > 4 * width else None
 
 
-def _course(run: Run) -> list[Note]:
+@dataclass(frozen=True, slots=True)
+class _Course:
+    """The course made (m,) over windows in which a vehicle moved, the heading in them, their way, and the share they are."""
+
+    course: FloatArray
+    heading: FloatArray
+    way: FloatArray
+    moved: float
+
+    @property
+    def slope(self) -> float | None:
+        """How far the course turns for a turn of the heading; None where they do not go together, or it is not followed round."""
+        c, h = np.unwrap(self.course) - np.unwrap(self.course).mean(), self.heading - self.heading.mean()
+        power = math.sqrt(float(c @ c) * float(h @ h))
+        if self.moved <= ALL_BUT or power == 0.0 or float(c @ h) / power < AGREES or float(np.std(c)) < TURNED:
+            return None
+        return math.sqrt(float(c @ c) / float(h @ h))
+
+
+def _course_of(run: Run) -> _Course | None:
+    """Return the course that a run makes; None where it makes none."""
     found = _windows(run, "x_m", "y_m", "yaw_rad")
     if found is None:
-        return []
+        return None
     time, width, (x, y, yaw) = found
     dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
     way = np.hypot(dx, dy)
     moved = way > LEAST_WAY_M
-    if moved.sum() < FEWEST:
-        return []
     heading = trapezoid_integral(time, yaw)
-    course, mean = np.arctan2(dy, dx)[moved], ((heading[width:] - heading[:-width]) / (time[width:] - time[:-width]))[moved]
+    mean = (heading[width:] - heading[:-width]) / (time[width:] - time[:-width])
+    return None if moved.sum() < FEWEST else _Course(np.arctan2(dy, dx)[moved], mean[moved], way[moved], float(moved.mean()))
+
+
+def _course(run: Run) -> list[Note]:
+    found = _course_of(run)
+    if found is None:
+        return []
     # by the way made: a course of little more than the sensors' noise says little
-    along, against = (complex(np.average(np.exp(1j * (course - s * mean)), weights=way[moved])) for s in (1.0, -1.0))
+    along, against = (
+        complex(np.average(np.exp(1j * (found.course - s * found.heading)), weights=found.way)) for s in (1.0, -1.0)
+    )
     if abs(against) > AGREES and abs(against) - abs(along) > TURNED:
         message = (
             f"the course made from x_m and y_m turns against yaw_rad (agreement {abs(against):.2f} against and {abs(along):.2f} "
@@ -76,7 +104,7 @@ def _course(run: Run) -> list[Note]:
             "set `frame: ENU` at x_m and y_m, or `frame: ENU` at yaw_rad"
         )
         return [Note("course_against", message, {"signal": "yaw_rad", "value": abs(against) - abs(along), "limit": TURNED})]
-    slope = _slope_of(np.unwrap(course), mean) if moved.mean() > ALL_BUT else None
+    slope = found.slope
     if slope is not None and not 1.0 / RATIO < slope < RATIO:
         message = (
             f"the course made from x_m and y_m turns {slope:.3g} times as far as yaw_rad (limits {1 / RATIO:g} and {RATIO:g}): "
@@ -93,6 +121,12 @@ def _course(run: Run) -> list[Note]:
     return []
 
 
+def goes_along_course(run: Run) -> bool:
+    """Whether the course made turns as far as the heading does, and turns at all: so it is in the unit it is taken in."""
+    found = _course_of(run)
+    return found is not None and found.slope is not None and 1.0 / RATIO < found.slope < RATIO
+
+
 def _dive_unit(slope: float, stated: Stated) -> list[Note]:
     """Return the finding that a depth changes by a unit's factor of what speed and pitch say; the unit where one may be it."""
     may = [("depth_m", u) for u, f in DEPTHS.items() if abs(slope * f - 1.0) < UNIT_LIMIT and stated.is_si("depth_m")]
@@ -107,31 +141,6 @@ def _dive_unit(slope: float, stated: Stated) -> list[Note]:
     )
     data = {"signal": signal, "value": slope, "limit": MOST_DIVE} | ({"unit": unit} if is_one else {})
     return [Note("depth_unit" if signal == "depth_m" else "speed_unit", message, data)]
-
-
-def _slope_of(course: FloatArray, heading: FloatArray) -> float | None:
-    """Return how far a course (n,) turns for a turn of the heading, None where the two do not go together."""
-    c, h = course - course.mean(), heading - heading.mean()
-    power = math.sqrt(float(c @ c) * float(h @ h))
-    if power == 0.0 or float(c @ h) / power < AGREES or float(np.std(c)) < TURNED:
-        return None
-    return math.sqrt(float(c @ c) / float(h @ h))
-
-
-def goes_along_course(run: Run) -> bool:
-    """Whether the course made turns as far as the heading does, and turns at all: so it is in the unit it is taken in."""
-    found = _windows(run, "x_m", "y_m", "yaw_rad")
-    if found is None:
-        return False
-    time, width, (x, y, yaw) = found
-    dx, dy = x[width:] - x[:-width], y[width:] - y[:-width]
-    moved = np.hypot(dx, dy) > LEAST_WAY_M
-    if moved.sum() < FEWEST or moved.mean() <= ALL_BUT:
-        return False
-    heading = trapezoid_integral(time, yaw)
-    mean = ((heading[width:] - heading[:-width]) / (time[width:] - time[:-width]))[moved]
-    slope = _slope_of(np.unwrap(np.arctan2(dy, dx)[moved]), mean)
-    return slope is not None and 1.0 / RATIO < slope < RATIO
 
 
 def goes_with_depth(run: Run) -> bool:

@@ -66,12 +66,14 @@ def _size(name: str, values: FloatArray, stated: Stated) -> list[Note]:
     found = []
     if largest > limit:
         servo = servo_of(values) if name in FINS and stated.is_si(name) else None
-        advice = stated.probable(name, unit, largest, limit)
+        advice, told = stated.probable(name, unit, largest, limit)
         if servo is not None:
-            advice = f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`"
+            told, advice = (
+                {},
+                f"whole numbers about {servo.centre:g}, as a servo has: set `unit: counts` and `centre: {servo.centre:g}`",
+            )
         message = f"{name} reaches {largest:.4g} {SIGNALS[name]} (limit {limit:g}): {advice}"
-        data = {"signal": name, "value": largest, "limit": limit}
-        found.append(Note("unit", message, data | ({"unit": unit} if f"`unit: {unit}`" in advice else {})))
+        found.append(Note("unit", message, {"signal": name, "value": largest, "limit": limit, **told}))
     middle = float(np.median(values))
     if name == "surge_m_s" and middle < -0.1:
         message = f"surge_m_s is negative, {middle:.3g} m/s in the middle: {stated.flip(name)}, or set the frame"

@@ -24,13 +24,13 @@ class Stated:
         """Whether a signal's numbers were taken as they are: no unit was stated, or its own."""
         return self.units.get(signal) in (None, SIGNALS[signal])
 
-    def probable(self, signal: str, unit: str, largest: float, limit: float) -> str:
-        """Return what to do about a signal that is larger than can be meant, and may be in a unit."""
+    def probable(self, signal: str, unit: str, largest: float, limit: float) -> tuple[str, dict[str, str]]:
+        """Return what to do about a signal that is larger than can be meant, and may be in a unit; and the unit to set if any."""
         if not self.is_si(signal):
-            return f"taken as `{self.units[signal]}` already: check which one it is"
+            return f"taken as `{self.units[signal]}` already: check which one it is", {}
         if largest * factor_to(signal, unit) <= limit:
-            return f"set its unit, probably `unit: {unit}`"
-        return "check its unit, and which one it is"
+            return f"set its unit, probably `unit: {unit}`", {"unit": unit}
+        return "check its unit, and which one it is", {}
 
     def flip(self, *signals: str) -> str:
         """Return how the sign of one of some signals is turned."""

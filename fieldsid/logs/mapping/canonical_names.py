@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from fieldsid.logs.channels import POSITION
 from fieldsid.logs.convert.servo_counts import BY_UNIT, FINS
 from fieldsid.logs.convert.units import SPELLINGS, dimension_of, find_unit
 from fieldsid.logs.mapping.name_words import ALL_UNITS, unit_said
-from fieldsid.logs.mapping.vocabulary import TIME
+from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE, TIME
 from fieldsid.logs.run import LINES, SIGNALS
 
 STEMS: Mapping[str, str] = MappingProxyType(
-    {
-        "yaw": "yaw_rad", "yaw_rate": "yaw_rate_rad_s", "pitch": "pitch_rad", "pitch_rate": "pitch_rate_rad_s",
-        "roll": "roll_rad", "roll_rate": "roll_rate_rad_s", "depth": "depth_m", "surge": "surge_m_s", "sway": "sway_m_s",
-        "heave": "heave_m_s", "x": "x_m", "y": "y_m", "rudder": "rudder_rad", "elevator": "elevator_rad",
-        "rudder_measured": "rudder_measured_rad", "elevator_measured": "elevator_measured_rad", "propeller": "propeller_rpm",
-        "yaw_goal": "yaw_goal_rad", "pitch_goal": "pitch_goal_rad",
-    }
-)  # fmt: skip
+    {re.sub(r"_(rad|m|rpm)(_s)?$", "", s): s for s, unit in SIGNALS.items() if unit not in ("", "1")}
+)
 """Names without a unit, and the signal each stands for."""
 
 OF_CHANGES: Mapping[str, str] = MappingProxyType({"angle rate": "angle", "speed": "length"})
@@ -45,12 +41,11 @@ def canonical(column: str) -> Canonical | None:
         return Canonical(name, "1")
     if name in LINES:
         return Canonical(name, "rad")
-    for stem, suffix in _splits(name):
-        signal, spelled = TIME if stem == "time" else STEMS.get(stem), suffix.replace("_", "/")
-        if signal is not None and spelled in ALL_UNITS:
-            unit = next((SPELLINGS[d][spelled] for d in fitting(signal) if spelled in SPELLINGS[d]), None)
-            if unit is not None:
-                return Canonical(signal, unit.name)
+    for at in (found.start() for found in re.finditer("_", name)):
+        signal, spelled = {**STEMS, "time": TIME}.get(name[:at], ""), name[at + 1 :].replace("_", "/")
+        units = [SPELLINGS[d][spelled] for d in fitting(signal) if spelled in SPELLINGS[d] and spelled in ALL_UNITS]
+        if units:
+            return Canonical(signal, units[0].name)
     return None
 
 
@@ -59,14 +54,9 @@ def canonical_names() -> tuple[str, ...]:
     return (TIME, *SIGNALS)
 
 
-def _splits(name: str) -> list[tuple[str, str]]:
-    parts = name.split("_")
-    return [("_".join(parts[:i]), "_".join(parts[i:])) for i in range(1, len(parts))]
-
-
 def fitting(signal: str) -> tuple[str, ...]:
     """Return the dimensions that a signal's numbers may have: a depth may be a pressure; none where any unit may be meant."""
-    dimension = "time" if signal == TIME else dimension_of(signal)
+    dimension = {TIME: "time", POSITION: "angle", LATITUDE: "angle", LONGITUDE: "angle"}.get(signal, dimension_of(signal))
     return (*((dimension,) if dimension else ()), *(("pressure",) if signal == "depth_m" else ()))
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fieldsid.logs.channels import ANGLES, ATTITUDE, POSITION, Source
-from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, Servo, servo_of
+from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, servo_of
+from fieldsid.logs.doctor.signal_findings import LARGEST
 from fieldsid.logs.mapping.guesses import Guess, of_column, of_topic, quaternion_of
 from fieldsid.logs.mapping.name_words import words_of
 from fieldsid.logs.mapping.numbers.recognise import recognised, unit_of_heading
@@ -19,7 +20,6 @@ from fieldsid.logs.mapping.vocabulary import LATITUDE, LONGITUDE
 from fieldsid.logs.mapping.word_meaning import meaning_of
 from fieldsid.logs.reader import TABLE, Inventory, Samples
 from fieldsid.logs.run import SIGNALS, Note
-from fieldsid.numerics.arrays import FloatArray
 
 SCHEMA = "fieldsid/mapping/1"
 REP103, NED = "ENU/FLU", "NED/FRD"
@@ -27,15 +27,11 @@ GLIDER_CLOCK, GLIDER_SENSORS = "m_present_time", ("m_", "c_")
 """The clock of a glider's table, and how the sensors begin that are measured or commanded: others are settings and sums."""
 _MESSAGE_PATH = re.compile(r"\bheader\.|\bpose\.pose\.|\btwist\.twist\.|\borientation\.[xyzw]$")
 """What columns are called that were written from messages, which are in the frames of REP 103."""
-NORTH_EAST_DOWN = ("ned", "px")
+NORTH_EAST_DOWN = frozenset({"ned", "px"})
 """Words of topics whose frames are others: of one called so, and of PX4's."""
-OTHER_HEADINGS = 4
-"""Headings beside the surest that are tried."""
-LARGEST = {"yaw_rad": 6.4, "pitch_rad": 1.6, "roll_rad": 3.3, "yaw_rate_rad_s": 4.0, "pitch_rate_rad_s": 4.0,
-           "roll_rate_rad_s": 8.0, "yaw_goal_rad": 6.4, "pitch_goal_rad": 1.6,
-           "rudder_rad": 1.6, "elevator_rad": 1.6, "rudder_measured_rad": 1.6,
-           "elevator_measured_rad": 1.6}  # fmt: skip
-"""Angles and rates larger than this are taken for degrees."""
+OTHER_HEADINGS, OTHERS_SHOWN = 4, 3
+"""Headings beside the surest that are tried, and others of any signal that are named."""
+TURN = 6.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,120 +44,123 @@ class Draft:
     headings: tuple[dict[str, Any], ...] = ()
 
 
-def draft_of(inventory: Inventory) -> Draft:
-    """Return what is to be tried on a log."""
-    return _of_topics(inventory) if inventory.by_topic else _of_columns(inventory)
-
-
 def label_of(item: Mapping[str, Any]) -> str:
     """Return where a line of a mapping reads a signal, in words."""
     return f"topic `{item['topic']}`" if "topic" in item else f"column `{item.get('column', item.get('columns'))}`"
 
 
 def place_of(item: Mapping[str, Any]) -> str:
-    """Return where a mapping's line says that a signal is: its column, or its topic and field."""
+    """Return where a mapping's line says that a signal is: its column, its topic and field, or those of its sum."""
+    if "sum" in item:
+        return " + ".join(map(place_of, item["sum"]))
     if "topic" in item:
         return f"{item['topic']} {item['field']}".strip() if item.get("field") not in (None, "", "data") else str(item["topic"])
     return ", ".join(map(str, item["columns"])) if "columns" in item else str(item.get("column", ""))
 
 
 def unit_by_size(signal: str, largest: float) -> str | None:
-    """Return degrees where numbers of such a size are none in rad."""
-    return None if largest <= LARGEST.get(signal, np.inf) else "deg/s" if signal.endswith("_s") else "deg"
+    """Return degrees where numbers of such a size are none of an angle or a rate in rad."""
+    limit, unit = (TURN, "deg") if signal in ("yaw_rad", "yaw_goal_rad") else LARGEST.get(signal, (np.inf, ""))
+    return unit if largest > limit and unit.startswith("deg") else None
 
 
 def with_units_by_span(draft: Draft, inventory: Inventory) -> None:
     """Set the units that the least and largest of a column say, in a log that cannot be read as it is."""
-    spans = {c.name: c.fields[0].span for c in inventory.channels if len(c.fields) == 1 and c.fields[0].span is not None}
+    spans = {
+        c.name: np.array(c.fields[0].span) for c in inventory.channels if len(c.fields) == 1 and c.fields[0].span is not None
+    }
+    _as_counts(spans, draft.body["signals"])
     for signal, item in draft.body["signals"].items():
         span = spans.get(item.get("column", ""))
-        if span is None or "unit" in item:
-            continue
-        servo = servo_of(np.array(span)) if signal in COUNTED else None
-        unit = unit_by_size(signal, max(map(abs, span)))
-        if servo is not None:
-            item |= {"unit": COUNTS, "centre": round(servo.centre)}
-        elif unit is not None:
-            item["unit"] = unit
+        unit = None if span is None or "unit" in item else unit_by_size(signal, float(np.abs(span).max()))
+        item.update({} if unit is None else {"unit": unit})
 
 
-def _of_columns(inventory: Inventory) -> Draft:
-    guesses: list[Guess] = []
-    names = [c.name for c in inventory.channels]
-    is_of_glider = GLIDER_CLOCK in names
-    is_named = inventory.table is None or bool(inventory.table.header)
-    for i, channel in enumerate(inventory.channels if is_named else ()):
-        if not is_of_glider or channel.name.startswith(GLIDER_SENSORS):
-            # A name that several columns have, or none, says nothing of which one is meant.
-            guesses += of_column(channel, channel.name if names.count(channel.name) == 1 else i)
-    best, notes = _best(guesses)
-    _plane_pose(best)
-    _single_speed(best)
+def draft_of(inventory: Inventory) -> Draft:
+    """Return what is to be tried on a log."""
     body: dict[str, Any] = {"schema": SCHEMA}
+    names = [c.name for c in inventory.channels]
+    guesses = [g for c in inventory.channels for g in of_topic(c)] if inventory.by_topic else _of_columns(inventory, names)
+    best, notes = _best(guesses)
     samples = inventory.samples
-    source = samples.source if samples is not None else inventory.no_clock[0] if inventory.no_clock is not None else None
-    if source is not None:
-        body["time"] = _time(inventory, source)
-    signals = _combined(best, names, samples)
-    if any(_MESSAGE_PATH.search(name) for name in names):
-        body["frame"] = REP103
+    attitude = None if samples is None else quaternion_of(names, samples.columns)
+    signals = _combined(best, attitude)
+    if inventory.by_topic:
+        body["frame"] = _frame_of_topics(inventory)
+    else:
+        source = samples.source if samples is not None else inventory.no_clock[0] if inventory.no_clock is not None else None
+        body |= {} if source is None else {"time": _time(inventory, source)}
+        body |= {"frame": REP103} if any(_MESSAGE_PATH.search(name) for name in names) else {}
     if samples is not None:
         notes += _by_numbers(samples, signals, inventory)
         notes += [] if "frame" in body else true_north(samples, names, signals)
-        _as_counts(samples, signals)
+        _as_counts(samples.columns, signals)
     body["signals"] = {s: signals[s] for s in (ATTITUDE, POSITION, *SIGNALS) if s in signals}
-    return Draft(body, tuple(notes), frozenset(_of_combined(signals)), _other_headings(guesses, signals))
-
-
-def _of_combined(signals: Mapping[str, Any]) -> set[str]:
-    """Return the signals that come several from one line, in units of their own."""
-    return {*(ANGLES if ATTITUDE in signals else ()), *(("x_m", "y_m") if POSITION in signals else ())}
-
-
-def _of_topics(inventory: Inventory) -> Draft:
-    guesses = [g for c in inventory.channels for g in of_topic(c)]
-    best, notes = _best(guesses)
-    if ATTITUDE in best:
-        for angle in ANGLES:
-            best.pop(angle, None)
-    named = words_of(" ".join(c.name + c.kind for c in inventory.channels).lower())
-    from_messages = any(c.kind == TABLE and _MESSAGE_PATH.search(f.path) for c in inventory.channels for f in c.fields)
-    frame = REP103 if from_messages else inventory.frame or (NED if set(NORTH_EAST_DOWN) & set(named) else REP103)
-    signals = {s: best[s].item for s in (ATTITUDE, POSITION, *SIGNALS) if s in best}
-    defined = {s for s in signals if best[s].defined} | _of_combined(signals)
-    body = {"schema": SCHEMA, "frame": frame, "signals": signals}
+    defined = {s for s, guess in best.items() if guess.defined}
+    defined |= {*(ANGLES if ATTITUDE in signals else ()), *(("x_m", "y_m") if POSITION in signals else ())}
     return Draft(body, tuple(notes), frozenset(defined), _other_headings(guesses, signals))
+
+
+def _of_columns(inventory: Inventory, names: list[str]) -> list[Guess]:
+    """Return what the columns of a table may be; a name that several have, or none, says nothing of which one is meant."""
+    is_named = inventory.table is None or bool(inventory.table.header)
+    starts = GLIDER_SENSORS if GLIDER_CLOCK in names else ("",)
+    return [
+        guess
+        for i, channel in enumerate(inventory.channels if is_named else ())
+        if channel.name.startswith(starts)
+        for guess in of_column(channel, channel.name if names.count(channel.name) == 1 else i)
+    ]
+
+
+def _frame_of_topics(inventory: Inventory) -> str:
+    """Return the frames of a log of topics: those of its format, but for tables that were written from messages."""
+    if any(c.kind == TABLE and _MESSAGE_PATH.search(f.path) for c in inventory.channels for f in c.fields):
+        return REP103
+    named = words_of(" ".join(c.name + c.kind for c in inventory.channels).lower())
+    return inventory.frame or (NED if NORTH_EAST_DOWN & set(named) else REP103)
 
 
 def _time(inventory: Inventory, source: Source) -> dict[str, Any]:
     """Return a time as a mapping has it: one column or several, its unit, and the columns of its days or weeks."""
-    date = [_place(inventory, c) for c in source.date]
+    # without a header a column goes by its place
+    of = int if inventory.table is not None and not inventory.table.header else lambda column: column
+    date = [of(c) for c in source.date]
     keys = {
-        "column": _place(inventory, source.column),
-        "columns": [_place(inventory, c) for c in source.columns] or None,
+        "column": None if source.column is None else of(source.column),
+        "columns": [of(c) for c in source.columns] or None,
         "unit": source.unit,
         "date": date[0] if len(date) == 1 else date or None,
-        "week": _place(inventory, source.week),
+        "week": None if source.week is None else of(source.week),
     }
     return {key: value for key, value in keys.items() if value is not None}
 
 
-def _combined(best: dict[str, Guess], names: list[str], samples: Samples | None) -> dict[str, Any]:
-    """Return the columns of signals, with those that give several together: latitude and longitude, a quaternion."""
-    position = [best.pop(s, None) for s in (LATITUDE, LONGITUDE)]
+def _combined(best: dict[str, Guess], attitude: dict[str, Any] | None) -> dict[str, Any]:
+    """Return the lines of signals, with those that give several together: latitude and longitude, a quaternion.
+
+    In a pose of x, y and theta the one angle is the heading; a `v` without a `u` beside it is the speed, and no sway.
+    """
+    latitude, longitude = (best.pop(s, None) for s in (LATITUDE, LONGITUDE))
     signals = {signal: guess.item for signal, guess in best.items()}
-    if all(position) and not {"x_m", "y_m"} & signals.keys():
-        signals[POSITION] = {"columns": [g.item["column"] for g in position if g is not None]}
-    attitude = None if samples is None else quaternion_of(names, samples.columns)
-    if attitude is not None:
-        signals = {s: item for s, item in signals.items() if s not in ANGLES}
-        signals[ATTITUDE] = attitude
-    return signals
+    if {"pitch_rad", "x_m", "y_m"} <= signals.keys() and "yaw_rad" not in signals and _is_called(signals, "pitch_rad", "theta"):
+        signals["yaw_rad"] = signals.pop("pitch_rad")
+    if "surge_m_s" not in signals and _is_called(signals, "sway_m_s", "v"):
+        signals["surge_m_s"] = signals.pop("sway_m_s")
+    if latitude is not None and longitude is not None and not {"x_m", "y_m"} & signals.keys():
+        unit = {"unit": latitude.item["unit"]} if latitude.item.get("unit", "deg") != "deg" else {}
+        if "column" in latitude.item:
+            signals[POSITION] = {"columns": [latitude.item["column"], longitude.item["column"]], **unit}
+        elif latitude.item["topic"] == longitude.item["topic"]:
+            fields = f"{latitude.item['field']}, {longitude.item['field']}"
+            signals[POSITION] = {"topic": latitude.item["topic"], "field": fields, **unit}
+    signals |= {} if attitude is None else {ATTITUDE: attitude}
+    return {s: item for s, item in signals.items() if ATTITUDE not in signals or s not in ANGLES}
 
 
-def _place(inventory: Inventory, column: str | int | None) -> str | int | None:
-    """Return a column as a mapping names it: without a header by its place."""
-    return int(column) if isinstance(column, str) and inventory.table and not inventory.table.header else column
+def _is_called(signals: Mapping[str, Any], signal: str, word: str) -> bool:
+    words = words_of(str(signals.get(signal, {}).get("column", "")))
+    return words == [word] or (len(word) > 1 and word in words)
 
 
 def _other_headings(guesses: Iterable[Guess], signals: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
@@ -180,46 +179,29 @@ def _best(guesses: Iterable[Guess]) -> tuple[dict[str, Guess], list[Note]]:
     best, notes = {}, []
     for signal, several in by_signal.items():
         ordered = sorted(several, key=lambda g: (-g.sure, -g.count))
-        best[signal] = ordered[0]
+        first = best[signal] = ordered[0]
         # of two that a format defines to be one signal both are it
-        open_ones = [g for g in ordered[1:4] if g.sure > 0.5 * ordered[0].sure and not (g.defined and ordered[0].defined)]
-        others = [label_of(g.item) for g in open_ones]
+        near = [g for g in ordered[1 : 1 + OTHERS_SHOWN] if g.sure > 0.5 * first.sure and not (g.defined and first.defined)]
+        others = [label_of(g.item) for g in near]
         if others and signal in SIGNALS:
-            message = f"{signal} is taken from {label_of(ordered[0].item)}; it may also be {', '.join(others)}"
+            message = f"{signal} is taken from {label_of(first.item)}; it may also be {', '.join(others)}"
             notes.append(Note("alternatives", message, {"signal": signal, "others": others}))
     return best, notes
-
-
-def _plane_pose(best: dict[str, Guess]) -> None:
-    """In a pose of x, y and theta the one angle is the heading."""
-    pitch = best.get("pitch_rad")
-    if pitch is None or "yaw_rad" in best or not {"x_m", "y_m"} <= best.keys():
-        return
-    if "theta" in words_of(str(pitch.item["column"])):
-        best["yaw_rad"] = replace(best.pop("pitch_rad"), signal="yaw_rad")
-
-
-def _single_speed(best: dict[str, Guess]) -> None:
-    """A `v` without a `u` beside it is the speed, and no sway."""
-    sway = best.get("sway_m_s")
-    if sway is not None and "surge_m_s" not in best and words_of(str(sway.item["column"])) == ["v"]:
-        best["surge_m_s"] = replace(best.pop("sway_m_s"), signal="surge_m_s")
 
 
 def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory) -> list[Note]:
     """Add what the numbers of columns without a known name say, and return the reasons."""
     columns = samples.columns
-    known = {s: i["column"] for s, i in signals.items() if "column" in i}
-    known = {s: c if c in columns else str(c) for s, c in known.items()}
+    known = {s: i["column"] if i["column"] in columns else str(i["column"]) for s, i in signals.items() if "column" in i}
     used = {*known.values(), *samples.source.places, *(c for i in signals.values() for c in i.get("columns", ()))}
     named = inventory.table is None or inventory.table.header
     free = [c for c in columns if c not in used and not (named and isinstance(c, str) and meaning_of(c) is not None)]
-    if all(known.get(s) in columns for s in ("yaw_rad", "x_m", "y_m")):
+    known = {s: c for s, c in known.items() if c in columns}
+    if {"yaw_rad", "x_m", "y_m"} <= known.keys():
         unit = unit_of_heading(samples, known["yaw_rad"], (known["x_m"], known["y_m"]))
-        if unit is not None:
-            signals["yaw_rad"].setdefault("unit", unit)
+        signals["yaw_rad"] |= {} if unit is None or "unit" in signals["yaw_rad"] else {"unit": unit}
     notes = []
-    for found in recognised(samples, {s: c for s, c in known.items() if c in columns}, free):
+    for found in recognised(samples, known, free):
         place = found.column if named else int(found.column)
         signals[found.signal] = {"column": place, **found.item}
         data = {"signal": found.signal, "column": place}
@@ -227,20 +209,17 @@ def _by_numbers(samples: Samples, signals: dict[str, Any], inventory: Inventory)
     return notes
 
 
-def _as_counts(samples: Samples, signals: dict[str, Any]) -> None:
-    """Write the centre of fins and motors that are logged in a servo's counts."""
-    taken = [samples.columns.get(signals[s].get("column", "")) for s in FINS if s in signals and "unit" not in signals[s]]
-    servos = [servo for values in taken if values is not None and (servo := servo_of(values)) is not None]
-    for signal in COUNTED:
-        item = signals.get(signal, {})
-        values = samples.columns.get(item.get("column", ""))
-        servo = None if values is None or "unit" in item else servo_of(values) or _as_others(values, servos)
+def _as_counts(columns: Mapping[Any, Any], signals: dict[str, Any]) -> None:
+    """Write the centre of fins and motors that are logged in a servo's counts, by the numbers (n,) of their columns.
+
+    One that never moves far tells no kind of counts itself, and is in that of the fins where its numbers fit it.
+    """
+    seen = {s: columns.get(signals[s].get("column", "")) for s in COUNTED if s in signals and "unit" not in signals[s]}
+    values = {s: v[np.isfinite(v)] for s, v in seen.items() if v is not None and np.isfinite(v).any()}
+    kinds = {s: servo_of(v) for s, v in values.items()}
+    for signal, v in values.items():
+        whole = bool((v == np.round(v)).all())
+        others = (k for s in FINS if (k := kinds.get(s)) is not None and whole and k.least <= v.min() and v.max() <= k.largest)
+        servo = kinds[signal] or next(others, None)
         if servo is not None:
-            item["unit"], item["centre"] = COUNTS, round(servo.centre)
-
-
-def _as_others(values: FloatArray, servos: list[Servo]) -> Servo | None:
-    """Return the kind of counts of the other fins where numbers (n,) fit it: one that never moves far tells none itself."""
-    seen = values[np.isfinite(values)]
-    whole = bool(seen.size) and bool((seen == np.round(seen)).all())
-    return next((s for s in servos if whole and s.least <= seen.min() and seen.max() <= s.largest), None)
+            signals[signal] |= {"unit": COUNTS, "centre": round(servo.centre)}

@@ -9,13 +9,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from fieldsid.errors import FieldsidError, MappingError
+from fieldsid.errors import MappingError
 from fieldsid.logs.channels import ANGLES, ATTITUDE, COMBINED, POSITION, ChannelMap, Pressure, Source, TableForm
 from fieldsid.logs.convert.frames import Body, Frame, World
 from fieldsid.logs.convert.servo_counts import COUNTED, COUNTS, FINS, SUMMED, counts_unit
 from fieldsid.logs.convert.times.clock_parts import parts_of
 from fieldsid.logs.convert.times.clock_text import FORMS
-from fieldsid.logs.convert.units import UNITS, dimension_of, find_unit, pick_unit
+from fieldsid.logs.convert.units import UNITS, find_unit
+from fieldsid.logs.mapping.canonical_names import fitting
 from fieldsid.logs.mapping.vocabulary import TIME
 from fieldsid.logs.run import PART, SIGNALS, signal_of
 from fieldsid.registry import near
@@ -141,6 +142,13 @@ def mapping_of(body: Mapping[str, Any], *, place: str = "the mapping") -> Channe
     return _channel_map(validated(_File, body, place=place, error=MappingError), place, None)
 
 
+def _refuse(place: str, *faults: tuple[object, str, object, str]) -> None:
+    """Raise MappingError for the first fault that is there: whether it is, what is wrong, what was found, and a hint."""
+    for is_there, what, found, hint in faults:
+        if is_there:
+            raise MappingError(f"{place} {what}", found=str(found), hint=hint)
+
+
 def frame_of(text: str | None, place: str) -> Frame | None:
     """Return the frames a text names: `ENU/FLU`, `NED`, `FLU`; raises MappingError."""
     if text is None:
@@ -154,11 +162,8 @@ def frame_of(text: str | None, place: str) -> Frame | None:
             case "FRD" | "FLU" as named_body:
                 body = named_body
             case _:
-                raise MappingError(
-                    f"{place}: there is no frame {part!r}",
-                    found=repr(text),
-                    hint="write the world's and the body's: `NED/FRD` or `ENU/FLU`",
-                )
+                hint = "write the world's and the body's: `NED/FRD` or `ENU/FLU`"
+                raise MappingError(f"{place}: there is no frame {part!r}", found=repr(text), hint=hint)
     return Frame(world, body)
 
 
@@ -169,11 +174,12 @@ def channel_of(text: str) -> tuple[str, Source]:
     """
     signal, equals, rest = text.partition("=")
     signal = TIME if signal.strip() == "time" else signal.strip()
-    if not equals or not rest:
-        raise MappingError(f"`--channel {text}` is no channel", found=repr(text), hint="write `--channel yaw_rad=heading:deg`")
     known = (TIME, *COMBINED, *SIGNALS)
-    if signal not in known:
-        raise MappingError(f"`--channel` names an unknown signal `{signal}`", found=repr(text), hint=near(signal, known))
+    _refuse(
+        "`--channel",
+        (not equals or not rest, f"{text}` is no channel", repr(text), "write `--channel yaw_rad=heading:deg`"),
+        (signal not in known, f"` names an unknown signal `{signal}`", repr(text), near(signal, known)),
+    )
     form = next((f for f in FORMS if signal == TIME and rest.endswith(f":{f}")), "")
     where, colon, unit = (rest.removesuffix(f":{form}"), ":", form) if form else rest.rpartition(":")
     if not colon:
@@ -189,16 +195,10 @@ def channel_of(text: str) -> tuple[str, Source]:
 def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
     frame = frame_of(file.frame, place)
     sources = {name: source for signal, item in file.signals.items() for name, source in _sources(signal, item, place)}
-    if not sources:
-        raise MappingError(
-            f"{place} maps no signal",
-            found="an empty `signals`",
-            hint="write a line for each under `signals`, as `yaw_rad: {column: NAME, unit: deg}`",
-        )
-    if file.clock is not None and file.clock not in file.signals:
-        raise MappingError(
-            f"{place}: `clock` names a signal that is not mapped", found=file.clock, hint=near(file.clock, list(file.signals))
-        )
+    unmapped, signals = file.clock is not None and file.clock not in file.signals, list(file.signals)
+    hint = "write a line for each under `signals`, as `yaw_rad: {column: NAME, unit: deg}`"
+    _refuse(place, (not sources, "maps no signal", "an empty `signals`", hint))
+    _refuse(f"{place}:", (unmapped, "`clock` names a signal that is not mapped", file.clock, near(file.clock or "", signals)))
     return ChannelMap(
         sources,
         time=_time(file.time, place) if file.time else None,
@@ -214,71 +214,60 @@ def _channel_map(file: _File, place: str, origin: Path | None) -> ChannelMap:
 
 def _time(time: _Time, place: str) -> Source:
     """The unit of a time is one of time, or says how a clock is written; one that counts samples or rows has a rate, and none."""
-    if (time.column is None) == (not time.columns) and (time.columns or time.rate is None):
-        raise MappingError(
-            f"{place}: `time` needs one of `column`, `columns`, `rate`",
-            found="both" if time.columns else "none of them",
-            hint="name one with `column`, those that make it up with `columns`, or give the rows a second with `rate`",
-        )
-    if time.rate is not None and (time.unit, time.date, time.week, time.columns) != (None, None, None, None):
-        raise MappingError(
-            f"{place}: a time with a `rate` counts samples, and has no unit, date or week",
-            found=f"rate {time.rate:g}",
-            hint=f"write `time: {{rate: {time.rate:g}}}`",
-        )
-    if time.columns:
-        parts_of(time.unit, time.columns, place)
+    rate, columns = time.rate, tuple(time.columns or ())
+    is_one = (time.column is None) != (not columns) or (not columns and rate is not None)
+    way = "name one with `column`, those that make it up with `columns`, or give the rows a second with `rate`"
+    is_both = rate is not None and (time.unit, time.date, time.week, time.columns) != (None, None, None, None)
+    _refuse(
+        f"{place}:",
+        (not is_one, "`time` needs one of `column`, `columns`, `rate`", "both" if columns else "none of them", way),
+        (
+            is_both,
+            "a time with a `rate` counts samples, and has no unit, date or week",
+            f"rate {rate}",
+            f"write `time: {{rate: {rate}}}`",
+        ),
+    )
+    if columns:
+        parts_of(time.unit, columns, place)
     elif time.unit is not None and time.unit not in FORMS:
         found = find_unit(time.unit, "time")
-        if found is None or found.dimension != "time":
-            known = [u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS)
-            raise MappingError(
-                f"{place}: time cannot be in {time.unit!r}", found=time.unit, hint=f"use one of: {', '.join(known)}"
-            )
-    dates = () if time.date is None else tuple(time.date) if isinstance(time.date, list) else (time.date,)
+        known = ", ".join([u.name for u in UNITS.values() if u.dimension == "time"] + list(FORMS))
+        is_none = found is None or found.dimension != "time"
+        _refuse(f"{place}:", (is_none, f"time cannot be in {time.unit!r}", time.unit, f"use one of: {known}"))
     return Source(
         column=time.column,
-        columns=tuple(time.columns or ()),
+        columns=columns,
         unit=time.unit,
-        date=dates,
+        date=() if time.date is None else tuple(time.date) if isinstance(time.date, list) else (time.date,),
         week=time.week,
-        scale=1.0 / time.rate if time.rate else None,
+        scale=1.0 / rate if rate else None,
     )
 
 
 def _sources(signal: str, item: _Source | str | int, place: str) -> list[tuple[str, Source]]:
     """Return where a signal is with its own name, or each entry of its sum with a name that has a number."""
     known = (*COMBINED, *SIGNALS)
-    if signal not in known:
-        raise MappingError(f"{place} maps an unknown signal `{signal}`", found=signal, hint=near(signal, known))
+    _refuse(place, (signal not in known, f"maps an unknown signal `{signal}`", signal, near(signal, known)))
     if not isinstance(item, _Source):
         item = validated(_Source, {"column": item}, place=f"{place}, `{signal}`", error=MappingError)
     if item.sum is None:
         return [(signal, _source(signal, item, place))]
-    _check_sum(signal, item, place)
-    named = [(f"{signal}{PART}{i}]", entry) for i, entry in enumerate(item.sum)]
-    return [(name, _source(name, entry, place)) for name, entry in named]
-
-
-def _check_sum(signal: str, item: _Source, place: str) -> None:
-    """A sum is of fins or motors, and all that is said of it is said of its entries."""
-    if signal not in SUMMED:
-        raise MappingError(
-            f"{place}: `{signal}` cannot be a sum",
-            found=f"{len(item.sum or ())} entries",
-            hint=f"a sum is for {', '.join(SUMMED)}",
-        )
-    beside = sorted(item.model_fields_set - {"sum"})
-    if beside:
-        raise MappingError(
-            f"{place}: `{signal}` has `{beside[0]}` beside its `sum`",
-            found=", ".join(beside),
-            hint="write it at each entry of the sum",
-        )
-    flat = next((i for i, entry in enumerate(item.sum or ()) if entry.scale == 0.0), None)
-    if flat is not None:
-        hint = "leave the entry out, or write what its number is worth"
-        raise MappingError(f"{place}: entry {flat} of the sum `{signal}` has a scale of zero", found="scale: 0", hint=hint)
+    # a sum is of fins or motors, and all that is said of it is said of its entries
+    beside, flat = sorted(item.model_fields_set - {"sum"}), [i for i, entry in enumerate(item.sum) if entry.scale == 0.0]
+    nothing = "leave the entry out, or write what its number is worth"
+    _refuse(
+        f"{place}:",
+        (signal not in SUMMED, f"`{signal}` cannot be a sum", f"{len(item.sum)} entries", f"a sum is for {', '.join(SUMMED)}"),
+        (
+            beside,
+            f"`{signal}` has `{''.join(beside[:1])}` beside its `sum`",
+            ", ".join(beside),
+            "write it at each entry of the sum",
+        ),
+        (flat, f"entry {flat and flat[0]} of the sum `{signal}` has a scale of zero", "scale: 0", nothing),
+    )
+    return [(name, _source(name, entry, place)) for i, entry in enumerate(item.sum) for name in (f"{signal}{PART}{i}]",)]
 
 
 def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
@@ -287,12 +276,6 @@ def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
     is_turned = isinstance(item, _Entry) and item.scale is not None and find_unit(item.unit or "") is not None
     if item.unit is not None and not is_turned:
         _check_unit(signal, item.unit, place)
-    if (signal in COMBINED or item.columns) and (item.sign != 1 or item.unit):
-        raise MappingError(
-            f"{place}: a {'position' if signal == POSITION else 'quaternion'} has no sign and no unit",
-            found=f"at `{signal}`",
-            hint="set `frame` instead",
-        )
     return Source(
         column=item.column,
         columns=tuple(item.columns or ()),
@@ -310,64 +293,48 @@ def _source(signal: str, item: _Source | _Entry, place: str) -> Source:
 
 
 def _check_place(signal: str, item: _Source | _Entry, place: str) -> None:
-    """Exactly one of column, columns, topic says where a signal is."""
+    """Exactly one of column, columns, topic says where a signal is; several are those of one line, counts those of a servo."""
     named = [n for n, v in (("column", item.column), ("columns", item.columns or None), ("topic", item.topic)) if v is not None]
-    if len(named) != 1:
-        raise MappingError(
-            f"{place}: `{signal}` needs one of `column`, `columns`, `topic`, `sum`",
-            found=" and ".join(named) or "none of them",
-            hint="write `column: NAME`, or `topic: NAME` where the log is a bag",
-        )
-    if item.field and item.topic is None:
-        raise MappingError(
-            f"{place}: `{signal}` has a `field` without a `topic`", found=f"field: {item.field}", hint="name the `topic` too"
-        )
-    _check_columns(signal, item, place)
-    _check_counts(signal, item, place)
-
-
-def _check_columns(signal: str, item: _Place, place: str) -> None:
-    if signal == POSITION:
-        if item.topic is None and len(item.columns or ()) != 2:
-            raise MappingError(
-                f"{place}: `{POSITION}` needs two columns",
-                found=str(item.columns or item.column),
-                hint="write `columns: [LAT, LON]`",
-            )
-    elif item.columns and (len(item.columns) != 4 or signal not in (ATTITUDE, *ANGLES)):
-        raise MappingError(
-            f"{place}: `columns` is for the four numbers of a quaternion",
-            found=f"{len(item.columns)} columns at `{signal}`",
-            hint="write `columns: [qx, qy, qz, qw]`" if signal in (ATTITUDE, *ANGLES) else "use `column`",
-        )
-
-
-def _check_counts(signal: str, item: _Source | _Entry, place: str) -> None:
-    """A centre and a scale are those of counts, and counts those of a servo or a motor."""
-    of_counts = (("centre", item.centre), ("scale", item.scale if isinstance(item, _Source) else None))
-    extra = [n for n, v in of_counts if v is not None]
-    if extra and counts_unit(signal_of(signal), item.unit) is None:
-        hint = f"write `unit: {COUNTS}` beside it"
-        raise MappingError(f"{place}: `{signal}` has a `{extra[0]}` without counts", found=f"unit: {item.unit}", hint=hint)
-    if item.unit == COUNTS and signal_of(signal) not in COUNTED:
-        raise MappingError(
-            f"{place}: `{signal}` cannot be in {COUNTS!r}", found=f"{COUNTS} are those of a servo or a motor", hint="set its unit"
-        )
+    count, is_position, may_turn = len(item.columns or ()), signal == POSITION, signal in (ATTITUDE, *ANGLES)
+    is_four = not is_position and (signal == ATTITUDE or count > 0)
+    of_counts = {"centre": item.centre, "scale": item.scale if isinstance(item, _Source) else None}
+    extra = [n for n, v in of_counts.items() if v is not None and counts_unit(signal_of(signal), item.unit) is None]
+    no_place = f"`{signal}` needs one of `column`, `columns`, `topic`, `sum`"
+    no_topic = item.field and item.topic is None
+    no_pair = is_position and item.topic is None and count != 2
+    no_four = not is_position and count and (count != 4 or not may_turn)
+    no_counts = item.unit == COUNTS and signal_of(signal) not in COUNTED
+    kind, at, four = "position" if is_position else "quaternion", f"at `{signal}`", "write `columns: [qx, qy, qz, qw]`"
+    a_place = "write `column: NAME`, or `topic: NAME` where the log is a bag"
+    _refuse(
+        f"{place}:",
+        (len(named) != 1, no_place, " and ".join(named) or "none of them", a_place),
+        (no_topic, f"`{signal}` has a `field` without a `topic`", f"field: {item.field}", "name the `topic` too"),
+        (no_pair, f"`{POSITION}` needs two columns", item.columns or item.column, "write `columns: [LAT, LON]`"),
+        (
+            no_four,
+            "`columns` is for the four numbers of a quaternion",
+            f"{count} columns {at}",
+            four if may_turn else "use `column`",
+        ),
+        ((is_position or is_four) and item.sign != 1, f"a {kind} has no sign", at, "set `frame` instead"),
+        (is_four and item.unit, "a quaternion has no unit", at, "set `frame` instead"),
+        (extra, f"`{signal}` has a `{''.join(extra[:1])}` without counts", f"unit: {item.unit}", f"write `unit: {COUNTS}` too"),
+        (no_counts, f"`{signal}` cannot be in {COUNTS!r}", f"{COUNTS} are those of a servo or a motor", "set its unit"),
+    )
 
 
 def _check_unit(signal: str, unit: str, place: str) -> None:
-    """The unit is one, and of the signal's dimension; a depth may be a pressure."""
-    dimension, whole = dimension_of(signal) if signal not in COMBINED else None, signal_of(signal)
-    if dimension is None or unit == COUNTS or counts_unit(signal, unit) is not None:
+    """The unit is one, and of the signal's dimension; a depth may be a pressure, latitude and longitude are angles."""
+    dimensions, whole = fitting(signal), signal_of(signal)
+    if not dimensions or unit == COUNTS or counts_unit(signal, unit) is not None:
         return
-    try:
-        picked = pick_unit(unit, dimension)
-    except FieldsidError as error:
-        fitting = [u.name for u in UNITS.values() if u.dimension == dimension]
-        raise MappingError(f"{place}: `{signal}`: {error.what}", found=unit, hint=near(unit, fitting)) from error
-    if picked.dimension != dimension and not (signal == "depth_m" and picked.dimension == "pressure"):
-        raise MappingError(
-            f"{place}: `{signal}` cannot be in {unit!r}",
-            found=f"a unit of {picked.dimension}",
-            hint=f"use a unit of {dimension}, such as `{SIGNALS[whole]}`{OF_FINS if whole in FINS else ''}",
-        )
+    known = [u.name for u in UNITS.values() if u.dimension == dimensions[0]]
+    found = find_unit(unit, dimensions[0])
+    of_fins = OF_FINS if whole in FINS else ""
+    fits = f"use a unit of {dimensions[0]}, such as `{SIGNALS.get(whole, 'deg')}`{of_fins}"
+    _refuse(
+        f"{place}: `{signal}`",
+        (found is None, f"there is no unit {unit!r}", unit, near(unit, known)),
+        (found and found.dimension not in dimensions, f"cannot be in {unit!r}", f"a unit of {found and found.dimension}", fits),
+    )

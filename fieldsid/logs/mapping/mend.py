@@ -26,29 +26,38 @@ def mended(body: dict[str, Any], run: Run, findings: Iterable[Note], by_size: Co
 
     `by_size` holds the signals that were taken for degrees because their numbers are large.
     """
-    signals = body["signals"]
-    done: list[Note] = []
+    signals, done = body["signals"], list[Note]()
     for note in findings:
-        signal = note.data.get("signal", "")
-        if note.code == "unit" and signal == "yaw_rate_rad_s" and "yaw_rad" in by_size and _counts_turns(signals, run):
-            del signals["yaw_rad"]["unit"]
-            done.append(_evidence("yaw_rad", "no unit, as rad that count turns", note))
-        elif (
-            note.code in ("unit", "speed_unit", "depth_unit")
-            and "unit" in note.data
-            and "unit" not in signals.get(signal, {"unit": 0})
+        if (
+            note.code == "unit"
+            and note.data["signal"] == "yaw_rate_rad_s"
+            and "yaw_rad" in by_size
+            and _counts_turns(signals, run)
         ):
-            signals[signal]["unit"] = note.data["unit"]
-            done.append(_evidence(signal, f"`unit: {note.data['unit']}`", note))
-        elif note.code in ("rate_sign", "speed_sign") and _turn(signals, signal):
-            done.append(_evidence(signal, "`sign: -1`", note))
-        elif note.code == "dive_sign":
-            wrong = "depth_m" if float(np.nanmedian(run["depth_m"])) < 0.0 else "pitch_rad"
-            done += [_evidence(wrong, "`sign: -1`", note)] if _turn(signals, wrong) else []
-        elif note.code == "course_against":
-            turned = _turned_world(body, signals)
-            done += [_evidence(turned[0], f"`frame: ENU` at {' and '.join(turned)}", note)] if turned else []
+            del signals["yaw_rad"]["unit"]
+            done.append(_evidence(["yaw_rad"], "no unit, as rad that count turns", note))
+            continue
+        wrong, key, value = _remedy(note, body, run)
+        if wrong and not any(key in signals.get(s, {key: 0}) for s in wrong):
+            for signal in wrong:
+                signals[signal][key] = value
+            done.append(_evidence(wrong, f"`{key}: {value}`{' at ' + ' and '.join(wrong) if key == 'frame' else ''}", note))
     return done
+
+
+def _remedy(note: Note, body: Mapping[str, Any], run: Run) -> tuple[list[str], str, Any]:
+    """Return the signals that a finding shows to be read wrongly, and the key and value that mend it; none where it does not."""
+    if note.code in ("unit", "speed_unit", "depth_unit"):
+        return [note.data["signal"]] if "unit" in note.data else [], "unit", note.data.get("unit")
+    if note.code in ("rate_sign", "speed_sign"):
+        return [note.data["signal"]], "sign", -1
+    if note.code == "dive_sign":
+        return ["depth_m" if float(np.nanmedian(run["depth_m"])) < 0.0 else "pitch_rad"], "sign", -1
+    if note.code == "course_against" and "frame" not in body and "yaw_rad" in body["signals"]:
+        columns = [body["signals"].get(s, {}).get("column") for s in ("x_m", "y_m")]
+        known = POSITION in body["signals"] or any(GEOGRAPHIC & set(words_of(str(c))) for c in columns)
+        return ["yaw_rad"] if known else ["x_m", "y_m"], "frame", "ENU"
+    return [], "", None
 
 
 def _counts_turns(signals: Mapping[str, Any], run: Run) -> bool:
@@ -56,34 +65,10 @@ def _counts_turns(signals: Mapping[str, Any], run: Run) -> bool:
 
     It is where the rate's unit is known, and where the other angles of the log are in rad: one logger wrote them.
     """
-    if "unit" not in signals.get("yaw_rad", {}):
-        return False
     others = [s for s in ANGLES_BESIDE if s in signals and "unit" not in signals[s] and run.has(s)]
     largest = max((float(np.nanpercentile(np.abs(run[s]), 99)) for s in others), default=np.inf)
-    return "unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST
+    return "unit" in signals.get("yaw_rad", {}) and ("unit" in signals.get("yaw_rate_rad_s", {}) or largest < WIDEST)
 
 
-def _evidence(signal: str, what: str, note: Note) -> Note:
-    return Note("evidence", f"{signal} is taken with {what}: {note.message}", {"signal": signal, "finding": note.code})
-
-
-def _turn(signals: Mapping[str, Any], signal: str) -> bool:
-    """Turn the sign of a signal once; return whether it was."""
-    item = signals.get(signal)
-    if item is None or "sign" in item:
-        return False
-    item["sign"] = -1
-    return True
-
-
-def _turned_world(body: Mapping[str, Any], signals: Mapping[str, Any]) -> tuple[str, ...]:
-    """Say of a table that its heading counts from east where its way is known to be north and east, else that its x is east."""
-    if "frame" in body or "yaw_rad" not in signals:
-        return ()
-    known = POSITION in signals or any(GEOGRAPHIC & set(words_of(str(signals[s].get("column")))) for s in ("x_m", "y_m"))
-    turned = ("yaw_rad",) if known else ("x_m", "y_m")
-    if any("frame" in signals[s] for s in turned):
-        return ()
-    for signal in turned:
-        signals[signal]["frame"] = "ENU"
-    return turned
+def _evidence(signals: list[str], what: str, note: Note) -> Note:
+    return Note("evidence", f"{signals[0]} is taken with {what}: {note.message}", {"signal": signals[0], "finding": note.code})

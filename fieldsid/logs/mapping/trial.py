@@ -13,8 +13,8 @@ from fieldsid.logs.channels import ChannelMap
 from fieldsid.logs.mapping.draft import unit_by_size
 from fieldsid.logs.mapping.mend import mended
 from fieldsid.logs.mapping.numbers.heading_units import heading_in_doubt, unit_of_wraps, wraps_in_rad
-from fieldsid.logs.mapping.numbers.unit_evidence import assumed_units, said_of_assumed
-from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions, Series
+from fieldsid.logs.mapping.numbers.unit_evidence import assumed_units
+from fieldsid.logs.reader import Inventory, RawLog, Reader, ReadOptions
 from fieldsid.logs.run import GOALS, Note, Run
 
 MENDS = 6
@@ -31,9 +31,17 @@ class Log:
 
     def read(self, mapping: ChannelMap) -> RawLog:
         """Return what a mapping names; raises LogError and MappingError."""
-        return self.reader.read(
-            self.inventory.path, mapping, ReadOptions(self.options.msg_path, salvage=True, joined=self.options.joined)
-        )
+        lenient = ReadOptions(self.options.msg_path, salvage=True, joined=self.options.joined)
+        return self.reader.read(self.inventory.path, mapping, lenient)
+
+    def run_of(self, body: Mapping[str, Any], raw: RawLog | None = None) -> Run:
+        """Return the run that a mapping's body gives of what was read; raises LogError, MappingError and DataError."""
+        from fieldsid.logs.convert.assemble import assemble
+        from fieldsid.logs.mapping.mapping_file import mapping_of
+
+        mapping = mapping_of(body)
+        raw = self.read(mapping) if raw is None else raw
+        return assemble(raw, mapping, self.inventory.path, ReadOptions(salvage=True), max_gap_s=float("inf"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +60,6 @@ class Proposal:
 
 def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     """Read the log with a mapping's body, and set in it what the numbers say; raises LogError, MappingError and DataError."""
-    from fieldsid.logs.convert.assemble import assemble
     from fieldsid.logs.doctor.examine import examine
     from fieldsid.logs.doctor.stated import stated_by
     from fieldsid.logs.mapping.mapping_file import mapping_of
@@ -61,9 +68,7 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     by_size = _in_degrees(raw, signals)
     why: list[Note] = []
     for _ in range(MENDS):
-        mapping = mapping_of(body)
-        run = assemble(raw, mapping, log.inventory.path, ReadOptions(salvage=True), max_gap_s=float("inf"))
-        stated = stated_by(mapping, raw)
+        run, stated = log.run_of(body, raw), stated_by(mapping_of(body), raw)
         notes = examine(run, stated=stated)
         set_now = mended(body, run, notes, by_size)
         why += set_now
@@ -73,31 +78,24 @@ def tried(log: Log, body: dict[str, Any], defined: frozenset[str]) -> Proposal:
     if yaw is not None and "yaw_rad" in by_size and "unit" in signals["yaw_rad"]:
         why += heading_in_doubt(yaw.values, signals)
     turned = {"yaw_rad"} if yaw is not None and wraps_in_rad(yaw.values) else set()
-    why += said_of_assumed(assumed_units(run, {*defined, *stated.units, *turned}), signals)
+    why += assumed_units(run, {*defined, *stated.units, *turned}, signals)
     return Proposal(body, replace(run, notes=(*run.notes, *notes)), notes=tuple(why))
 
 
 def _in_degrees(raw: RawLog, signals: Mapping[str, Any]) -> frozenset[str]:
-    """Set the units that the size of the numbers says; return the signals whose unit was told by it."""
-    units = {s: unit for s, v in raw.series.items() if (unit := _unit_of(s, v, signals.get(s, {}))) is not None}
-    for signal, unit in units.items():
-        signals[signal]["unit"] = unit
+    """Set the units that the size of the numbers says; return the signals whose unit was told by it.
+
+    Pitch, roll and goals without a unit are in degrees too where the heading is: one logger wrote them.
+    """
+    known = {
+        s: i.get("unit", raw.series[s].unit) for s, i in signals.items() if s in raw.series and raw.series[s].values.ndim == 1
+    }
+    seen = {s: np.abs(raw.series[s].values[np.isfinite(raw.series[s].values)]) for s, unit in known.items() if unit is None}
+    units = {s: unit for s, v in seen.items() if (unit := unit_by_size(s, float(v.max(initial=0.0)))) is not None}
     if "yaw_rad" in units:
-        signals["yaw_rad"]["unit"] = unit_of_wraps(raw.series["yaw_rad"].values)
-    _as_the_heading(raw, signals)
+        units["yaw_rad"] = unit_of_wraps(raw.series["yaw_rad"].values)
+    with_it = () if "deg" not in {units.get("yaw_rad"), known.get("yaw_rad")} else ("pitch_rad", "roll_rad", *sorted(GOALS))
+    beside = {s: "deg" for s in with_it if s in seen and s not in units and "field" not in signals[s]}
+    for signal, unit in (units | beside).items():
+        signals[signal]["unit"] = unit
     return frozenset(units)
-
-
-def _unit_of(signal: str, series: Series, item: Mapping[str, Any]) -> str | None:
-    if series.values.ndim != 1 or "unit" in item or series.unit is not None:
-        return None
-    return unit_by_size(signal, float(np.max(np.abs(series.values[np.isfinite(series.values)]), initial=0.0)))
-
-
-def _as_the_heading(raw: RawLog, signals: Mapping[str, Any]) -> None:
-    """Take pitch, roll and goals without a unit for degrees where the heading is in them: one logger wrote them."""
-    if "deg" not in {signals.get("yaw_rad", {}).get("unit"), raw.series["yaw_rad"].unit if "yaw_rad" in raw.series else None}:
-        return
-    for angle in ("pitch_rad", "roll_rad", *sorted(GOALS)):
-        if angle in signals and raw.series[angle].unit is None and "field" not in signals[angle]:
-            signals[angle].setdefault("unit", "deg")

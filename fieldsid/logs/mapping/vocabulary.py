@@ -17,25 +17,28 @@ Span = tuple[float, float]
 """The least and the largest number of a column."""
 
 
-def _words(text: str) -> frozenset[str]:
+def word_set(text: str) -> frozenset[str]:
+    """Return the words of a text."""
     return frozenset(text.split())
 
 
-COMMANDED = _words(
+COMMANDED = word_set(
     "cmd command commanded setpoint sp desired des target tgt reference ref demand demanded goal next ordered wanted"
 )
-MEASURED = _words("measured meas feedback fb actual state states encoder position")
-OF_ANOTHER = _words(
+MEASURED = word_set("measured meas feedback fb actual state states encoder position")
+OF_ANOTHER = word_set(
     "error err cov covariance std sigma variance var bias limit lim max min quality valid flag gain gains temp temperature sound "
-    "wind air variation status mode enabled count"
+    "wind air variation status mode enabled count id"
 )
 """Words that make a name one of something else than the signal it also names."""
-OVER_GROUND = _words("gps gnss course cog sog vtg ground track")
+OVER_GROUND = word_set("gps gnss course cog sog vtg ground track")
 """Words of a course or a speed over ground, which current and sideslip keep from being the vehicle's own; and of a receiver
 that hears nothing under water, beside a position that was estimated."""
-OF_SPEED = _words("v vel velocity speed acceleration accel acc")
+OF_SPEED = word_set("v vel velocity speed acceleration accel acc")
 """Words of a speed or acceleration north or east, which is no place."""
-OTHERS = _words("angle signal raw filtered estimate estimated sensor compass stick servo true magnetic joint vehicle boat glider")
+OTHERS = word_set(
+    "angle signal raw filtered estimate estimated sensor compass stick servo true magnetic joint vehicle boat glider"
+)
 """Words that say nothing of the signal, and stand glued to those that do, as in `rudderangle`."""
 
 
@@ -68,7 +71,7 @@ class Rule:
 STEEPEST_DEG = 360.0
 """A pitch or roll is less in any unit: a larger number is none, as the port or the error code that a constant may be."""
 _TILT = within(STEEPEST_DEG)
-_TURN = _words("rate fin")
+_TURN = word_set("rate fin")
 
 RULES = (
     Rule(TIME, "time, timestamp, stamp, utc, seconds, datetime, epoch, zeit, uhrzeit, datenum, elapsed"),
@@ -88,14 +91,14 @@ RULES = (
         "angular velocity x, ang vel x",
     ),
     Rule("yaw_rad", "yaw, heading, hdg, psi, compass", _TURN),
-    Rule("yaw_rad", "head", _TURN | _words("water loss pump")),
+    Rule("yaw_rad", "head", _TURN | word_set("water loss pump")),
     Rule("pitch_rad", "pitch, theta", _TURN, _TILT),
     Rule("roll_rad", "roll, phi", _TURN, _TILT),
-    Rule("depth_m", "depth", _words("rate water bottom column total")),
+    Rule("depth_m", "depth", word_set("rate water bottom column total")),
     Rule(
         "surge_m_s",
         "surge, speed, spd, vehicle speed, water speed, velocity x, vel x, vx, dvl u, dvl x, stw, sog",
-        _words("motor rate"),
+        word_set("motor rate"),
     ),
     Rule("sway_m_s", "sway, velocity y, vel y, vy, dvl v, dvl y"),
     Rule("heave_m_s", "heave, velocity z, vel z, vz, dvl w, dvl z"),
@@ -103,7 +106,7 @@ RULES = (
     Rule(LONGITUDE, "longitude, long, lon, lng", holds=within(360.0)),
     Rule("x_m", "north, northing, pos x, position x, utm y", OF_SPEED),
     Rule("y_m", "east, easting, pos y, position y, utm x", OF_SPEED),
-    Rule("rudder_rad", "rudder, rud, delta r, deltar, fin yaw, fin, drud, delr", _words("roll")),
+    Rule("rudder_rad", "rudder, rud, delta r, deltar, fin yaw, fin, drud, delr", word_set("roll")),
     Rule("elevator_rad", "elevator, elev, stern plane, sternplane, sternplanes, delta s, deltas, delta e, fin pitch, delv"),
     Rule("thrust", "thrust, thruster, throttle, motor, motor speed"),
     Rule("propeller_rpm", "rpm, propeller, prop"),
@@ -122,9 +125,17 @@ RULES = (
 )  # fmt: skip
 """What names mean. The field's symbols are taken only where a name has no other word."""
 
+WANTED: Mapping[str, str] = MappingProxyType(
+    {s: s for s in ("rudder_rad", "elevator_rad", "thrust", "propeller_rpm", TIME)}
+    | {"yaw_rad": "yaw_goal_rad", "pitch_rad": "pitch_goal_rad"}
+)
+SEEN: Mapping[str, str] = MappingProxyType({"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"})
+"""What signals are that were commanded, all others of which are none, and what they are that were measured."""
+GROUNDED = frozenset({"yaw_rad", "surge_m_s", LATITUDE, LONGITUDE})
+"""Signals that are the vehicle's own only where they are not over ground."""
 GLIDER: Mapping[str, str] = MappingProxyType({"m": "measured", "c": "commanded"})
 """What the first letter of a glider's sensor says, as in `m_fin` and `c_fin`."""
-GREEK = _words("phi theta psi")
+GREEK = word_set("phi theta psi")
 MOST_BESIDE_GREEK = 2
 """Words beside a Greek letter up to which it is the symbol; with more it is an abbreviation, as in `PHI_HOST_PORT_DB`."""
 

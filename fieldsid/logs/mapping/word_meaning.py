@@ -9,20 +9,19 @@ from fieldsid.logs.mapping.name_words import unit_said, words_of
 from fieldsid.logs.mapping.vocabulary import (
     COMMANDED,
     GREEK,
-    LATITUDE,
-    LONGITUDE,
+    GROUNDED,
     MEASURED,
     MOST_BESIDE_GREEK,
     OF_ANOTHER,
     OVER_GROUND,
     PHRASES,
-    TIME,
+    SEEN,
+    WANTED,
     Rule,
     Span,
 )
+from fieldsid.logs.run import GOALS
 
-_FINS = {"rudder_rad": "rudder_measured_rad", "elevator_rad": "elevator_measured_rad"}
-_GOALS = {"yaw_rad": "yaw_goal_rad", "pitch_rad": "pitch_goal_rad"}
 RATES = {"yaw_rad": "yaw_rate_rad_s", "pitch_rad": "pitch_rate_rad_s", "roll_rad": "roll_rate_rad_s"}
 """What an angle's name means beside the unit of a rate, as `yaw_deg_s`."""
 CANONICAL = 9
@@ -57,14 +56,9 @@ def _score(rule: Rule, phrase: tuple[str, ...], words: list[str]) -> int:
 
 def _of_use(signal: str, sure: int, words: set[str]) -> tuple[str, int] | None:
     """Return a signal as what it was wanted to be or what it was, and how sure its words make it."""
-    if signal in _FINS and MEASURED & words and not COMMANDED & words:
-        return _FINS[signal], sure
-    if COMMANDED & words and signal in _GOALS:
-        return _GOALS[signal], sure + ("next" not in words)
-    if COMMANDED & words and signal not in (*_FINS, "thrust", "propeller_rpm", TIME):
-        return None
-    if signal in ("yaw_rad", "surge_m_s"):
-        sure += ("true" in words) - ("magnetic" in words)
-    if signal in ("yaw_rad", "surge_m_s", LATITUDE, LONGITUDE):
-        sure = 1 if OVER_GROUND & words else sure
-    return signal, sure
+    if COMMANDED & words:
+        return (WANTED[signal], sure + (WANTED[signal] in GOALS and "next" not in words)) if signal in WANTED else None
+    if signal in GROUNDED and OVER_GROUND & words:
+        return signal, 1
+    sure += (("true" in words) - ("magnetic" in words)) * (signal in ("yaw_rad", "surge_m_s"))
+    return SEEN.get(signal, signal) if MEASURED & words else signal, sure

@@ -64,7 +64,7 @@ def tables_beside(path: Path) -> list[Note]:
         return []
     files = quote(str(path.parent)) if len(runs) == 1 else " ".join(["--join", *(quote(str(p)) for p in own)])
     shown = ", ".join(p.name for p in others[:6]) + (", ..." if len(others) > 6 else "")
-    message = f"no fin in it; beside it lie {shown}: where they are of the same run, `sysid inspect {files}`"
+    message = f"beside it lie {shown}: where they are of the same run, `sysid inspect {files}`"
     return [Note("tables_beside", message, {"tables": [str(p) for p in others]})]
 
 

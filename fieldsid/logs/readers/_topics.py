@@ -96,11 +96,6 @@ def _channel(name: str, topic: Topic, means: Means, kind: str) -> ChannelInfo:
     return ChannelInfo(name, kind, int(topic.time.size), rate, tuple(fields), topic.unit)
 
 
-def _span(values: FloatArray) -> tuple[float, float] | None:
-    seen = values[np.isfinite(values)]
-    return (float(seen.min()), float(seen.max())) if seen.size else None
-
-
 def _check_not_empty(path: Path, topics: Mapping[str, Topic]) -> None:
     if not topics:
         raise LogError(f"`{path}` has no data", found="no topic with a number and a time", hint=COPY_AGAIN)

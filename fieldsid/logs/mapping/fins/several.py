@@ -1,11 +1,13 @@
 """Which fins move a plane, where a log has several alike: the sum of them that a mapping reads, with what speaks for it.
 
 Fins of one vehicle are called alike but for a number or a side. What each does to the rate of the plane is told by the numbers,
-see shares.py; of an X tail the shares are 1/4 each, of twin rudders 1/2.
+see shares.py; of an X tail the shares are 1/4 each, of twin rudders 1/2. Of a vehicle's outputs, of which no name says what they
+move, it is the one that the rate follows; where none does all are named with the line that is missing.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,19 +18,22 @@ import numpy as np
 
 from fieldsid.errors import FieldsidError
 from fieldsid.logs.convert.clock import Track, held
-from fieldsid.logs.convert.servo_counts import COUNTS, FULL_RAD, servo_of
+from fieldsid.logs.convert.servo_counts import COUNTS, FINS, FULL_RAD, SERVOS, servo_of
 from fieldsid.logs.convert.units import pick_unit
-from fieldsid.logs.mapping.fins.families import Family, families, is_measured, is_on_starboard, is_thruster
+from fieldsid.logs.mapping.fins.families import Family, are_outputs, families, is_measured, is_on_starboard, is_thruster
 from fieldsid.logs.mapping.fins.shares import FinShares, fin_shares, window_mean
 from fieldsid.logs.mapping.mapping_file import mapping_of
 from fieldsid.logs.mapping.numbers.recognise import EXPLAINS, WINDOWS_S
-from fieldsid.logs.reader import Inventory, Reader, ReadOptions, Series
+from fieldsid.logs.mapping.trial import Log
+from fieldsid.logs.reader import Inventory, Series
 from fieldsid.logs.run import Note, Run
 from fieldsid.numerics.arrays import FloatArray
 
 PLACE = ("column", "topic", "field")
 LARGEST_RAD, LARGEST_DEG, THRUST_RAD = 1.6, 180.0, 0.4
 """A larger angle is in degrees, and a larger one yet in counts; what the largest difference of thrusters is taken for."""
+SHOWN = 8
+"""Outputs that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,50 +63,77 @@ class _Fin:
     values: FloatArray
 
 
-def with_several_fins(
-    inventory: Inventory, reader: Reader, options: ReadOptions, body: Mapping[str, Any], run: Run
-) -> tuple[dict[str, Any], list[Note]]:
+def with_several_fins(log: Log, body: Mapping[str, Any], run: Run) -> tuple[dict[str, Any], list[Note]]:
     """Return a mapping's body with the fins that move each plane, of several alike, and what speaks for them; else as it is."""
     signals, notes = dict(body["signals"]), []
-    done: set[str] = set()
+    known, done = families(log.inventory), set[str]()
     for plane in PLANES:
-        for family in families(inventory):
-            signal = plane.measured if is_measured(family) else plane.fin
-            if signal in done or not _is_asked(signal, plane, {**body, "signals": signals}, family, run):
+        for family in known:
+            signal, asked = plane.measured if is_measured(family) else plane.fin, {**body, "signals": signals}
+            if signal in done or not _is_asked(signal, plane, signals, family, run):
                 continue
-            fins = _read(inventory, reader, options, {**body, "signals": signals}, family, run)
-            found = _told(fins, run, plane) if len(fins) > 1 else None
+            fins = _read(log, asked, family, run)
+            found = _told(fins, run, plane) if fins else None
             if found is not None and found.explains >= EXPLAINS and not _is_known(signals.get(signal), fins, found):
                 signals[signal] = _item(fins, found)
                 done.add(signal)
                 _as_thrust(signals, fins, family)
-                notes.append(_evidence(signal, plane, fins, found))
-    return ({**body, "signals": signals}, notes) if notes else (dict(body), [])
+                notes.append(_evidence(signal, plane, fins, found, family))
+    return {**body, "signals": signals}, notes
 
 
-def _is_asked(signal: str, plane: _Plane, body: Mapping[str, Any], family: Family, run: Run) -> bool:
+def which_output(inventory: Inventory, signals: Mapping[str, Any]) -> list[Note]:
+    """Return the note that names a vehicle's outputs, and the line that is missing, where a mapping has no fin."""
+    outputs = [place for family in families(inventory) if are_outputs(family) for place in family.values()]
+    if not outputs or set(FINS) & signals.keys():
+        return []
+    named = [f"{place['topic']} {place['field']}" for place in outputs]
+    spans = {(c.name, f.path): f.span for c in inventory.channels for f in c.fields}
+    topic, field = outputs[0]["topic"], outputs[0]["field"]
+    unit, shown = _unit_by_span(spans[topic, field]), ", ".join(named[:SHOWN]) + ", ..." * (len(named) > SHOWN)
+    message = (
+        f"which servo moves which fin is not in the log; one line is missing, as `rudder_rad: {{topic: {json.dumps(topic)}, "
+        f"field: {json.dumps(field)}{unit}}}`, of: {shown}"
+    )
+    return [Note("which_output", message, {"signal": "rudder_rad", "others": named})]
+
+
+def _unit_by_span(span: tuple[float, float] | None) -> str:
+    """Return the unit of an output by its least and largest, as a mapping has it: pulses, or shares of its range."""
+    if span is None or span == (0.0, 0.0):
+        return ""
+    servo = next((s for s in SERVOS[1:] if s.least <= span[0] and span[1] <= s.largest), None)
+    shares = ', unit: "1"' if max(map(abs, span)) <= 1.0 else ""
+    return shares if servo is None else f", unit: {COUNTS}, centre: {servo.centre:g}"
+
+
+def _is_asked(signal: str, plane: _Plane, signals: Mapping[str, Any], family: Family, run: Run) -> bool:
     """Whether a plane that moves has no fin yet, one of several alike, or a sum of them beside which these were measured."""
-    signals = body["signals"]
     if not (run.has(plane.rate) or run.has(plane.angle)):
         return False
     if signal in signals:
-        return any(all(signals[signal].get(key) == value for key, value in place.items()) for place in family.values())
-    others = [signals[s] for s in (plane.fin, plane.measured) if s in signals]
-    return all("sum" in item for item in others)
+        return _is_of(signals[signal], family)
+    return all("sum" in signals[s] for s in (plane.fin, plane.measured) if s in signals)
 
 
-def _read(
-    inventory: Inventory, reader: Reader, options: ReadOptions, body: Mapping[str, Any], family: Family, run: Run
-) -> list[_Fin]:
+def _is_of(item: Mapping[str, Any], family: Family) -> bool:
+    """Whether what a line of a mapping reads is one of a family."""
+    return any(all(item.get(key) == value for key, value in place.items()) for place in family.values())
+
+
+def _read(log: Log, body: Mapping[str, Any], family: Family, run: Run) -> list[_Fin]:
     """Return the fins of a family on the clock of the run, those that move; none where they cannot be read."""
     signals = {"rudder_rad": {"sum": [{**place, "scale": 1.0} for place in family.values()]}}
-    lenient = ReadOptions(options.msg_path, salvage=True, joined=options.joined)
     try:
-        raw = reader.read(inventory.path, mapping_of({**body, "signals": signals}), lenient)
+        raw = log.read(mapping_of({**body, "signals": signals}))
     except FieldsidError:  # what cannot be read is no fin
         return []
     shift = _origin_s(raw.notes) - _origin_s(run.notes)
-    seen = {name: _held(series, run.time - shift) for name, series in zip(family, raw.series.values(), strict=True)}
+    seen = {
+        name: _held(series, run.time - shift)
+        for name, series in zip(family, raw.series.values(), strict=True)
+        if series.values.ndim == 1
+    }
     moving = [n for n, v in seen.items() if np.isfinite(v).mean() > 0.5 and float(np.nanmax(v) - np.nanmin(v)) > 0.0]
     if not moving:
         return []
@@ -115,6 +147,7 @@ def _held(series: Series, time: FloatArray) -> FloatArray:
 
 
 def _origin_s(notes: tuple[Note, ...]) -> float:
+    """Return the log's own time at time 0, in s: two readings of other fields start at other messages."""
     return next((n.data["origin_ns"] / 1e9 for n in notes if n.code == "time_origin"), 0.0)
 
 
@@ -138,12 +171,10 @@ def _how(names: list[str], unit: str | None, values: FloatArray) -> tuple[dict[s
 
 def _is_known(item: Mapping[str, Any] | None, fins: list[_Fin], found: FinShares) -> bool:
     """Whether one fin that a plane has already is all that moves it: the others do nothing, or have its numbers."""
-    if item is None:
+    used = [fin for fin, _ in _used(fins, found)]
+    if item is None or not all(np.array_equal(fin.values, used[0].values, equal_nan=True) for fin in used):
         return False
-    used = [fin for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
-    if all(np.array_equal(fin.values, used[0].values, equal_nan=True) for fin in used):
-        return any(all(item.get(key) == fin.item[key] for key in PLACE if key in fin.item) for fin in used)
-    return False
+    return any(all(item.get(key) == fin.item[key] for key in PLACE if key in fin.item) for fin in used)
 
 
 def _told(fins: list[_Fin], run: Run, plane: _Plane) -> FinShares | None:
@@ -163,9 +194,14 @@ def _over(fins: list[FloatArray], run: Run, plane: _Plane, width: int) -> FinSha
     return fin_shares(means, time[:-width], turned, None if righting is None else window_mean(time, righting, width), width)
 
 
+def _used(fins: list[_Fin], found: FinShares) -> list[tuple[_Fin, float]]:
+    """Return the fins that do something, with their shares."""
+    return [(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
+
+
 def _item(fins: list[_Fin], found: FinShares) -> dict[str, Any]:
     """Return how a mapping reads the fins that do something: one of them alone, or their sum."""
-    used = [(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
+    used = _used(fins, found)
     turned, taken = _sign(used), _taken_for(used)
     if len(used) == 1 and taken == 1.0:
         return dict(used[0][0].item)
@@ -194,31 +230,31 @@ def _rounded(value: float) -> float:
 
 def _as_thrust(signals: dict[str, Any], fins: list[_Fin], family: Family) -> None:
     """Take the mean of several thrusters for the thrust, where one of them was."""
-    thrust = signals.get("thrust", {})
-    if any(all(thrust.get(key) == value for key, value in place.items()) for place in family.values()):
-        share = _rounded(1.0 / len(fins))
-        signals["thrust"] = {"sum": [{**fin.item, "scale": share} for fin in fins]}
+    if _is_of(signals.get("thrust", {}), family):
+        signals["thrust"] = {"sum": [{**fin.item, "scale": _rounded(1.0 / len(fins))} for fin in fins]}
 
 
-def _evidence(signal: str, plane: _Plane, fins: list[_Fin], found: FinShares) -> Note:
-    used = [(fin.name, share, was) for fin, share, was in zip(fins, found.shares, found.fitted, strict=True) if share != 0.0]
-    counted = [(fin, float(share)) for fin, share in zip(fins, found.shares, strict=True) if share != 0.0]
-    turned = _sign(counted)
+def _evidence(signal: str, plane: _Plane, fins: list[_Fin], found: FinShares, family: Family) -> Note:
+    used = _used(fins, found)
+    shares = {fin.name: _sign(used) * share for fin, share in used}
+    told = " ".join(f"{'-' if share < 0.0 else '+'} {_fraction(abs(share))}{name}" for name, share in shares.items())
     rate = plane.rate.removesuffix("_rad_s").replace("_", " ")
-    told = " ".join(f"{'-' if turned * share < 0.0 else '+'} {_fraction(abs(share))} {name}" for name, share, _ in used)
-    was = ", ".join(f"{turned * value:.2g}" for _, _, value in used)
+    was = [_sign(used) * was for was, share in zip(found.fitted, found.shares, strict=True) if share != 0.0]
+    fitted = f", the best one alone {100 * found.best_alone:.0f} %; fitted {', '.join(f'{value:.2g}' for value in was)}"
+    each, more = ("together they explain", fitted) if len(used) > 1 else ("it explains", "")
     message = (
-        f"{signal} is {told.removeprefix('+ ')}: together they explain {100 * found.explains:.0f} % of what the {rate}'s change "
-        f"has beside the rate's own, the best one alone {100 * found.best_alone:.0f} %; fitted {was}"
+        f"{signal} is {told.removeprefix('+ ')}: {each} {100 * found.explains:.0f} % of what the {rate}'s change has beside the "
+        f"rate's own{more}"
     )
     if found.patterns < len(used):
         ways = "together only" if found.patterns == 1 else f"in {found.patterns} patterns only"
         message += f"; they moved {ways}: how much of it each of them does is not told by this log, and taken by how far it went"
-    if _taken_for(counted) != 1.0:
+    if _taken_for(used) != 1.0:
         message += f"; no angles: the largest difference is taken for about {THRUST_RAD:g} rad, and the authority is per that"
-    return Note("evidence", message, {"signal": signal, "fins": {name: turned * float(share) for name, share, _ in used}})
+    outputs = {"outputs": len(family)} if are_outputs(family) and len(used) == 1 else {}
+    return Note("evidence", message, {"signal": signal, "fins": shares, **outputs})
 
 
 def _fraction(share: float) -> str:
     simple = Fraction(share).limit_denominator(12)
-    return str(simple) if abs(float(simple) - share) < 1e-6 else f"{share:.2f}"
+    return "" if share == 1.0 else f"{simple} " if abs(float(simple) - share) < 1e-6 else f"{share:.2f} "

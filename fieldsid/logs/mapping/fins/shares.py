@@ -60,19 +60,21 @@ def fin_shares(
     if rows.size < FEWEST:
         return None
     base = np.stack(beside, axis=1)[rows]
-    left, moved = (_beyond(base, v[rows]) for v in (grows[:, None], means))
+    left, moved = (beyond(base, v[rows]) for v in (grows[:, None], means))
     power = float(left[:, 0] @ left[:, 0])
     if not power > 0.0:
         return None
     answer, _, _, length = np.linalg.lstsq(moved, left[:, 0], rcond=TOGETHER)
     fitted = answer.astype(np.float64)
-    shares = _shares(fitted)
+    shares, patterns = _shares(fitted), int((length > TOGETHER * length[0]).sum())
+    # as many patterns explain so much of noise: windows that share samples say the same
+    chance = min(patterns * width / grows.size, 1.0 - 1e-9)
     return FinShares(
         shares,
         fitted / float(np.sum(np.abs(fitted))),
-        _explained(left[:, 0], moved @ shares),
+        (_explained(left[:, 0], moved @ shares) - chance) / (1.0 - chance),
         max(_explained(left[:, 0], moved[:, i]) for i in range(len(fins))),
-        int((length > TOGETHER * length[0]).sum()),
+        patterns,
     )
 
 
@@ -84,7 +86,7 @@ def window_mean(time: FloatArray, values: FloatArray, width: int) -> FloatArray:
     return np.asarray(np.where(gone[width + 1 :] - gone[: -width - 1] == 0, mean, np.nan))
 
 
-def _beyond(base: FloatArray, values: FloatArray) -> FloatArray:
+def beyond(base: FloatArray, values: FloatArray) -> FloatArray:
     """Return what columns (n, k) leave of values (n, m)."""
     size = np.linalg.norm(base, axis=0)
     base = base / np.where(size > 0.0, size, 1.0)

@@ -20,8 +20,8 @@ NEEDS_NONE = frozenset({"thrust", "thrust_ratio", "propeller_rpm"})
 """Signals whose scale no estimate hangs on."""
 
 
-def assumed_units(run: Run, known: Collection[str]) -> tuple[str, ...]:
-    """Return the signals of a run that are taken in SI though nothing says so; `known` are those whose unit is told."""
+def assumed_units(run: Run, known: Collection[str], signals: Mapping[str, Any]) -> list[Note]:
+    """Return the note on the signals of a run that are taken in SI though nothing says so; `known` have a unit that is told."""
     sure = {s for s in run.signals if s in known}
     if _all_there(run, "x_m", "y_m", "surge_m_s") and goes_with_way(run):
         sure |= {"x_m", "y_m", "surge_m_s"}
@@ -31,17 +31,11 @@ def assumed_units(run: Run, known: Collection[str]) -> tuple[str, ...]:
     if _all_there(run, "depth_m", "pitch_rad", "surge_m_s") and goes_with_depth(run):
         agreeing += [{"depth_m", "surge_m_s"}]
     sure |= {s for both in agreeing if both & sure for s in both}
-    return tuple(s for s in run.signals if s in SIGNALS and run.has(s) and s not in sure and s not in NEEDS_NONE)
+    assumed = [s for s in run.signals if s in SIGNALS and run.has(s) and s not in sure and s not in NEEDS_NONE]
+    shown = ", ".join(f"{s} from `{place_of(signals.get(s, {}))}` in {SIGNALS[s]}" for s in assumed)
+    message = f"no name and no other signal tells the unit of what is taken as it is: {shown}; write `unit:` where it is another"
+    return [Note("unit_assumed", message, {"signals": assumed})] if assumed else []
 
 
 def _all_there(run: Run, *signals: str) -> bool:
     return all(run.has(s) for s in signals)
-
-
-def said_of_assumed(assumed: Collection[str], signals: Mapping[str, Any]) -> list[Note]:
-    """Return the note on the units that were assumed, with where each signal is from."""
-    if not assumed:
-        return []
-    shown = ", ".join(f"{s} from `{place_of(signals.get(s, {}))}` in {SIGNALS[s]}" for s in assumed)
-    message = f"no name and no other signal tells the unit of what is taken as it is: {shown}; write `unit:` where it is another"
-    return [Note("unit_assumed", message, {"signals": list(assumed)})]
