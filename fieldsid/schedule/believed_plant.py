@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fieldsid.models.axis import Axis
+from fieldsid.models.hull import Core
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.schedule.linear_plant import FinLimits, LinearPlant
 from fieldsid.turning.maneuvering.belief import Belief
@@ -26,6 +27,9 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
     zero = np.zeros(draws)
     way = -float(np.sign(near.authority[0]))  # as the runs were read: what a model's sway makes of it in the end may differ
     damping, authority, slow, by_rate, by_fin = _about_straight(hull, near.speed)
+    core = np.array(
+        [Core(cross_damping=c, cross_rate=r, cross_fin=f) for c, r, f in zip(slow, by_rate, way * by_fin, strict=True)]
+    )
     return LinearPlant(
         axis=Axis.YAW,
         speed=near.speed,
@@ -33,16 +37,7 @@ def believed_plant(belief: Belief, near: LinearPlant, limits: FinLimits, draws: 
         stiffness=zero,
         authority=way * authority,
         offset=near.offset[which],
-        quadratic=zero,
-        beyond_square=zero,
-        cross_damping=slow,
-        cross_rate=by_rate,
-        cross_fin=way * by_fin,
-        cross_quadratic=zero,
-        cross_share=zero + 1.0,
-        strip_moment=zero,
-        strip_force=zero,
-        strip_flow=zero,
+        core=core,
         lag=hull[:, LAG] if limits.lag is None else zero + limits.lag,
         delay=near.delay[which],
         fin_rate=hull[:, RATE] if limits.rate is None else zero + limits.rate,

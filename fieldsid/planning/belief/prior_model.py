@@ -13,7 +13,7 @@ from fieldsid.dynamics.assemble import Base, combined_core
 from fieldsid.dynamics.free_run import base_at, effects_of
 from fieldsid.errors import ModelError, UsageError
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.models.effect import Core
+from fieldsid.models.hull import Core
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.planning.belief.prior_file import load_prior

@@ -12,6 +12,7 @@ from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
 from fieldsid.dynamics.free_run import command_record
 from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
 from fieldsid.maneuvers import Autopilot, Limits, steer
+from fieldsid.models.hull import FIN, MOMENT_END, MOMENT_START
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
@@ -39,7 +40,7 @@ def closed_loop(
     """Fill command (n,) and out (n, 3): angle, rate, cross state from rest.
 
     asked (n,): fin about trim, NaN where the autopilot steers. off (n-1, 2): fin angle minus command at both ends of each
-    interval. push (n-1, 3): moment per rad at start and end, input of the cross state per rad. gains (3,): angle, rate, fin limit
+    interval. push (n-1, 2): moment per rad at start and end. gains (3,): angle, rate, fin limit
     of the autopilot. limits (4,): low, high, rate, trim fin.
     """
     n = asked.shape[0]
@@ -54,9 +55,9 @@ def closed_loop(
         if i == n - 1:
             break
         start, end = limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1]
-        drive[i, 2] += push[i, 0] * start
-        drive[i, 3] += push[i, 1] * end
-        drive[i, 5] += push[i, 2] * 0.5 * (start + end)
+        drive[i, MOMENT_START] += push[i, 0] * start
+        drive[i, MOMENT_END] += push[i, 1] * end
+        drive[i, FIN] = 0.5 * (start + end)
         nonlinear_motion(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
         # Number by number: an array put into another compiles its own error message, two seconds of it.
         for l in range(3):
@@ -86,8 +87,8 @@ def respond(
     bounds = np.array([min(-limits.fin - trim, 0.0), max(limits.fin - trim, 0.0), limits.fin_rate, trim])
     clean = ready.drive.copy()
     if moment is not None:
-        clean[:, 2] += moment[:-1]
-        clean[:, 3] += moment[1:]
+        clean[:, MOMENT_START] += moment[:-1]
+        clean[:, MOMENT_END] += moment[1:]
     idle = idle_records([scene], ready.time) if moving else {}
     for left in reversed(range(ACTUATOR_ROUNDS if moving else 1)):
         drive = clean.copy() if moving else clean
@@ -115,17 +116,14 @@ def prepared(scene: OperatingPoint, count: int, rate_hz: float) -> Prepared:
     time = np.arange(count) / rate_hz
     idle = scene.record(time, np.zeros(count))
     arrays = assemble(idle, scene.effects, replace(scene.base, authority=0.0), scene.values, scene.scale)
-    arrays.drive[:, 5] = 0.0
     return Prepared(time, idle.steps, arrays.drive, arrays.constants, arrays.pieces, fin_push(scene, arrays))
 
 
 def fin_push(scene: OperatingPoint, arrays: KernelInputs) -> FloatArray:
-    """Return what a rad of fin adds to the drives: moments at both ends of an interval, and the cross push, (n-1, 3)."""
+    """Return the moments that a rad of fin adds to the drives at both ends of each interval, (n-1, 2)."""
     n = arrays.drive.shape[0] + 1
     factor = np.ones(n) if arrays.terms.authority_factor is None else arrays.terms.authority_factor
-    cross = sum(e.core(scene.values, scene.scale).cross_fin for e in scene.effects if e.core is not None)
-    b = scene.base.authority
-    return np.column_stack([b * factor[:-1], b * factor[1:], np.full(n - 1, cross)])
+    return scene.base.authority * np.column_stack([factor[:-1], factor[1:]])
 
 
 def idle_records(scenes: Sequence[OperatingPoint], time: FloatArray) -> dict[float, Record]:

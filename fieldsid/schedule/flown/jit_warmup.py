@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, PLANT_COLUMNS, close_loop
+from fieldsid.models.hull import CONSTANTS
+from fieldsid.schedule.flown.closed_loop_kernel import GAIN_COLUMNS, OUT_COLUMNS, Plants, close_loop
 from fieldsid.schedule.flown.hull_kernel import SETTINGS, close_hull_loop
 from fieldsid.turning.maneuvering.equations import settle, simulate
 
@@ -19,5 +20,7 @@ def compile_loops() -> None:
     time.setflags(write=False)  # as that of a run is
     simulate(p, 1.0, np.ones((1, 3)), np.zeros(1, dtype=np.int64), time, np.zeros((1, 2)), np.ones(2), STEP_S)
     settle(p, 1.0, 0.0)
-    close_loop(np.zeros((1, PLANT_COLUMNS)), none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
+    row, rows = np.zeros(1), np.zeros((1, len(CONSTANTS)))
+    plants = Plants(**{name: rows if name.startswith("core") else row for name in Plants._fields})
+    close_loop(plants, none, 0.0, 0.0, 0.0, 1.0, STEP_S, push, out)
     close_hull_loop(np.ones((1, COEFFICIENTS)), np.ones((1, SETTINGS)), none, 0.0, 1.0, STEP_S, push, out)
