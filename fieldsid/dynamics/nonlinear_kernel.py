@@ -16,6 +16,7 @@ from fieldsid.models.hull import (
     MOMENT_END,
     MOMENT_START,
     STIFFNESS,
+    Core,
     Kinds,
     Slope,
     by_constants,
@@ -55,30 +56,40 @@ def _total(steps: FloatArray) -> float:
     return total
 
 
+@inner
+def over_interval(
+    k: Core, kinds: Kinds, drive: FloatArray, i: int, step: float, pieces: int, late: float, state: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Return angle, rate and cross state after the interval of a drive's row i (n-1, 6), `late` s after the run's middle."""
+    y, p, x = state
+    h, a, b, fast, fin = step / pieces, drive[i, DAMPING], drive[i, STIFFNESS], drive[i, CROSS_FACTOR], drive[i, FIN]
+    first, last = drive[i, MOMENT_START], drive[i, MOMENT_END]
+    for piece in range(pieces):
+        ky, kp, kx, ty, tp, tx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for stage in range(4):
+            g, part = _reach(stage) * h, (piece + _reach(stage)) / pieces
+            rate, moment = p + g * kp, first + (last - first) * part
+            now = slope(k, kinds, a, b, moment, fin, fast, y + g * ky, rate, x + g * kx, late + part * step)
+            ky, kp, kx = rate, now.rate, now.cross
+            ty, tp, tx = ty + _weight(stage) * ky, tp + _weight(stage) * kp, tx + _weight(stage) * kx
+        y, p, x = y + h / 6.0 * ty, p + h / 6.0 * tp, x + h / 6.0 * tx
+    return y, p, x
+
+
 @jit
 def nonlinear_motion(
     steps: FloatArray, drive: FloatArray, c: FloatArray, start: FloatArray, pieces: int, out: FloatArray
 ) -> None:
     """Fill out (n, 3) as `integrate.integrate_motion` does, whatever the motion and the clock."""
-    y, p, x = start[0], start[1], start[2]
-    out[0, 0], out[0, 1], out[0, 2] = y, p, x
+    state = (start[0], start[1], start[2])
+    out[0, 0], out[0, 1], out[0, 2] = state
     k, kinds, late = named(c), kinds_of(c), -0.5 * _total(steps)
     for i in range(steps.shape[0]):
-        h, a, b, fast, fin = steps[i] / pieces, drive[i, DAMPING], drive[i, STIFFNESS], drive[i, CROSS_FACTOR], drive[i, FIN]
-        first, last = drive[i, MOMENT_START], drive[i, MOMENT_END]
-        for piece in range(pieces):
-            ky, kp, kx, ty, tp, tx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for stage in range(4):
-                g, part = _reach(stage) * h, (piece + _reach(stage)) / pieces
-                rate, moment = p + g * kp, first + (last - first) * part
-                now = slope(k, kinds, a, b, moment, fin, fast, y + g * ky, rate, x + g * kx, late + part * steps[i])
-                ky, kp, kx = rate, now.rate, now.cross
-                ty, tp, tx = ty + _weight(stage) * ky, tp + _weight(stage) * kp, tx + _weight(stage) * kx
-            y, p, x = y + h / 6.0 * ty, p + h / 6.0 * tp, x + h / 6.0 * tx
-        if not abs(p) < DIVERGED_RATE_RAD_S:
+        state = over_interval(k, kinds, drive, i, steps[i], pieces, late, state)
+        if not abs(state[1]) < DIVERGED_RATE_RAD_S:
             set_diverged(out, i + 1)
             return
-        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = y, p, x
+        out[i + 1, 0], out[i + 1, 1], out[i + 1, 2] = state
         late += steps[i]
 
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from fieldsid.dynamics.assemble import KernelInputs, assemble, fin_path
 from fieldsid.dynamics.free_run import command_record
-from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
+from fieldsid.dynamics.nonlinear_kernel import over_interval
 from fieldsid.maneuvers import Autopilot, Limits, steer
-from fieldsid.models.hull import FIN, MOMENT_END, MOMENT_START
+from fieldsid.models.hull import FIN, MOMENT_END, MOMENT_START, kinds_of, named
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
-from fieldsid.numerics.jit import jit
+from fieldsid.numerics.jit import inner, jit
 from fieldsid.planning.flight.operating_point import OperatingPoint
 
 ACTUATOR_ROUNDS = 4
@@ -32,6 +32,14 @@ class Response:
     rate: FloatArray
 
 
+@inner
+def hold_fin(drive: FloatArray, i: int, start: float, end: float, push_start: float, push_end: float) -> None:
+    """Add a fin (rad at both ends) to row i of a drive without one, with what a rad of it pushes at both ends."""
+    drive[i, MOMENT_START] += push_start * start
+    drive[i, MOMENT_END] += push_end * end
+    drive[i, FIN] = 0.5 * (start + end)
+
+
 @jit
 def closed_loop(
     steps: FloatArray, drive: FloatArray, c: FloatArray, pieces: int, asked: FloatArray, off: FloatArray,
@@ -43,26 +51,17 @@ def closed_loop(
     interval. push (n-1, 2): moment per rad at start and end. gains (3,): angle, rate, fin limit
     of the autopilot. limits (4,): low, high, rate, trim fin.
     """
-    n = asked.shape[0]
-    state = np.zeros(3)
-    pair = np.zeros((2, 3))
-    last = 0.0
-    out[0, 0], out[0, 1], out[0, 2] = 0.0, 0.0, 0.0
+    n, state, last = asked.shape[0], (0.0, 0.0, 0.0), 0.0
+    k, kinds = named(c), kinds_of(c)
     for i in range(n):
+        out[i, 0], out[i, 1], out[i, 2] = state
         fin = steer(asked[i], state[0], state[1], last, gains, limits[2] * steps[min(i, n - 2)], limits[0], limits[1])
         command[i] = fin
         last = fin
         if i == n - 1:
             break
-        start, end = limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1]
-        drive[i, MOMENT_START] += push[i, 0] * start
-        drive[i, MOMENT_END] += push[i, 1] * end
-        drive[i, FIN] = 0.5 * (start + end)
-        nonlinear_motion(steps[i : i + 1], drive[i : i + 1], c, state, pieces, pair)
-        # Number by number: an array put into another compiles its own error message, two seconds of it.
-        for l in range(3):
-            state[l] = pair[1, l]
-            out[i + 1, l] = pair[1, l]
+        hold_fin(drive, i, limits[3] + fin + off[i, 0], limits[3] + fin + off[i, 1], push[i, 0], push[i, 1])
+        state = over_interval(k, kinds, drive, i, steps[i], pieces, -0.5 * steps[i], state)
 
 
 def respond(

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fieldsid.dynamics.nonlinear_kernel import nonlinear_motion
+from fieldsid.dynamics.nonlinear_kernel import over_interval
 from fieldsid.maneuvers import Autopilot, Flight, Limits, Maneuver, Parameters, Schedule, fly
-from fieldsid.models.hull import CONSTANTS, DRIVES, FIN, MOMENT_END, MOMENT_START
+from fieldsid.models.hull import CONSTANTS, DRIVES, MOMENT_END, MOMENT_START, kinds_of, named
 from fieldsid.models.record import Record
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
-from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, idle_records, prepared
+from fieldsid.planning.flight.closed_loop import ACTUATOR_ROUNDS, fin_offset, hold_fin, idle_records, prepared
 from fieldsid.planning.flight.operating_point import OperatingPoint
 
 
@@ -26,18 +26,16 @@ def advance_all(
 
     drive (m, n-1, 6) before the fin, push (m, n-1, 2), off (m, n-1, 2) the fin's angle less its command at both ends.
     """
-    steps, pair, now = np.array([step]), np.empty((2, 3)), np.empty((1, drive.shape[2]))
+    now = np.empty((1, drive.shape[2]))
     for i in range(state.shape[0]):
         for j in range(drive.shape[2]):
             now[0, j] = drive[i, at, j]
         angle = trim[i] + fin[i]
-        start, end = angle + off[i, at, 0], angle + off[i, at, 1]
-        now[0, MOMENT_START] += push[i, at, 0] * start
-        now[0, MOMENT_END] += push[i, at, 1] * end
-        now[0, FIN] = 0.5 * (start + end)
-        nonlinear_motion(steps, now, c[i], state[i], pieces, pair)
-        for j in range(3):
-            state[i, j] = pair[1, j]
+        hold_fin(now, 0, angle + off[i, at, 0], angle + off[i, at, 1], push[i, at, 0], push[i, at, 1])
+        held = (state[i, 0], state[i, 1], state[i, 2])
+        state[i, 0], state[i, 1], state[i, 2] = over_interval(
+            named(c[i]), kinds_of(c[i]), now, 0, step, pieces, -0.5 * step, held
+        )
         moved[0, i], moved[1, i] = state[i, 0], state[i, 1]
 
 
