@@ -9,13 +9,11 @@ import numpy as np
 from fieldsid.numerics.arrays import FloatArray
 from fieldsid.numerics.jit import jit
 from fieldsid.schedule.flown.closed_loop_kernel import DIVERGED_RATE_RAD_S, at_rest, commanded, gains_at
-from fieldsid.turning.maneuvering.equations import LEAST_SURGE_M_S, rudder_lift, slope
+from fieldsid.turning.maneuvering.equations import LEAST_SURGE_M_S, OFFSET, rudder_lift, slope
 
 SETTINGS = 5
 """Columns of a vehicle's row: which way the fin turns (1 to port as the equations' rudder, else -1), its offset (rad), lag (s),
 largest rate (rad/s), delay (s)."""
-OFFSET = 13
-"""Place of the rudder's offset among the coefficients."""
 
 
 @jit
