@@ -74,9 +74,10 @@ class Contents:
             decoder, note = decoder_of(connection, payload, self.search)
             return _Topic(decoder, decoder.first_values(payload), note=note)
         except LogError as error:
-            code = "definition" if connection.is_decodable else "serialization"
             data = {"topic": connection.topic, "found": error.found, "hint": error.hint}
-            return _Topic(note=Note(code, f"{connection.topic}: {error.what}; {error.hint}", data), error=error)
+            message = f"{connection.topic}: {error.what}; {error.hint}"
+            note = Note("definition" if connection.is_decodable else "serialization", message, data)
+            return _Topic(note=note, error=error)
 
     def inventory(self, collector: Collector) -> Inventory:
         """Return the inventory of a bag whose topics were all caught; raises LogError for a bag of which nothing can be read."""
