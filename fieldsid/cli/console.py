@@ -78,7 +78,7 @@ def emit(
     alone. Only what is no result, as a page of the guide, has no headline. Where what `render` prints `is_file`, to be redirected
     to one, the headline goes to stderr, and the file is what is left where it is to be quiet.
     """
-    whole = body if headline is None else {**body, "headline": headline.record()}
+    whole = body if headline is None else {**body, "headline": headline}
     if as_json:
         sys.stdout.write(json.dumps(plain(whole), allow_nan=False) + "\n")
         return whole

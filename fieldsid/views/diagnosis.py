@@ -46,7 +46,7 @@ def page(found: Diagnosis) -> Page:
             ("effects", listed(found.effects) or "none"),
             ("noise floor", f"{number(floor.angle, 3)} rad and {number(floor.rate, 3)} rad/s"),
             ("not tried", "; ".join(f"{n}: {why}" for n, why in found.skipped.items())),
-            ("fly next", f"{next_['maneuver']}, {next_['why']}" if next_ else ""),
+            ("fly next", f"{next_.maneuver}, {next_.why}" if next_ else ""),
         ),
     )
     blocks = (

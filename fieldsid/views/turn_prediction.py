@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fieldsid.display import View
 from fieldsid.page import Block, Page, cut
+from fieldsid.records.keys import body_of
 from fieldsid.rounding import interval, number, with_error
 from fieldsid.views._words import counted, joined, table, warned
 
@@ -65,7 +66,7 @@ def page(found: TurnPrediction) -> Page:
 
 def frames(found: TurnPrediction) -> Mapping[str, Callable[[], DataFrame]]:
     """Return a row for each speed and side, and the measured circles."""
-    return {"rows": lambda: table(r.record() for r in found.rows), "measured": lambda: table(m.record() for m in found.measured)}
+    return {"rows": lambda: table(map(body_of, found.rows)), "measured": lambda: table(map(body_of, found.measured))}
 
 
 def figures(found: TurnPrediction) -> Mapping[str, Callable[[], Any]]:

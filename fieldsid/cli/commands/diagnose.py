@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from fieldsid.logs.run import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
+    from fieldsid.results.diagnoses import Applied, Diagnosed
 
 MOST_PLACES, MOST_SPOKEN = 5, 3
 
@@ -74,6 +76,8 @@ def command(
     axis = known.axis if known else axis or axis_excited(training)
     from fieldsid.diagnosis import diagnose
     from fieldsid.models.definition import NONE
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.diagnoses import Diagnosed
 
     effects = known.effects if known else ()
     with compiling_first(context), trying("diagnosing") as report:
@@ -81,9 +85,18 @@ def command(
         found = diagnose(training, axis, unseen, known=effects, own=own, report=report, thorough=thorough, unfit=skips.skip)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     inputs = [*files_of([*training, *unseen]), *([model] if model else [])]
-    body = _body(found, [r.name for r in training], [r.name for r in unseen], known, model) | {"skipped_runs": skips.records}
-    body |= {"file": _saved(body, output, inputs, force=force), "figure": _drawn(found, figure, context, force=force)}
-    body |= {"applied": _applied(context, found, (known, model), training, unseen, force=force) if apply else []}
+    told = Diagnosed(
+        found=found,
+        runs=tuple(r.name for r in training),
+        validation_runs=tuple(r.name for r in unseen),
+        model=None if model is None else str(model),
+        known=() if known is None else known.effects,
+        skipped_runs=tuple(skips.records),
+    )
+    told = replace(told, file=_saved(told, output, inputs, force=force), figure=_drawn(found, figure, context, force=force))
+    if apply:
+        told = replace(told, applied=_applied(context, found, (known, model), training, unseen, force=force))
+    body = body_of(told)
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
     headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
@@ -105,25 +118,13 @@ def _known(path: Path | None, axis: Axis | None) -> Model | None:
     return model
 
 
-def _body(found: Diagnosis, runs: Sequence[str], unseen: Sequence[str], known: Model | None, path: Path | None) -> dict[str, Any]:
-    from fieldsid.diagnosis import body_of
-
-    return {
-        "schema": "fieldsid/diagnose/1",
-        **body_of(found),
-        "runs": list(runs),
-        "validation_runs": list(unseen),
-        "model": None if path is None else str(path),
-        "known": [] if known is None else list(known.effects),
-    }
-
-
-def _saved(body: Mapping[str, Any], path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
+def _saved(told: Diagnosed, path: Path | None, inputs: Sequence[Path], *, force: bool) -> str | None:
     if path is None:
         return None
     from fieldsid.artifacts import save_record
+    from fieldsid.records.keys import body_of
 
-    kept = {k: v for k, v in body.items() if k != "schema"}
+    kept = {k: v for k, v in body_of(told).items() if k not in ("schema", "applied", "file", "figure")}
     return str(save_record(path, "fieldsid/diagnosis/1", kept, inputs=inputs, force=force))
 
 
@@ -139,17 +140,18 @@ def _drawn(found: Diagnosis, path: Path | None, context: typer.Context, *, force
 def _applied(
     context: typer.Context, found: Diagnosis, model: tuple[Model | None, Path | None], training: Sequence[Run],
     unseen: Sequence[Run], *, force: bool,
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> tuple[Applied, ...]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
     from fieldsid.artifacts import check_output
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
-    from fieldsid.extension import extend_in_steps, gain_body, save_extension
+    from fieldsid.extension import extend_in_steps, save_extension
     from fieldsid.models.model import save_model
+    from fieldsid.results.diagnoses import Applied
 
     known, path = model
     if not found.effects:
-        return []
+        return ()
     if known is None or path is None:
         stem = "joint" if len(training) > 1 else training[0].name
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
@@ -165,10 +167,9 @@ def _applied(
     parents = [path, *targets]
     for step, target, parent in zip(steps, targets, parents, strict=False):
         save_extension(step, target, parent=parent, training=training, validation=unseen, force=force)
-    return [
-        {"effect": name, "model": str(target), "pays": step.pays, **gain_body(step.gain)}
-        for name, step, target in zip(found.effects, steps, targets, strict=True)
-    ]
+    return tuple(
+        Applied(step.gain, name, str(target), step.pays) for name, step, target in zip(found.effects, steps, targets, strict=True)
+    )
 
 
 def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
@@ -282,5 +283,5 @@ def _render_maneuver(to: Console, found: Diagnosis) -> None:
     fly = found.next_maneuver
     if fly:
         to.print()
-        note = f"; {fly['note']}" if "note" in fly else ""
-        to.print(shown_words(f"what would settle it: {fly['maneuver']}, {fly['why']}{note}"))
+        note = f"; {fly.note}" if fly.note else ""
+        to.print(shown_words(f"what would settle it: {fly.maneuver}, {fly.why}{note}"))

@@ -27,10 +27,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.extension import Extension
-    from fieldsid.models.effect import Coefficient
     from fieldsid.models.model import Model
+    from fieldsid.results.extensions import AddedCoefficient, LeftOver
 
-SCHEMA = "fieldsid/extend/1"
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
 
@@ -113,6 +112,10 @@ def _extended(
     check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
     from fieldsid.extension import extend, save_extension
+    from fieldsid.extension.lineage import kept_by
+    from fieldsid.records.keys import body_of
+    from fieldsid.records.named_inputs import sha256_of
+    from fieldsid.results.extensions import Extended, MadeFrom
 
     with compiling_first(context), trying("extending") as report:
         found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
@@ -120,8 +123,25 @@ def _extended(
     kept = found.pays or keep
     if kept:
         save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
-    body = _body(found, known, path, target if kept else None) | {"skipped_runs": skips.records}
-    return body | _left(found, body, runs, validate, mapping), found.notes
+    left, next_ = _left(found, (target if kept else path), known, runs, validate, mapping, kept=kept)
+    written = target if kept else None
+    told = Extended(
+        gain=found.gain,
+        axis=known.axis,
+        log_evidence=found.evidence,
+        pays=found.pays,
+        kept=kept,
+        kept_by=kept_by(found) if kept else None,
+        model=str(written or path),
+        effects=found.model.effects if kept else known.effects,
+        parent=MadeFrom(str(path), sha256_of(path)),
+        coefficients=_coefficients(found),
+        notes=found.notes,
+        left=left,
+        next=next_,
+        skipped_runs=tuple(skips.records),
+    )
+    return body_of(told), found.notes
 
 
 def _check(path: Path, model: Model, names: Sequence[str]) -> None:
@@ -132,52 +152,49 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
     new_effects(model, names)
 
 
-def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
+def _left(
+    found: Extension,
+    model: Path,
+    parent: Model,
+    runs: Sequence[Path],
+    validate: Sequence[Path],
+    mapping: Path | None,
+    *,
+    kept: bool,
+) -> tuple[LeftOver, str]:
     """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
-    fitted, unseen = found.gain.left(kept=body["kept"])
-    more = not all(is_noise(error) for error in (fitted, unseen))
-    if more:
-        reading = ("--mapping", mapping) if mapping is not None else ()
-        judged = repeated("--validate", validate)
-        longer = () if body["kept"] else ("--thorough",)  # what was named by the usual search has not paid
-        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *reading, *longer)
-    else:
-        command = used(body["axis"], body["model"])
-    return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}
+    from fieldsid.results.extensions import LeftOver
+
+    fitted, unseen = found.gain.left(kept=kept)
+    left = LeftOver(fitted, unseen, not all(is_noise(error) for error in (fitted, unseen)))
+    if not left.more_than_noise:
+        return left, used(parent.axis.value, str(model))
+    reading = ("--mapping", mapping) if mapping is not None else ()
+    judged = repeated("--validate", validate)
+    longer = () if kept else ("--thorough",)  # what was named by the usual search has not paid
+    command = pasted("diagnose", runs, "--axis", parent.axis.value, "--model", str(model), *judged, *reading, *longer)
+    return left, command
 
 
-def _body(found: Extension, parent: Model, path: Path, written: Path | None) -> dict[str, Any]:
+def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:
     from fieldsid.effects import pick_effect
-    from fieldsid.extension import gain_body, kept_by
     from fieldsid.models.effect import as_fitted
-    from fieldsid.records.named_inputs import sha256_of
+    from fieldsid.results.extensions import AddedCoefficient
 
-    new = [c for n in found.gain.added for c in as_fitted(pick_effect(n), found.model.values).shared]
+    model = found.model
     return {
-        "schema": SCHEMA,
-        "axis": parent.axis.value,
-        **gain_body(found.gain),
-        "log_evidence": found.evidence,
-        "pays": found.pays,
-        "kept": written is not None,
-        "kept_by": None if written is None else kept_by(found),
-        "model": str(path if written is None else written),
-        "effects": list(parent.effects if written is None else found.model.effects),
-        "parent": {"path": str(path), "sha256": sha256_of(path)},
-        "coefficients": {c.name: _coefficient(found, c) for c in new},
-        "notes": [{"code": n.code, "message": n.message} for n in found.notes],
+        c.name: AddedCoefficient(model.values[c.name], model.std_error(c.name), c.unit, c.name in found.on_bound)
+        for n in found.gain.added
+        for c in as_fitted(pick_effect(n), model.values).shared
     }
-
-
-def _coefficient(found: Extension, c: Coefficient) -> dict[str, Any]:
-    value, error = found.model.values[c.name], found.model.std_error(c.name)
-    return {"value": value, "std_error": error, "unit": c.unit, "at_bound": c.name in found.on_bound}
 
 
 def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> Mapping[str, Any]:
     from fieldsid.artifacts import replacing
-    from fieldsid.extension import CHANGED, MISSING, gain_body, history_of, parent_of
+    from fieldsid.extension import CHANGED, MISSING, history_of, parent_of
     from fieldsid.models.model import load_model
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.extensions import Undone
 
     parent = parent_of(path)
     if parent is None:
@@ -194,15 +211,10 @@ def _undone(path: Path, output: Path | None, *, force: bool, as_json: bool) -> M
             shutil.copyfile(parent.path, temporary)
         back = output
     step = history_of(path)[-1].step
-    body = {
-        "schema": SCHEMA,
-        **(gain_body(step.gain) if step else {"before": {}, "after": {}, "noise_floor": {}}),
-        "kept": False,
-        "undone": str(path),
-        "model": str(back),
-        "effects": list(load_model(back).effects),
-        "parent": {"path": str(parent.path), "sha256": parent.sha256, "state": parent.state},
-    }
+    undone = Undone(
+        gain=step.gain if step else None, undone=str(path), model=str(back), effects=load_model(back).effects, parent=parent
+    )
+    body = body_of(undone)
     return emit(body, as_json=as_json, render=lambda to: _render_undone(to, body), headline=of_undoing(body))
 
 

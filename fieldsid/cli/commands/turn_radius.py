@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from fieldsid.logs.run import Run
     from fieldsid.plant.parameter_source import ParameterSource
+    from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.prediction import TurnPrediction
 
 Speeds = Annotated[
@@ -83,6 +85,8 @@ def command(
     from fieldsid.face.arguments import length_of
     from fieldsid.face.speeds import speeds_of
     from fieldsid.plant.parameter_source import load_parameter_source
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.turning import TurnRadius
     from fieldsid.turning.radius import turn_radius
 
     refuse_closed(output)
@@ -100,10 +104,11 @@ def command(
         unfit=skips.skip,
         length=length_of(vehicle),
     )
-    body: dict[str, Any] = {"schema": "fieldsid/turn-radius/1", **prediction.record(), "figures": []}
-    body["skipped_runs"] = skips.records
+    found = TurnRadius(prediction=prediction, skipped_runs=tuple(skips.records))
     if output is not None:
-        body["figures"] = _written(prediction, body, output, source, context, figures=figures, force=force)
+        drawn = _written(found, output, source, context, figures=figures, force=force)
+        found = replace(found, figures=drawn)
+    body = body_of(found)
     headline, notes = of_turn(body, models, caveat(source.models, models)), prediction.notes
     result = emit(body, as_json=as_json, render=lambda to: _render(to, prediction, body), headline=headline, notes=notes)
     skips.end(len(runs or []) + len(measured or []) - len(skips.records))
@@ -148,26 +153,27 @@ def _runs(given: Sequence[Path] | None, source: ParameterSource, mapping: Path |
 
 
 def _written(
-    prediction: TurnPrediction,
-    body: Mapping[str, Any],
+    found: TurnRadius,
     folder: Path,
     source: ParameterSource,
     context: typer.Context,
     *,
     figures: bool,
     force: bool,
-) -> list[str]:
+) -> tuple[str, ...]:
     from fieldsid.artifacts import save_record
     from fieldsid.figures.canvas import save
     from fieldsid.figures.turn import figure, track_figure
+    from fieldsid.records.keys import body_of
 
     inputs = [p for p in source.paths if p.is_file()]
-    rest = {k: v for k, v in body.items() if k not in ("schema", "figures")}
-    save_record(folder / "turn_radius.yaml", "fieldsid/turn-radius/1", rest, inputs=inputs, force=force)
+    rest = {k: v for k, v in body_of(found).items() if k not in ("schema", "figures")}
+    save_record(folder / "turn_radius.yaml", found.SCHEMA, rest, inputs=inputs, force=force)
     if not figures:
-        return []
+        return ()
+    prediction = found.prediction
     drawn = {"turn_radius": figure(prediction)} | {f"circle_{m.turn.run}": track_figure(m.turn) for m in prediction.measured}
-    return [str(save(f, folder / f"{name}.png", force=force, tasks=tasks_of(context))) for name, f in drawn.items()]
+    return tuple(str(save(f, folder / f"{name}.png", force=force, tasks=tasks_of(context))) for name, f in drawn.items())
 
 
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:

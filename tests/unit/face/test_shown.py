@@ -17,6 +17,7 @@ from fieldsid.display import LONGEST, Brief, Displayed, Plotted, view_of
 from fieldsid.errors import UsageError
 from fieldsid.face.several import Several
 from fieldsid.logs import Note
+from fieldsid.records.keys import body_of
 from fieldsid.registry import members
 
 KINDS = (
@@ -250,7 +251,7 @@ def test_an_interval_of_a_parameter_that_is_not_there_is_refused(held):
 
 def test_the_tables_of_turns_and_gains_are_the_rows_that_json_prints(held):
     turns, schedule = held["TurnPrediction"], held["Schedule"]
-    assert list(turns.to_frame().columns) == list(turns.rows[0].record())
+    assert list(turns.to_frame().columns) == list(body_of(turns.rows[0]))
     assert list(turns.to_frame()["radius_m"]) == [r.radius for r in turns.rows]
     assert list(turns.to_frame("measured")["radius_m"]) == [m.turn.circle.radius for m in turns.measured]
     assert list(schedule.to_frame()["kp"]) == [r.gains.kp for r in schedule.rows]
