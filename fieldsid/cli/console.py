@@ -25,6 +25,7 @@ from fieldsid.artifacts import plain
 from fieldsid.cli.headlines.headline import Headline
 from fieldsid.cli.voice import voice
 from fieldsid.logs.run import Note
+from fieldsid.page import Block, Page, told
 from fieldsid.text.one_line import one_line
 
 T = TypeVar("T")
@@ -112,6 +113,17 @@ def print_file(to: Console, text: str) -> None:
         return
     for line in text.removesuffix("\n").split("\n"):
         to.print(line, soft_wrap=True)
+
+
+def print_page(to: Console, page: Page) -> None:
+    """Print the blocks and sentences of a page: the first lines of the result stand for its title and warnings."""
+    for i, block in enumerate(filter(told, page.blocks)):
+        if i and (isinstance(block, Block) or block.startswith("\n")):
+            to.print()
+        if isinstance(block, Block):
+            to.print(table(block.title, block.columns, block.rows, left=block.left))
+        else:
+            to.print(block.removeprefix("\n"))
 
 
 class Rows(Table):

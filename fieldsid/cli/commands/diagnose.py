@@ -5,29 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit, print_page, table
 from fieldsid.cli.options import ExcitedAxis, FigureFile, Force, JsonFlag, MappingFile, OutputFile, RunFiles, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, refuse_figure, trying
 from fieldsid.cli.session import tasks_of
-from fieldsid.cli.voice import shown_in, shown_words
+from fieldsid.cli.voice import angles
+from fieldsid.display import page_of
 from fieldsid.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fieldsid.diagnosis import Diagnosis, Errors, Pair
+    from fieldsid.diagnosis import Diagnosis
     from fieldsid.logs.run import Run
     from fieldsid.models.axis import Axis
     from fieldsid.models.model import Model
     from fieldsid.results.diagnoses import Applied, Diagnosed
-
-MOST_PLACES, MOST_SPOKEN = 5, 3
 
 KnownModel = Annotated[
     Path | None, typer.Option("--model", metavar="MODEL", help="A model whose effects are known already.", show_default=False)
@@ -191,97 +189,8 @@ def _render_applied(to: Console, applied: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _render(to: Console, found: Diagnosis, body: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number
-
-    to.print(_candidates(found))
-    floor = found.noise_floor
-    factor, angle = shown_in("rad")
-    noise = f"{number(factor * floor.angle, 2)} {angle} and {number(factor * floor.rate, 2)} {angle}/s"
-    of = f"in {angle} and {angle}/s, in logs with next to no noise" if found.noiseless else f"over the noise floor, {noise}"
-    to.print(f"fitted, unseen: free-run error of those runs {of}; evidence: log, over the first row")
-    _render_words(to, found)
-    _render_where(to, found)
-    _render_skipped(to, found.skipped)
-    _render_maneuver(to, found)
+    print_page(to, page_of(found, angles()))
     _render_applied(to, body["applied"])
     for key in ("file", "figure"):
         if body[key]:
             to.print(f"{key}: {body[key]}", soft_wrap=True)
-
-
-def _candidates(found: Diagnosis) -> Any:
-    from fieldsid.rounding import probability
-
-    rows = [("as it is", "", *_errors(found, found.base), "", "")]
-    rows += [
-        (
-            c.effect.replace("+", " +"),
-            probability(c.probability),
-            *_errors(found, c.errors),
-            "worse" if c.worse else f"{100 * c.explained:.0f} %",
-            f"{c.score:+z.0f}",
-        )
-        for c in found.candidates
-    ]
-    return table("", ("effect", "prob.", "fitted", "unseen", "explained", "evidence"), rows)
-
-
-def _errors(found: Diagnosis, errors: Pair) -> tuple[str, str]:
-    """Return the errors on fitted and on unseen runs: over the noise floor, or in their units without noise."""
-    from fieldsid.cli.headlines.words import times
-    from fieldsid.rounding import number
-
-    def said(e: Errors) -> str:
-        if not found.noiseless:
-            return times(e.over(found.noise_floor))
-        factor = shown_in("rad")[0]
-        return ", ".join(number(factor * rms, 2) for rms in (e.angle_rms_rad, e.rate_rms_rad_s) if isfinite(rms))
-
-    return said(errors.train), said(errors.validation)
-
-
-def _render_words(to: Console, found: Diagnosis) -> None:
-    """Say what each named effect does, what it may be confused with, and the evidence for what is not in the first line."""
-    from fieldsid.diagnosis import what_it_does
-    from fieldsid.diagnosis.thresholds import RIVAL_PROBABILITY_RATIO
-
-    if found.verdict in ("sufficient", "disturbed"):
-        return
-    to.print()
-    for name in found.effects:
-        to.print(shown_words(f"{name}: {what_it_does(name, found.model.values)}"))
-    for i, c in enumerate(found.candidates[:MOST_SPOKEN]):
-        if i and c.probability < RIVAL_PROBABILITY_RATIO:
-            continue
-        if found.verdict != "effect" or i:
-            to.print(shown_words(f"{c.effect}: {c.evidence}"))
-        if c.confusable_with:
-            to.print(shown_words(f"on these data nearly as good as {c.effect}: {', '.join(c.confusable_with)}"))
-
-
-def _render_where(to: Console, found: Diagnosis) -> None:
-    rows = [
-        (shown_words(p.condition), f"{100 * p.share_of_error:.0f} %", f"{p.rms_ratio:.2f}", f"{p.start_s:.1f} .. {p.end_s:.1f}")
-        for p in found.where[:MOST_PLACES]
-    ]
-    to.print()
-    to.print(table("where the model as it is fails", ("", "of error", "rms ratio", "worst, s"), rows))
-
-
-def _render_skipped(to: Console, skipped: Mapping[str, str]) -> None:
-    if not skipped:
-        return
-    why: dict[str, list[str]] = {}
-    for name, reason in skipped.items():
-        why.setdefault(reason, []).append(name)
-    to.print()
-    for reason, names in why.items():
-        to.print(f"not tried: {', '.join(names)}: {reason}")
-
-
-def _render_maneuver(to: Console, found: Diagnosis) -> None:
-    fly = found.next_maneuver
-    if fly:
-        to.print()
-        note = f"; {fly.note}" if fly.note else ""
-        to.print(shown_words(f"what would settle it: {fly.maneuver}, {fly.why}{note}"))

@@ -6,29 +6,30 @@ import re
 import shutil
 from collections.abc import Mapping, Sequence
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, table
+from fieldsid.cli.console import emit, print_page, table
 from fieldsid.cli.headlines.missing import left_says, of_extension, of_undoing
 from fieldsid.cli.headlines.typed import pasted, repeated
 from fieldsid.cli.headlines.words import used
 from fieldsid.cli.options import Force, JsonFlag, MappingFile, ModelFile, OutputFile, ValidateRuns
 from fieldsid.cli.progress import compiling_first, get_ready, refuse_existing, trying
 from fieldsid.cli.skipped_logs import Skips
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles, shown_in
 from fieldsid.comparison.sufficient import is_noise
 from fieldsid.errors import ArtifactError, UsageError
+from fieldsid.page import Page
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from fieldsid.extension import Extension
+    from fieldsid.extension.extend import Gain
     from fieldsid.models.model import Model
-    from fieldsid.results.extensions import AddedCoefficient, LeftOver
+    from fieldsid.results.extensions import AddedCoefficient, Extended, LeftOver
 
 MUCH, SMALL = 100.0, 1e-3
 """A standard error so many times the value, or the smallest value that counts, is no knowledge."""
@@ -71,11 +72,16 @@ def command(
                 "`--undo` takes the model alone", found="runs or options beside it", hint=f"sysid extend {model} --undo"
             )
         return _undone(model, output, force=force, as_json=as_json)
+    from fieldsid.records.keys import body_of
+
     skips = Skips()
-    body, notes = _extended(
+    told = _extended(
         context, model, runs or [], _names(add), validate or [], skips, keep=keep, mapping=mapping, output=output, force=force
     )
-    result = emit(body, as_json=as_json, render=lambda to: _render(to, body), headline=of_extension(body), notes=notes)
+    body = body_of(told)
+    result = emit(
+        body, as_json=as_json, render=lambda to: _render(to, told.gain, body), headline=of_extension(body), notes=told.notes
+    )
     skips.end(len(runs or []) + len(validate or []) - len(skips.records))
     return result
 
@@ -97,7 +103,7 @@ def _extended(
     mapping: Path | None,
     output: Path | None,
     force: bool,
-) -> tuple[dict[str, Any], Sequence[Any]]:
+) -> Extended:
     from fieldsid.cli.inputs import read_groups, refuse_swapped
     from fieldsid.models.model import load_model
 
@@ -113,7 +119,6 @@ def _extended(
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
     from fieldsid.extension import extend, save_extension
     from fieldsid.extension.lineage import kept_by
-    from fieldsid.records.keys import body_of
     from fieldsid.records.named_inputs import sha256_of
     from fieldsid.results.extensions import Extended, MadeFrom
 
@@ -125,7 +130,7 @@ def _extended(
         save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
     left, next_ = _left(found, (target if kept else path), known, runs, validate, mapping, kept=kept)
     written = target if kept else None
-    told = Extended(
+    return Extended(
         gain=found.gain,
         axis=known.axis,
         log_evidence=found.evidence,
@@ -141,7 +146,6 @@ def _extended(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
-    return body_of(told), found.notes
 
 
 def _check(path: Path, model: Model, names: Sequence[str]) -> None:
@@ -222,24 +226,10 @@ def _render_undone(to: Console, body: Mapping[str, Any]) -> None:
     to.print(f"model: {body['model']}; {body['undone']} stays where it is", soft_wrap=True)
 
 
-def _render(to: Console, body: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number
+def _render(to: Console, gain: Gain, body: Mapping[str, Any]) -> None:
+    from fieldsid.views.extension import errors
 
-    times, angle = shown_in("rad")
-    floor = body["noise_floor"]
-    rows = [
-        (f"{unit}, {side}", *(number(times * v, 3) for v in (b[key], a[key], floor[noise])))
-        for key, noise, unit in (
-            ("angle_rms_rad", "angle_rad", f"angle, {angle}"),
-            ("rate_rms_rad_s", "rate_rad_s", f"rate, {angle}/s"),
-        )
-        for side, b, a in (
-            ("unseen", body["before"]["validation"], body["after"]["validation"]),
-            ("fitted", body["before"]["train"], body["after"]["train"]),
-        )
-        if isfinite(b[key])
-    ]
-    to.print(table("", ("rms error", "before", "after", "noise floor"), rows))
+    print_page(to, Page("", blocks=(errors(gain, angles()),)))
     to.print()
     found = [
         (n, _value(factor * c["value"], factor * c["std_error"], at_bound=c["at_bound"]), unit)

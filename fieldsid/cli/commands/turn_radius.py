@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fieldsid.cli.console import emit, say, table
+from fieldsid.cli.console import emit, print_page, say
 from fieldsid.cli.options import Figures, Force, JsonFlag, MappingFile, ModelFiles, OutputDir, VehicleFile
 from fieldsid.cli.progress import refuse_closed
 from fieldsid.cli.session import tasks_of
 from fieldsid.cli.skipped_logs import Skips
-from fieldsid.cli.voice import shown_in
+from fieldsid.cli.voice import angles
+from fieldsid.display import page_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -177,66 +178,6 @@ def _written(
 
 
 def _render(to: Console, prediction: TurnPrediction, body: Mapping[str, Any]) -> None:
-    from fieldsid.rounding import number
-    from fieldsid.turning.known_radius import BRACKETED, radius_cell
-    from fieldsid.turning.prediction import found_by
-
-    times, angle = shown_in("rad")
-    columns = ("side", "m/s", "radius m", "95 %", "model's", "deg/s", "u-turn s", "trust")
-    rows = [
-        (
-            r.side,
-            number(r.speed, 3),
-            radius_cell(r.radius, r.interval95),
-            f"{number(r.interval95[0], 3)} .. {number(r.interval95[1], 3)}",
-            number(r.of_model, 3),
-            number(r.yaw_rate_max * 57.29577951308232, 3),
-            number(r.u_turn_time, 3),
-            r.trust,
-        )
-        for r in prediction.rows
-    ]
-    to.print(
-        table(
-            f"rudder {times * prediction.rudder_max:.4g} {angle}, {found_by(r.method for r in prediction.rows)}",
-            columns,
-            rows,
-        )
-    )
-    if any(r.band_only for r in prediction.rows):
-        to.print(BRACKETED)
-    _render_measured(to, prediction)
-    for reason in dict.fromkeys(b for r in prediction.rows for b in r.because):
-        of = sum(reason in r.because for r in prediction.rows)
-        share = "" if of == len(prediction.rows) else f" ({of} of {len(prediction.rows)} turns)"
-        to.print(f"extrapolated{share}: {reason}")
-    for settling in prediction.settling:
-        to.print(f"what would settle it: {settling}")
-    for side, best in body["minimum"].items():
-        if best:
-            to.print(f"tightest at higher speed, {side}: {best['radius_m']:.2f} m at {best['speed_m_s']:.2f} m/s")
+    print_page(to, page_of(prediction, angles()))
     for path in body["figures"]:
         to.print(f"figure: {path}", soft_wrap=True)
-
-
-def _render_measured(to: Console, prediction: TurnPrediction) -> None:
-    from fieldsid.rounding import number, with_error
-
-    if not prediction.measured:
-        return
-    rows, times = [], shown_in("rad")[0]
-    for m in prediction.measured:
-        circle = m.turn.circle
-        off = 100.0 * (m.predicted / circle.radius - 1.0)
-        band = f"{number(m.predicted95[0], 3)} .. {number(m.predicted95[1], 3)}"
-        radius = with_error(circle.radius, circle.radius_std_error)
-        fin, speed = number(times * m.turn.fin, 3), number(m.turn.flown_at, 3)
-        rows.append((m.turn.run, speed, fin, radius, number(m.predicted), band, f"{off:+.1f}"))
-    to.print()
-    to.print(
-        table(
-            "measured circles, and what the other runs alone predict",
-            ("run", "m/s", "fin", "radius m", "predicted", "95 %", "off %"),
-            rows,
-        )
-    )
