@@ -167,6 +167,7 @@ def _diagnosis(
         base_model=base_model,
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, unlogged, floor),
+        unusual=apart_from_the_hulls_own(added_effects(work, named))[0],
         skipped=skipped,
         notes=(
             *notes,
@@ -250,60 +251,3 @@ def where_of(h: ScoredModel, records: Sequence[Record]) -> tuple[tuple[Place, ..
     seen, squared = worst.record, worst.residual[channel] ** 2
     found = places(seen.time, squared, seen.ok[channel], conditions(seen, worst.rate, 0.0))
     return found, tuple(notes)
-
-
-def body_of(d: Diagnosis) -> dict[str, Any]:
-    """Return a diagnosis as the JSON object of the contract, without its schema."""
-    return {
-        "axis": d.axis.value,
-        "verdict": d.verdict,
-        "says": d.says,
-        "short": d.short,
-        "effects": list(d.effects),
-        "unusual": list(apart_from_the_hulls_own(d.effects)[0]),
-        "base": _pair(d.base),
-        "final": _pair(d.final),
-        "noise_floor": {"angle_rad": d.noise_floor.angle, "rate_rad_s": d.noise_floor.rate},
-        "noiseless": d.noiseless,
-        "left": {
-            "ratio": d.left.ratio,
-            "unexplained": d.left.unexplained,
-            "where": d.left.where or None,
-            "moves_with": d.left.moves_with or None,
-        },
-        "candidates": [
-            {
-                "effect": c.effect,
-                "probability": c.probability,
-                "parameters": dict(c.parameters),
-                **_pair(c.errors),
-                "explained": c.explained,
-                "log_evidence": c.score,
-                "worse": c.worse,
-                "evidence": c.evidence,
-                "confusable_with": list(c.confusable_with),
-            }
-            for c in d.candidates
-        ],
-        "where": [
-            {
-                "condition": w.condition,
-                "share_of_error": w.share_of_error,
-                "rms_ratio": w.rms_ratio,
-                "t_start_s": w.start_s,
-                "t_end_s": w.end_s,
-            }
-            for w in d.where
-        ],
-        "next_maneuver": d.next_maneuver,
-        "skipped": dict(d.skipped),
-        "notes": [{"code": n.code, "message": n.message} for n in d.notes],
-        "speed_law": {"reference_m_s": d.model.law.reference},
-    }
-
-
-def _pair(p: Any) -> dict[str, Any]:
-    return {
-        side: {"angle_rms_rad": e.angle_rms_rad, "rate_rms_rad_s": e.rate_rms_rad_s}
-        for side, e in (("train", p.train), ("validation", p.validation))
-    }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from fieldsid.errors import DataError
 from fieldsid.models.axis import NAMES, Axis
 from fieldsid.models.model import Model
 from fieldsid.numerics.arrays import FloatArray
+from fieldsid.records.keys import Key, Number
 
 EQUAL_SPEED_SHARE = 0.03
 """Speeds closer than this fraction count as one: log-to-log spread of a held thrust setting."""
@@ -24,10 +26,10 @@ SIGN_STD_ERRORS = 3.0
 class Point(Brief):
     """Parameters identified at one speed (m/s), by name, with standard errors where they are known."""
 
-    name: str
-    speed: float
-    values: Mapping[str, float]
-    std_errors: Mapping[str, float]
+    name: Annotated[str, Key("The model, or the row of a table.")]
+    speed: Annotated[float, Key("Its speed.", "speed_m_s")]
+    values: Annotated[Mapping[str, float], Key("By parameter.")]
+    std_errors: Annotated[Mapping[str, Number], Key("Their standard errors, where they are known.")]
 
 
 def points_of(models: Sequence[Model], names: Sequence[str]) -> tuple[Axis, tuple[tuple[Point, ...], ...]]:

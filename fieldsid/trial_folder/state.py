@@ -6,13 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from fieldsid.display import Brief
 from fieldsid.errors import ArtifactError, LogError
 from fieldsid.logs.reader import reader_of
 from fieldsid.logs.run import OF_LIMITS, SIMULATED
 from fieldsid.logs.unknown_file import own_kind
+from fieldsid.records.keys import Key, Words
 from fieldsid.records.named_inputs import beside
 from fieldsid.records.reading import check_kind, read_json, read_yaml
 from fieldsid.trial_folder.journal import JOURNAL, Entry, Hashes, made_by, read, relative_to
@@ -28,9 +29,9 @@ SETTINGS = ("vehicle", "mapping", "user-effect", "effect")
 class Source(Brief):
     """What a file was made from: its path as named then, where it is now (None: nowhere), and its SHA-256 then."""
 
-    named: str
+    named: Annotated[str, Key("The file as it was named then.", "path")]
     path: Path | None
-    sha256: str
+    sha256: Annotated[str, Key("Its hash then.")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -41,11 +42,11 @@ class Item(Brief):
     `fins` is how far (rad) a run's fins went where its import found them beyond the vehicle's limits, by signal.
     """
 
-    path: str
-    kind: str
-    sources: tuple[Source, ...] = ()
-    stale: str = ""
-    missing: tuple[str, ...] = ()
+    path: Annotated[str, Key("Its path from the folder.")]
+    kind: Annotated[str, Key("What it is: log, run, model, fit, schedule, ...")]
+    sources: Annotated[tuple[Source, ...], Key("What it was made from, as it says itself.", "made_from")] = ()
+    stale: Annotated[Words, Key("Why it does not hold any more; null where it does.")] = ""
+    missing: Annotated[tuple[str, ...], Key("What it was made from and is not there any more.")] = ()
     body: Mapping[str, Any] | None = None
     fins: Mapping[str, float] | None = None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +28,6 @@ def several_models(
     runs: Sequence[Path],
     skips: Skips,
     *,
-    entry: Callable[[Comparison, str | None, Collection[str]], dict[str, Any]],
     reading: Mapping[str, Any],
     output: Path | None,
     force: bool,
@@ -36,7 +35,7 @@ def several_models(
 ) -> Mapping[str, Any]:
     """Compare several models with the same runs and print which follows them best; return the body.
 
-    entry makes a comparison's part of the body; reading is what `read_runs` takes: mapping, start and end.
+    reading is what `read_runs` takes: mapping, start and end.
     """
     from fieldsid.cli.inputs import read_runs
     from fieldsid.cli.user_effects import check_effects
@@ -51,27 +50,28 @@ def several_models(
     ready = partial(get_ready, "fieldsid.comparison.compare")
     logs = read_runs(runs, check=effects, meanwhile=ready, refused=skips.skip, **reading)
     from fieldsid.comparison.compare import compare
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.comparisons import ComparedSeveral, OneOfSeveral, compared_run
 
     found_of = [compare(m, logs, unfit=skips.skip if i == 0 else None) for i, m in enumerate(models)]
     names = _names(paths)
     fitted_of = [fitted_to(p, m, logs) for p, m in zip(paths, models, strict=True)]
-    figures = _drawn(found_of, names, output, force=force)
-    body = {
-        "schema": "fieldsid/compare-several/1",
-        "axis": models[0].axis,
-        "models": [
-            {
-                "model": str(p),
-                "over_floor": pooled(c.over_noise for c in found),
-                "fitted_to": [c.run for c in found if c.run in fitted],
-                "runs": [entry(c, None, fitted) for c in found],
-            }
-            for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
-        ],
-        "best": str(paths[min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))]),
-        "figures": figures,
-        "skipped_runs": skips.records,
-    }
+    figures = tuple(_drawn(found_of, names, output, force=force))
+    least = min(range(len(paths)), key=lambda i: pooled(c.over_noise for c in found_of[i]))
+    several = tuple(
+        OneOfSeveral(
+            str(p),
+            pooled(c.over_noise for c in found),
+            tuple(c.run for c in found if c.run in fitted),
+            tuple(compared_run(c, None, fitted) for c in found),
+        )
+        for p, found, fitted in zip(paths, found_of, fitted_of, strict=True)
+    )
+    body = body_of(
+        ComparedSeveral(
+            axis=models[0].axis, models=several, best=str(paths[least]), figures=figures, skipped_runs=tuple(skips.records)
+        )
+    )
     from fieldsid.cli.headlines.models import of_several
     from fieldsid.cli.inputs import files_of
     from fieldsid.records.named_inputs import inputs_of

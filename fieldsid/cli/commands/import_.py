@@ -64,6 +64,8 @@ def command(
     from fieldsid.logs.importing import Importer
     from fieldsid.logs.several.run_names import refuse_twice
     from fieldsid.logs.several.sifting import attempt, sifted
+    from fieldsid.records.keys import body_of
+    from fieldsid.results.logs import Import
 
     joined: list[Path] = []
     if join:
@@ -82,7 +84,7 @@ def command(
     for _, place in placed:
         check_output(place, force=force)
     done = [importer.write(run, place, force=force) for run, place in placed]
-    body: dict[str, Any] = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
+    body = body_of(Import(runs=tuple(done), skipped_runs=tuple(skips.records)))
     from fieldsid.cli.headlines.logs import of_import
 
     notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
@@ -102,16 +104,5 @@ def _fin_limits(vehicle: Path | None) -> dict[str, float]:
 def _render(done: list[Imported], console: Console) -> None:
     from fieldsid.cli.console import table
 
-    rows: list[Any] = []
-    for item in done:
-        record = item.record()
-        rows.append(
-            (
-                record["file"],
-                str(record["samples"]),
-                f"{record['duration_s']:.2f}",
-                f"{record['rate_hz']:.4g}",
-                str(len(record["signals"])),
-            )
-        )
+    rows = [(d.file, str(d.samples), f"{d.duration_s:.2f}", f"{d.rate_hz:.4g}", str(len(d.signals))) for d in done]
     console.print(table("", ("run", "samples", "s", "Hz", "signals"), rows))
