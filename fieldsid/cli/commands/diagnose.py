@@ -86,7 +86,7 @@ def command(
     body |= {"applied": _applied(context, found, (known, model), training, unseen, force=force) if apply else []}
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
-    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
+    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, thorough))
     result = emit(body, as_json=as_json, render=lambda to: _render(to, found, body), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
     return result

@@ -99,10 +99,10 @@ def _extended(
     output: Path | None,
     force: bool,
 ) -> tuple[dict[str, Any], Sequence[Any]]:
-    from fieldsid.cli.inputs import read_groups, refuse_swapped
+    from fieldsid.cli.inputs import model_first, read_groups
     from fieldsid.models.model import load_model
 
-    refuse_swapped("extend", path, runs)
+    path, runs = model_first(path, runs)
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
@@ -121,7 +121,7 @@ def _extended(
     if kept:
         save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
     body = _body(found, known, path, target if kept else None) | {"skipped_runs": skips.records}
-    return body | _left(found, body, runs, validate, mapping), found.notes
+    return body | _left(found, body, runs, validate), found.notes
 
 
 def _check(path: Path, model: Model, names: Sequence[str]) -> None:
@@ -132,15 +132,14 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
     new_effects(model, names)
 
 
-def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path], mapping: Path | None) -> Any:
+def _left(found: Extension, body: Mapping[str, Any], runs: Sequence[Path], validate: Sequence[Path]) -> Any:
     """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
     fitted, unseen = found.gain.left(kept=body["kept"])
     more = not all(is_noise(error) for error in (fitted, unseen))
     if more:
-        reading = ("--mapping", mapping) if mapping is not None else ()
         judged = repeated("--validate", validate)
         longer = () if body["kept"] else ("--thorough",)  # what was named by the usual search has not paid
-        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *reading, *longer)
+        command = pasted("diagnose", runs, "--axis", body["axis"], "--model", body["model"], *judged, *longer)
     else:
         command = used(body["axis"], body["model"])
     return {"left": {"fitted": fitted, "unseen": unseen, "more_than_noise": more}, "next": command}

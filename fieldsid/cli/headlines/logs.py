@@ -61,7 +61,9 @@ def _is_taken(log: Path, mapping: str | Path | None) -> bool:
 
 def of_import(body: Body) -> Headline:
     """Return how many runs there are now, and the first fit of them."""
-    runs = body["runs"]
+    runs, there = body["runs"], body["already_imported"]
+    if not runs and there:
+        return Headline(f"already imported: {counted(len(there), 'log')}, as they are", named(there), pasted("status"))
     seconds = sum(float(r["duration_s"]) for r in runs)
     axes = [a.value for a in Axis if any({NAMES[a].fin, NAMES[a].fin_measured} & set(r["signals"]) for r in runs)] or ["yaw"]
     files = [r["file"] for r in runs]

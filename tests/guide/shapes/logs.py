@@ -230,6 +230,8 @@ class Import(Result):
     """One for each log."""
     skipped_runs: list[Skipped]
     """Logs that could not be used, and why; where there are any, the exit code is 1."""
+    already_imported: list[str]
+    """Logs whose runs were there, made of the same bytes of log and mapping."""
 
 
 class SignalRange(Shape):
