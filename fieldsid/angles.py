@@ -7,6 +7,7 @@ cannot be meant with its unit either: a course of 400 deg.
 from __future__ import annotations
 
 import math
+import re
 
 from fieldsid.errors import UsageError
 
@@ -22,6 +23,19 @@ TURN = 2.0 * math.pi
 FASTEST_FIN = 20.0 * math.pi
 """The fastest fin that can be meant, rad/s: the servos of models, 60 deg in 0.06 s, do a quarter of it."""
 UNITS = {"deg": math.pi / 180.0, "rad": 1.0}
+
+
+_ANGLE = re.compile(r"(?P<low>-?[\d.]+)(?: \.\. (?P<high>-?[\d.]+))? rad\b(?P<rest>(?:/s(?:\^2)?)?)")
+
+
+def in_degrees(text: str) -> str:
+    """Return a sentence with its angles turned from rad to deg: `rate: 2.86 .. 5.73 deg/s`."""
+
+    def turned(found: re.Match[str]) -> str:
+        numbers = [f"{math.degrees(float(found[name])):.3g}" for name in ("low", "high") if found[name]]
+        return f"{' .. '.join(numbers)} deg{found['rest']}"
+
+    return _ANGLE.sub(turned, text)
 
 
 def parse_angle(text: str, option: str, most: float, largest: float = math.inf, beyond: str = "") -> float:

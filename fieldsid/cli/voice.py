@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from math import pi
-from re import Match
-from re import compile as pattern
 
+from fieldsid.angles import in_degrees
 from fieldsid.rounding import in_unit, interval, with_error
 
 QUIET, VERBOSE, DEGREES = "--quiet", "-v", "--deg"
@@ -32,7 +31,6 @@ class Voice:
 
 
 _VOICE = [Voice()]
-_ANGLE = pattern(r"(?P<low>-?[\d.]+)(?: \.\. (?P<high>-?[\d.]+))? rad\b(?P<rest>(?:/s(?:\^2)?)?)")
 
 
 def voice() -> Voice:
@@ -79,9 +77,4 @@ def shown_estimate(value: float, std_error: float, interval95: Sequence[float], 
 
 def shown_words(text: str) -> str:
     """Return a sentence with the angles in it as they are shown: `rate: 0.05 .. 0.1 rad/s`."""
-    return _ANGLE.sub(_turned, text) if voice().is_in_degrees else text
-
-
-def _turned(found: Match[str]) -> str:
-    numbers = [f"{float(found[name]) * 180.0 / pi:.3g}" for name in ("low", "high") if found[name]]
-    return f"{' .. '.join(numbers)} deg{found['rest']}"
+    return in_degrees(text) if voice().is_in_degrees else text

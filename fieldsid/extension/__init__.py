@@ -13,6 +13,7 @@ from fieldsid.extension.lineage import (
     parent_of,
     save_extension,
 )
+from fieldsid.extension.loop import Loop, LoopStep, loop_of
 from fieldsid.extension.steps import extend_in_steps
 
 __all__ = [
@@ -22,12 +23,15 @@ __all__ = [
     "Extension",
     "Gain",
     "Generation",
+    "Loop",
+    "LoopStep",
     "Step",
     "extend",
     "extend_in_steps",
     "gain_body",
     "history_of",
     "kept_by",
+    "loop_of",
     "parent_of",
     "save_extension",
 ]

@@ -8,6 +8,7 @@ from textwrap import fill
 
 from matplotlib.figure import Figure, SubFigure
 
+from fieldsid.angles import in_degrees
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.figures import canvas, motion, where
 from fieldsid.models.model import Model
@@ -39,8 +40,9 @@ def _draw_places(failing: Sequence[Channel], right: SubFigure) -> None:
     """Draw where each failing channel fails, the worse one at the top."""
     for channel, ax in zip(failing, right.subplots(len(failing), 1, squeeze=False)[:, 0], strict=True):
         shown = channel.where[: MOST_BARS // len(failing)]
-        where.draw([where.Bar(p.condition, p.share_of_error, p.rms_ratio) for p in shown], ax)
-        says = f"the {channel.name} fails most at {shown[0].condition}" if shown else f"where the {channel.name} fails"
+        where.draw(shown, ax)
+        at = f" most at {in_degrees(shown[0].condition)}" if shown else ""
+        says = f"the {channel.name} fails{at}"
         how = f"{left_in_words(channel.over_floor, channel.fit)}; beside a bar: rms there\nover that of the whole run"
         ax.set_title(f"{fill(says, TITLE_WIDTH)}\n{how}", loc="left", fontsize=10)
 

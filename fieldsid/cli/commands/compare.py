@@ -76,7 +76,7 @@ def command(
     if len(sides) == len(runs) + 1 == 2:
         _refuse_part(start, end, mapping, min_fit)
         return before_after(sides[0], sides[1], output, figures=figures, force=force, as_json=as_json)
-    from fieldsid.cli.inputs import read_runs, refuse_swapped
+    from fieldsid.cli.inputs import model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.models.model import load_model
@@ -94,7 +94,7 @@ def command(
             force=force,
             as_json=as_json,
         )
-    refuse_swapped("compare", model, runs)
+    model, runs = model_first(model, runs)
     known = load_model(model)
     skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
     effects = partial(check_effects, [(model, known)])

@@ -150,6 +150,41 @@ class OneOfSeveral(Shape):
     """One for each run."""
 
 
+class LoopPlace(Shape):
+    """Where the first model of a line fails."""
+
+    condition: str
+    """When."""
+    beyond: float
+    """Its share of the squared error beyond its share of the time."""
+    rms_ratio: float
+    """The rms there over that of the run."""
+
+
+class LoopStep(Shape):
+    """The error of a model of the line: over the noise floor, without noise over the first model's."""
+
+    added: str
+    """What was added."""
+    fitted: Number
+    """On the runs fitted to."""
+    unseen: Number
+    """On unseen runs."""
+
+
+class Loop(Shape):
+    """From a model to one that was extended from it."""
+
+    run: str
+    """The run that the first fails most on."""
+    added: list[str]
+    """The effects that were added."""
+    where: list[LoopPlace]
+    """Where the first fails."""
+    steps: list[LoopStep]
+    """The first model, and each addition."""
+
+
 class CompareSeveral(Result):
     """Several models over the same runs."""
 
@@ -160,6 +195,8 @@ class CompareSeveral(Result):
     """The models in the order given."""
     best: str
     """The file of the one with the least error."""
+    loop: Loop | None
+    """Where one of them was extended from another: how the error fell."""
     figures: list[str]
     """The figures, one for each run."""
     skipped_runs: list[Skipped]
