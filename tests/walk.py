@@ -45,7 +45,8 @@ class Walk:
         self.steps.append(line)
         out, err = self._run(line)
         for hint in dict.fromkeys(a or b for a, b in SNIPPET.findall(out + err)):
-            if hint not in self.tried and not NOT_TO_PASTE.search(hint) and not FLIGHT.search(hint):
+            names_a_command = len(hint.split()) == 2 and not Path("journal.jsonl").exists()  # and is no line, but in a trial
+            if hint not in self.tried and not names_a_command and not NOT_TO_PASTE.search(hint) and not FLIGHT.search(hint):
                 self.tried[hint] = line
                 self._try(hint)
         found = NEXT.search(out)

@@ -64,7 +64,7 @@ def _loop_motion(loop: Loop, models: Sequence[tuple[str, Comparison, str]], titl
         series.append(Series(time, motion, kind, name))
     spans = [(s.start_s, s.end_s) for s in loop.before.leading.worst]
     label = f"{record.axis.value} rate, deg/s" if is_rate else f"{record.axis.value}, deg"
-    return chart([Panel(label, series, height=170, spans=spans)], "time, s", title), legend(series)
+    return chart([Panel(label, series, height=140, spans=spans)], "time, s", title), legend(series)
 
 
 def loop_steps(loop: Loop) -> str:
@@ -79,7 +79,7 @@ def loop_steps(loop: Loop) -> str:
 def failures(places: Sequence[Place], title: str) -> str:
     """Return bars of what each condition has of the squared error beyond its share of the time, in per cent."""
     worse = [p for p in places[:MOST_BARS] if p.beyond > 0.0]
-    rows = [(in_degrees(p.condition), 100.0 * p.beyond, f"+{100.0 * p.beyond:.0f} %, rms {p.rms_ratio:.2f} x") for p in worse]
+    rows = [(in_degrees(p.condition), 100.0 * p.beyond, f"+{100.0 * p.beyond:.0f} %, {p.rms_ratio:.2f} x") for p in worse]
     return bars(rows, title)
 
 

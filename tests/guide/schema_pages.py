@@ -20,7 +20,7 @@ SHAPES: dict[str, Any] = {
     "import": logs.Import,
     "identify": fits.Identify,
     "live": live.Live,
-    "compare": fits.Compare | change.CompareModels | change.CompareSeveral,
+    "compare": fits.Compare | change.CompareModels | change.CompareSeveral | gains.AsPromised,
     "simulate": logs.Simulation,
     "diagnose": diagnosis.Diagnose,
     "extend": fits.Extension | fits.Undone,

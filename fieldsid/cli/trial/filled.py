@@ -72,8 +72,12 @@ def _output(parsed: Parsed, folder: str) -> list[str]:
 
 
 def _diagnose(parsed: Parsed, state: FolderState) -> list[str]:
-    """Return the runs, and a file that is free for the diagnosis: the report shows it, and `plan --from` takes it."""
-    axis = parsed.values.get("axis")
+    """Return the runs, the plane of the models, and a file that is free: the report shows it, and `plan --from` takes it."""
+    axis, planes = parsed.values.get("axis"), {str((i.body or {}).get("axis")) for i in state.models}
+    if axis is None and len(planes) == 1 and not parsed.paths("runs", "model"):
+        axis = Axis(planes.pop())
+        whole = Parsed(parsed.name, {**parsed.values, "axis": axis})
+        return [*_diagnose(whole, state), "--axis", axis.value]
     name = f"{MODELS}/diagnosis{f'_{axis}' if axis else ''}"
     return [*_runs(parsed, state), *_output(parsed, _free(state, name, ".yaml"))]
 
@@ -115,8 +119,11 @@ def _of_model(fitted: Callable[[FolderState, Item], list[str]]) -> Fill:
 
 def _compare(parsed: Parsed, state: FolderState) -> list[str]:
     """Return the model and runs; where nothing is typed and the model was extended, what its line began with before it."""
+    typed = parsed.paths("model", "runs")
+    if any(own_kind(state.folder / p) == "schedule" for p in typed):
+        return run_words(state) if len(typed) == 1 else []
     words = _of_model(unseen_runs)(parsed, state)
-    if parsed.paths("model", "runs") or not words:
+    if typed or not words:
         return words
     first = root_of(state, words[0])
     return words if first == words[0] else [first, *words, *_output(parsed, _free(state, "figures"))]

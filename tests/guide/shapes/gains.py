@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from guide.shapes.common import AxisName, Headline, Number, Remark, Result, Shape, schema_field
+from guide.shapes.common import AxisName, Headline, Number, Remark, Result, Shape, Skipped, schema_field
 
 
 class Row(Shape):
@@ -216,6 +216,56 @@ class Gate(Shape):
     """The speed it was found at."""
     passed: bool
     """Whether it holds."""
+
+
+class FlownNumbers(Shape):
+    """What a step that was flown came to."""
+
+    overshoot_percent: Number
+    """Overshoot of the angle averaged over half a second."""
+    settling_s: Number
+    """Time to stay within 5 %; null if it was not there at the end of the step."""
+    steady_error_rad: Number
+    """What was asked less where it came to rest."""
+
+
+class PromisedStep(Shape):
+    """One step of the goal, flown and promised."""
+
+    run: str
+    """Name of the run."""
+    t_start_s: float
+    """When the goal changed."""
+    speed_m_s: float
+    """Median speed of the step."""
+    step_rad: float
+    """From the angle then to the goal."""
+    held_s: float
+    """How long the goal was held."""
+    flown: FlownNumbers
+    """What was flown."""
+    promised: StepCheck
+    """What a verification says of this step at this speed."""
+    broken: list[str]
+    """The numbers that are worse than 95 % of the draws say."""
+    as_promised: bool
+    """Whether none is."""
+
+
+class AsPromised(Result):
+    """The steps that were flown with a schedule."""
+
+    schema_: Literal["fieldsid/as-promised/1"] = schema_field("fieldsid/as-promised/1")
+    gains: str
+    """The schedule's file."""
+    axis: AxisName
+    """The plane."""
+    as_promised: bool
+    """Whether every step went as its verification says."""
+    steps: list[PromisedStep]
+    """The steps."""
+    skipped_runs: list[Skipped]
+    """Runs without a step of the goal, and why."""
 
 
 class Verification(Result):
