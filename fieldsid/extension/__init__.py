@@ -14,7 +14,7 @@ from fieldsid.extension.lineage import (
     save_extension,
 )
 from fieldsid.extension.loop import Loop, LoopStep, loop_of
-from fieldsid.extension.steps import extend_in_steps
+from fieldsid.extension.steps import extend_in_steps, save_steps, whole_of
 
 __all__ = [
     "CHANGED",
@@ -34,4 +34,6 @@ __all__ = [
     "loop_of",
     "parent_of",
     "save_extension",
+    "save_steps",
+    "whole_of",
 ]

@@ -141,10 +141,10 @@ def _applied(
     unseen: Sequence[Run], *, force: bool,
 ) -> list[dict[str, Any]]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
-    from fieldsid.artifacts import check_output
+    from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
-    from fieldsid.extension import extend_in_steps, gain_body, save_extension
+    from fieldsid.extension import extend_in_steps, gain_body, save_steps
     from fieldsid.models.model import save_model
 
     known, path = model
@@ -155,16 +155,10 @@ def _applied(
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), force=force)
-    targets, last = list[Path](), path
-    for name in found.effects:
-        last = last.with_name(f"{last.stem}+{name}.yaml")
-        check_output(last, force=force)
-        targets.append(last)
+    targets = step_files(path, found.effects, force=force)
     with compiling_first(context), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
-    parents = [path, *targets]
-    for step, target, parent in zip(steps, targets, parents, strict=False):
-        save_extension(step, target, parent=parent, training=training, validation=unseen, force=force)
+    save_steps(steps, targets, path, (training, unseen), force=force)
     return [
         {"effect": name, "model": str(target), "pays": step.pays, **gain_body(step.gain)}
         for name, step, target in zip(found.effects, steps, targets, strict=True)

@@ -62,7 +62,8 @@ def command(
 
     Before and after are both refitted to the runs and judged by their free run on the `--validate` runs; without them a part of
     the runs is held back. The extended model is written to its parent's folder, or to `-o FILE`, where the error on unseen runs
-    falls, or with `--keep`. `--undo` gives the parent back; `sysid history MODEL` shows the whole line.
+    falls, or with `--keep`; of several effects each is a step, with a model of its own. `--undo` gives the parent back;
+    `sysid history MODEL` shows the whole line.
 
     Example: sysid extend model.yaml runs/pulses_*.parquet --add servo_lag --validate runs/zigzag.parquet
     """
@@ -107,21 +108,31 @@ def _extended(
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
-    target = output or path.with_name(f"{path.stem}+{'+'.join(dict.fromkeys(names))}.yaml")
-    known = load_model(path)
-    refuse_existing(target, force=force)
+    known, names = load_model(path), list(dict.fromkeys(names))
+    targets = step_files(path, names, output, force=force) if names else []
     check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
-    from fieldsid.extension import extend, save_extension
+    from fieldsid.extension import extend_in_steps, save_steps, whole_of
 
     with compiling_first(context), trying("extending") as report:
-        found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
+        steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
+    found = whole_of(steps)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
-        save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
-    body = _body(found, known, path, target if kept else None) | {"skipped_runs": skips.records}
+        save_steps(steps, targets, path, (training, unseen), force=force)
+    body = _body(found, known, path, targets[-1] if kept else None) | {"skipped_runs": skips.records}
     return body | _left(found, body, runs, validate), found.notes
+
+
+def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *, force: bool = False) -> list[Path]:
+    """Return the file of the model after each of some effects, beside the last or the parent; refuses those that exist."""
+    stems = [f"{parent.stem}+{'+'.join(effects[: i + 1])}" for i in range(len(effects))]
+    files = [(last or parent).with_name(f"{stem}.yaml") for stem in stems]
+    files[-1] = last or files[-1]
+    for file in files:
+        refuse_existing(file, force=force)
+    return files
 
 
 def _check(path: Path, model: Model, names: Sequence[str]) -> None:
