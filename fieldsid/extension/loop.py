@@ -8,7 +8,7 @@ from math import degrees
 
 from fieldsid.comparison.compare import Comparison
 from fieldsid.comparison.localize import Place
-from fieldsid.diagnosis.records import Pair
+from fieldsid.diagnosis.records import Errors, Pair
 from fieldsid.display import Brief
 from fieldsid.extension.lineage import Generation
 from fieldsid.models.model import Noise
@@ -73,13 +73,13 @@ class Loop(Brief):
 
 
 def _step(name: str, pair: Pair, floor: Noise, first: Pair | None) -> LoopStep:
-    sides = ((pair.train, first and first.train), (pair.validation, first and first.validation))
-    floors = [floor if one is None else Noise(one.angle_rms_rad, one.rate_rms_rad_s) for _, one in sides]
-    over = [errors.over(one) for (errors, _), one in zip(sides, floors, strict=True)]
-    says = [
-        f"{o:.2f} x" if first is None else errors.sized("deg", degrees(1.0)) for (errors, _), o in zip(sides, over, strict=True)
-    ]
-    return LoopStep(name, over[0], over[1], (says[0], says[1]))
+    def side(errors: Errors, of: Errors | None) -> tuple[float, str]:
+        over = errors.over(floor if of is None else Noise(of.angle_rms_rad, of.rate_rms_rad_s))
+        return over, f"{over:.2f} x" if of is None else errors.sized("deg", degrees(1.0))
+
+    fitted, fitted_says = side(pair.train, None if first is None else first.train)
+    unseen, unseen_says = side(pair.validation, None if first is None else first.validation)
+    return LoopStep(name, fitted, unseen, (fitted_says, unseen_says))
 
 
 def loop_of(line: Sequence[Generation], first: Sequence[Comparison], last: Sequence[Comparison]) -> Loop | None:

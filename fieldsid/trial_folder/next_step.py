@@ -5,15 +5,17 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import chdir
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from fieldsid.comparison.left_by import left_by_addition
 from fieldsid.comparison.sufficient import is_noise
-from fieldsid.logs.load import maps_anything, needs_mapping, to_map
+from fieldsid.errors import FieldsidError
+from fieldsid.logs.load import load_run, maps_anything, needs_mapping, to_map
+from fieldsid.logs.run import Run
+from fieldsid.logs.segments import may_show, plane_of
 from fieldsid.logs.several.run_names import stem_of
-from fieldsid.models.axis import NAMES, Axis
+from fieldsid.models.axis import Axis
 from fieldsid.records.named_inputs import sha256_of
 from fieldsid.rounding import MANY
 from fieldsid.trial_folder.journal import Entry, is_trial, made_by
@@ -43,7 +45,7 @@ def step_before(command: str, state: FolderState) -> tuple[str, str]:
     if command in ("schedule verify", "schedule export") and not state.of_kind("schedule") and (step := _use(state)) is not None:
         return step
     if command == "turn-radius" and state.models and not chosen_models(state, Axis.YAW.value):
-        runs = [i for i in state.of_kind(RUN) if Axis.YAW in _axes(state, i)]
+        runs = [i for i in state.of_kind(RUN) if any(may_show(run, Axis.YAW) for run in _loaded(state, i))]
         if not runs:
             return "there is no model of the yaw, and no run with a rudder", ""
         return "there is no model of the yaw yet", shlex.join(["sysid", "identify", "--axis", "yaw", *_joint(runs)])
@@ -349,17 +351,15 @@ def _joint(runs: Sequence[Item]) -> list[str]:
 
 
 def _axis(state: FolderState) -> str:
-    """Return the plane of the models, else the one that the first run moved a fin in; yaw where both are there."""
+    """Return the plane of the models, else the one that most runs excite."""
     if state.models:
         return str((state.models[0].body or {}).get("axis", "yaw"))
-    tables = [i for i in state.of_kind(RUN) if i.path.endswith(".parquet")]
-    axes = _axes(state, tables[0]) if tables else []
-    return axes[0].value if axes else Axis.YAW.value
+    return plane_of([run for i in state.of_kind(RUN) for run in _loaded(state, i)])
 
 
-def _axes(state: FolderState, run: Item) -> list[Axis]:
-    """Return the planes that a run has a fin of, every one where it is no Parquet file."""
-    if not run.path.endswith(".parquet"):
-        return list(Axis)
-    names = set(import_module("pyarrow.parquet").read_schema(state.place(run)).names)
-    return [a for a in Axis if {NAMES[a].fin, NAMES[a].fin_measured} & names]
+def _loaded(state: FolderState, item: Item) -> list[Run]:
+    """Return a run; none where it cannot be read: who works with it says so."""
+    try:
+        return [load_run(state.place(item))]
+    except FieldsidError:
+        return []

@@ -87,9 +87,16 @@ def command(
     body: dict[str, Any] = {"schema": "fieldsid/import/1", "runs": [d.record() for d in done], "skipped_runs": skips.records}
     body["already_imported"] = [str(log) for log in there]
     from fieldsid.cli.headlines.logs import of_import
+    from fieldsid.logs.segments import plane_of
 
     notes = alike(((n.code, n.data.get("signal")), item.run.name, n) for item in done for n in item.warnings)
-    result = emit(body, as_json=as_json, render=lambda c: _render(done, c), headline=of_import(body), notes=notes)
+    result = emit(
+        body,
+        as_json=as_json,
+        render=lambda c: _render(done, c),
+        headline=of_import(body, plane_of([d.run for d in done])),
+        notes=notes,
+    )
     if as_json:  # a run is used for long: what is odd about it is said however it is asked for
         warn(notes)
     skips.end(len(done))
