@@ -92,7 +92,7 @@ def command(
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     prediction = turn_radius(
         source,
-        speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
+        speeds_of(speeds) or source.knots,
         _rudder(given, vehicle, source),
         runs=_runs(runs, source, mapping, skips),
         measured=read_runs(measured, mapping=mapping, refused=skips.skip) if measured else (),
