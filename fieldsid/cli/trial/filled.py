@@ -108,8 +108,8 @@ def _of_model(fitted: Callable[[FolderState, Item], list[str]]) -> Fill:
 
     def fill(parsed: Parsed, state: FolderState) -> list[str]:
         typed = [str(p) for p in parsed.paths("model", "runs")]
-        if typed and not any(own_kind(state.folder / p) == "model" or (state.folder / p).is_dir() for p in typed):
-            return chosen_models(state)[:1]
+        if typed and not any(p.endswith((".yaml", ".yml")) or (state.folder / p).is_dir() for p in typed):
+            return chosen_models(state)[:1]  # runs alone
         words = typed or chosen_models(state)[:1]
         model = next((i for i in state.of_kind(MODEL) if [i.path] == words), None)
         return [] if model is None else [*(() if typed else words), *fitted(state, model)]
