@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -103,8 +104,10 @@ def state_of(folder: Path, files: Sequence[Path] | None = None) -> FolderState:
 
 def _sides(folder: Path) -> tuple[str, ...]:
     """Return the folders in a folder that are trials themselves, the one with the oldest files first."""
-    found = [p for p in folder.iterdir() if p.is_dir() and any((p / n).exists() for n in (JOURNAL, LOGS, RUNS, MODELS))]
-    return tuple(p.name for p in sorted(found, key=lambda p: (min(f.stat().st_mtime_ns for f in p.iterdir()), p.name)))
+    names = (JOURNAL, LOGS, RUNS, MODELS)
+    # os.path says no where a folder is closed, and does not raise
+    found = [p for p in folder.iterdir() if not p.is_symlink() and any(os.path.exists(p / n) for n in names)]  # noqa: PTH110
+    return tuple(p.name for p in sorted(found, key=lambda p: (min(f.lstat().st_mtime_ns for f in p.iterdir()), p.name)))
 
 
 def _is_simulated(item: Item, entries: Sequence[Entry]) -> bool:
