@@ -30,6 +30,11 @@ class Place:
     start_s: Annotated[float, Key("Start of its worst unbroken stretch.", "t_start_s")]
     end_s: Annotated[float, Key("End of that stretch.", "t_end_s")]
 
+    @property
+    def beyond(self) -> float:
+        """The share of the squared error beyond that of the samples: by this it is told where a model fails most."""
+        return self.share_of_error - self.share_of_samples
+
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
@@ -52,7 +57,7 @@ def places(time: FloatArray, square: FloatArray, ok: Mask, conditions: Sequence[
         share = float(square[here].sum()) / total
         start, end = worst_run(time, square, here)
         found.append(Place(condition.words, share, float(share_of_samples), float(np.sqrt(share / share_of_samples)), start, end))
-    return tuple(sorted(found, key=lambda p: p.share_of_samples - p.share_of_error))
+    return tuple(sorted(found, key=lambda p: -p.beyond))
 
 
 def worst_run(time: FloatArray, square: FloatArray, here: Mask) -> tuple[float, float]:

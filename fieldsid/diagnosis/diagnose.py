@@ -51,6 +51,7 @@ from fieldsid.models.record import Record, left_out
 SEARCH_ENDED = Note(
     "search_ended", "the search ended with what it had found by then: more might explain what is left; `--thorough` goes on"
 )
+SCREENED = "screened alone and beside what was found: it explains less than those listed"
 FinalModel = tuple[Model, tuple[Note, ...]]
 
 
@@ -168,7 +169,7 @@ def _diagnosis(
         where=where,
         next_maneuver=next_maneuver(work, verdict, found, unlogged, floor),
         unusual=apart_from_the_hulls_own(added_effects(work, named))[0],
-        skipped=skipped,
+        skipped={**skipped, **{name: SCREENED for name in _of_the_user(work) if not any(name in h.names for h in end.leading)}},
         notes=(
             *notes,
             *diverged,
@@ -181,11 +182,23 @@ def _diagnosis(
 
 
 def _leading(work: Search, found: ScoredModel) -> list[ScoredModel]:
-    """Return all models but the base: the one found, the accepted sets by log evidence, and the others, small ones first."""
+    """Return all models but the base: the one found, the accepted sets by log evidence, and the others, small ones first.
+
+    Of an effect of the user's own the best model is among those that are listed.
+    """
     base, sums = work.base(), work.evidences()
     others = [h for h in work.ranked() if h is not found and h is not base]
     others.sort(key=lambda h: (-sums[key], 0) if (key := frozenset(h.names)) in sums else (np.inf, len(key)))
-    return [*([found] if found is not base else []), *others]
+    whole = [*([found] if found is not base else []), *others]
+    first = [next((i for i, h in enumerate(whole) if name in h.names), 0) for name in _of_the_user(work)]
+    beyond = sorted({i for i in first if i >= MAX_CANDIDATES})[:MAX_CANDIDATES]
+    before = MAX_CANDIDATES - len(beyond)
+    return [*whole[:before], *(whole[i] for i in beyond), *(h for i, h in enumerate(whole[before:], before) if i not in beyond)]
+
+
+def _of_the_user(work: Search) -> list[str]:
+    """Return the user's own effects that the search was told to try."""
+    return [e.name for e in work.catalogue if e.definition is not None and e.name not in work.known]
 
 
 def _candidates(end: _SearchResult, floor: Noise, left: float) -> tuple[Candidate, ...]:

@@ -77,6 +77,25 @@ def distinct_speeds(speeds: FloatArray) -> int:
     return int(1 + np.sum(np.diff(ordered) > EQUAL_SPEED_SHARE * ordered[:-1])) if ordered.size else 0
 
 
+def meant_speeds(speeds: FloatArray) -> list[float]:
+    """Return the speeds that were asked for when these (n,) m/s were flown, rising: those of one thrust setting as one.
+
+    Each is the mean of its flown ones, to as few digits as leave it well within their spread.
+    """
+    groups = list[list[float]]()
+    for speed in np.sort(speeds).tolist():
+        if groups and speed <= groups[-1][0] * (1.0 + 2.0 * EQUAL_SPEED_SHARE):
+            groups[-1].append(speed)
+        else:
+            groups.append([speed])
+    return [_rounded(float(np.mean(group))) for group in groups]
+
+
+def _rounded(speed: float) -> float:
+    shown = (float(f"{speed:.{digits}g}") for digits in range(1, 17))
+    return next(s for s in shown if abs(s - speed) <= 0.5 * EQUAL_SPEED_SHARE * speed)
+
+
 def check_authority(axis: Axis, points: Sequence[Point]) -> float:
     """Return the common sign of the authority; raises DataError when the points disagree or have none."""
     name = NAMES[axis].authority

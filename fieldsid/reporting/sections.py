@@ -11,6 +11,7 @@ import numpy as np
 from fieldsid._version import __version__
 from fieldsid.comparison.compare import Channel, Comparison, left_in_words
 from fieldsid.comparison.sufficient import is_noise, pooled
+from fieldsid.extension import Loop
 from fieldsid.page import Block
 from fieldsid.reporting import figures
 from fieldsid.reporting.made_from import lineage_rows
@@ -134,19 +135,32 @@ def _axis(axis: AxisMaterial) -> dict[str, Any]:
         "failures": [
             {
                 "title": f"{run}: the {_followed(channel)}",
-                "chart": figures.failures(channel, f"where the {channel.name} of {run} fails"),
+                "chart": figures.failures(channel.where, f"where the {channel.name} of {run} fails"),
                 "moves": ", ".join(f"{m.signal} ({100 * m.explained:.0f} %)" for m in c.moves_with[:3]),
             }
             for run, channel, c in failing[:6]
         ],
         "candidates": _candidates(axis.diagnosis),
         "diagnosis": axis.diagnosis.body if axis.diagnosis is not None else None,
-        "fall": figures.fall(axis.line, f"the falling error of the {axis.axis} model"),
+        "loop": None if axis.loop is None else _loop(axis.loop),
         "parameters": [row for s in told for row in _parameters(s)],
         "parameters_of": told[0].path if len(told) == 1 else None,
         "laws": _laws(axis),
         "radius": None if axis.turning is None else _radius(axis.turning),
         "gains": None if axis.schedule is None else _gains(axis.schedule),
+    }  # fmt: skip
+
+
+def _loop(loop: Loop) -> dict[str, Any]:
+    """Return the loop in four charts: the first model fails, where; with what was added, and the error after each step."""
+    (before, before_key), (after, after_key) = figures.loop_before(loop), figures.loop_after(loop)
+    return {
+        "run": loop.run, "start": loop.start, "added": ", ".join(loop.added),
+        "before": before, "before_key": before_key, "before_left": loop.left_by(loop.before),
+        "after": after, "after_key": after_key, "after_left": loop.left_by(loop.after),
+        "where": figures.failures(loop.where, f"where the {loop.start} fails") if loop.where else "",
+        "most": DEGREES.words(loop.where[0].condition) if loop.where else "",
+        "steps": figures.loop_steps(loop),
     }  # fmt: skip
 
 

@@ -6,12 +6,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
 
+from fieldsid.change.promise import KeptStep
 from fieldsid.change.record import Change
 from fieldsid.comparison.compare import Channel, Comparison
 from fieldsid.comparison.localize import Place, Stretch
 from fieldsid.comparison.metrics import Metrics
 from fieldsid.comparison.residuals import Companion
 from fieldsid.diagnosis.records import Errors
+from fieldsid.extension.loop import Loop
 from fieldsid.fitting.predict.goodness_of_fit import GoodnessOfFit
 from fieldsid.logs.run import Note
 from fieldsid.models.axis import Axis
@@ -114,6 +116,7 @@ class ComparedSeveral(OfLogs):
     axis: Annotated[Axis, Key("The plane.")]
     models: Annotated[tuple[OneOfSeveral, ...], Key("The models in the order given.")]
     best: Annotated[str, Key("The file of the one with the least error.")]
+    loop: Annotated[Loop | None, Key("How the error fell where one of them was extended from another; else null.")]
     figures: Annotated[tuple[str, ...], Key("The figures, one for each run.")]
 
 
@@ -136,6 +139,22 @@ class BeforeAfter(Result):
     before: Annotated[str, Key("What was given first.")]
     after: Annotated[str, Key("What was given second.")]
     changes: Annotated[tuple[AxisChange, ...], Key("One for each axis that has models on both sides.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AsPromised(OfLogs):
+    """The steps that were flown with a schedule."""
+
+    SCHEMA = "fieldsid/as-promised/1"
+
+    gains: Annotated[str, Key("The schedule's file.")]
+    axis: Annotated[Axis, Key("The plane.")]
+    steps: Annotated[tuple[KeptStep, ...], Key("The steps of the goal.")]
+
+    @property
+    def as_promised(self) -> Annotated[bool, Key()]:
+        """Whether every step went as its verification says."""
+        return all(s.as_promised for s in self.steps)
 
 
 def compared_run(c: Comparison, figure: str | None, fitted: Collection[str]) -> ComparedRun:

@@ -49,6 +49,7 @@ class Import(OfLogs):
     SCHEMA = "fieldsid/import/1"
 
     runs: Annotated[tuple[Imported, ...], Key("One for each log.")]
+    already_imported: Annotated[tuple[str, ...], Key("Logs whose runs were there, made of the same bytes of log and mapping.")]
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,6 @@ from fieldsid.plant.parameter_source import ParameterSource, draw_values
 from fieldsid.plant.yaw_plant import EXPONENT, follows_the_run, scaled_cores, straight_moment
 from fieldsid.records.keys import Key
 
-
 PARTS = ("damping", "stiffness", "authority", "offset", "core", "lag", "delay", "fin_rate", "powers", "speed_loss")
 WITHOUT_EFFECTS = np.array(Core(cross_damping=1.0))
 """The constants of a plant without effects: of a cross state that nothing moves, which comes back to rest."""

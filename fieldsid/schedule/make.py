@@ -104,7 +104,7 @@ def _took_no_gains(error: ModelError) -> Note:
 
 
 def _knots(source: ParameterSource, speeds: Sequence[float]) -> list[float]:
-    knots = sorted({round(float(s), 9) for s in (speeds or source.speeds)})
+    knots = sorted({round(float(s), 9) for s in (speeds or source.knots)})
     if not all(np.isfinite(s) and s > 0 for s in knots):
         raise UsageError("speeds must be above zero", found=f"{knots}", hint="write `--speeds 1.0,1.5,2.0`")
     return knots

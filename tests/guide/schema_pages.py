@@ -23,7 +23,7 @@ RESULTS: dict[str, tuple[type[Result], ...]] = {
     "import": (logs.Import,),
     "identify": (fits.Identified,),
     "live": (Look,),
-    "compare": (comparisons.Compared, comparisons.BeforeAfter, comparisons.ComparedSeveral),
+    "compare": (comparisons.Compared, comparisons.BeforeAfter, comparisons.ComparedSeveral, comparisons.AsPromised),
     "simulate": (logs.Simulation,),
     "diagnose": (diagnoses.Diagnosed,),
     "extend": (extensions.Extended, extensions.Undone),

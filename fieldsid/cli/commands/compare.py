@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 MOST_SHOWN = 6
 
-First = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file, or the folder of the models before a swap.")]
+First = Annotated[
+    Path, typer.Argument(metavar="MODEL", help="A model file, the folder of the models before a swap, or gains that were flown.")
+]
 Others = Annotated[
     list[Path],
     typer.Argument(metavar="RUN...", help="Runs or log files, more models before them; or the model or folder after a swap."),
@@ -62,6 +64,8 @@ def command(
     made. The error of angle and rate is divided by phase, fin angle, rate, speed, heading, side, depth and time, that of the
     one further above its noise first. With `-o` one figure per run is drawn.
 
+    Gains and the runs flown with them: whether each step of the goal went as `schedule verify` said.
+
     Two models, or two folders of models, and no run: what a swap has changed beyond the models' errors at the speeds that both
     were flown at, and what that does to the gains and the turning radius. Several models and runs: which follows them best.
 
@@ -72,11 +76,17 @@ def command(
     from fieldsid.cli.commands._before_after import before_after, is_side
 
     refuse_place(output, force=force)
+    from fieldsid.logs.unknown_file import own_kind
+
+    if own_kind(model) == "schedule":
+        from fieldsid.cli.commands._as_promised import as_promised
+
+        return as_promised(model, runs, {"mapping": mapping, "start": start, "end": end}, as_json=as_json)
     sides = [p for p in (model, *runs) if is_side(p)]
     if len(sides) == len(runs) + 1 == 2:
         _refuse_part(start, end, mapping, min_fit)
         return before_after(sides[0], sides[1], output, figures=figures, force=force, as_json=as_json)
-    from fieldsid.cli.inputs import read_runs, refuse_swapped
+    from fieldsid.cli.inputs import model_first, read_runs
     from fieldsid.cli.skipped_logs import Skips
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.models.model import load_model
@@ -94,7 +104,7 @@ def command(
             force=force,
             as_json=as_json,
         )
-    refuse_swapped("compare", model, runs)
+    model, runs = model_first(model, runs)
     known = load_model(model)
     skips, ready = Skips(), partial(get_ready, "fieldsid.comparison.compare")
     effects = partial(check_effects, [(model, known)])

@@ -97,7 +97,7 @@ def command(
     body = body_of(told)
     from fieldsid.cli.headlines.missing import Searched, of_diagnosis
 
-    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, mapping, thorough))
+    headline = of_diagnosis(body, Searched(files_of(training), files_of(unseen), model, thorough))
     result = emit(body, as_json=as_json, render=lambda to: _render(to, found, body), headline=headline, notes=found.notes)
     skips.end(len(training) + len(unseen))
     return result
@@ -140,10 +140,10 @@ def _applied(
     unseen: Sequence[Run], *, force: bool,
 ) -> tuple[Applied, ...]:  # fmt: skip
     """Extend the model diagnosed by each named effect in turn, write each model, and return what each step has changed."""
-    from fieldsid.artifacts import check_output
+    from fieldsid.cli.commands.extend import step_files
     from fieldsid.cli.headlines.missing import MODELS
     from fieldsid.cli.inputs import files_of
-    from fieldsid.extension import extend_in_steps, save_extension
+    from fieldsid.extension import extend_in_steps, save_steps
     from fieldsid.models.model import save_model
     from fieldsid.results.diagnoses import Applied
 
@@ -155,16 +155,10 @@ def _applied(
         known, path = found.base_model, Path(MODELS) / f"{stem}_{found.axis.value}.yaml"
         if not path.exists() or force:
             save_model(known, path, inputs=files_of(training), force=force)
-    targets, last = list[Path](), path
-    for name in found.effects:
-        last = last.with_name(f"{last.stem}+{name}.yaml")
-        check_output(last, force=force)
-        targets.append(last)
+    targets = step_files(path, found.effects, force=force)
     with compiling_first(context), trying("adding what was found") as report:
         steps = extend_in_steps(known, found.effects, training, unseen, report=report)
-    parents = [path, *targets]
-    for step, target, parent in zip(steps, targets, parents, strict=False):
-        save_extension(step, target, parent=parent, training=training, validation=unseen, force=force)
+    save_steps(steps, targets, path, (training, unseen), force=force)
     return tuple(
         Applied(step.gain, name, str(target), step.pays) for name, step, target in zip(found.effects, steps, targets, strict=True)
     )

@@ -62,7 +62,8 @@ def command(
 
     Before and after are both refitted to the runs and judged by their free run on the `--validate` runs; without them a part of
     the runs is held back. The extended model is written to its parent's folder, or to `-o FILE`, where the error on unseen runs
-    falls, or with `--keep`. `--undo` gives the parent back; `sysid history MODEL` shows the whole line.
+    falls, or with `--keep`; of several effects each is a step, with a model of its own. `--undo` gives the parent back;
+    `sysid history MODEL` shows the whole line.
 
     Example: sysid extend model.yaml runs/pulses_*.parquet --add servo_lag --validate runs/zigzag.parquet
     """
@@ -104,32 +105,32 @@ def _extended(
     output: Path | None,
     force: bool,
 ) -> Extended:
-    from fieldsid.cli.inputs import read_groups, refuse_swapped
+    from fieldsid.cli.inputs import model_first, read_groups
     from fieldsid.models.model import load_model
 
-    refuse_swapped("extend", path, runs)
+    path, runs = model_first(path, runs)
     if not runs:
         raise UsageError(
             "there is no run to fit to", found=f"sysid extend {path}", hint=f"sysid extend {path} RUN... --add EFFECT"
         )
-    target = output or path.with_name(f"{path.stem}+{'+'.join(dict.fromkeys(names))}.yaml")
-    known = load_model(path)
-    refuse_existing(target, force=force)
+    known, names = load_model(path), list(dict.fromkeys(names))
+    targets = step_files(path, names, output, force=force) if names else []
     check, ready = partial(_check, path, known, names), partial(get_ready, "fieldsid.extension")
     training, unseen = read_groups([runs, validate], mapping=mapping, check=check, meanwhile=ready, refused=skips.skip)
-    from fieldsid.extension import extend, save_extension
+    from fieldsid.extension import extend_in_steps, save_steps, whole_of
     from fieldsid.extension.lineage import kept_by
     from fieldsid.records.named_inputs import sha256_of
     from fieldsid.results.extensions import Extended, MadeFrom
 
     with compiling_first(context), trying("extending") as report:
-        found = extend(known, names, training, unseen, report=report, unfit=skips.skip)
+        steps = extend_in_steps(known, names, training, unseen, report=report, unfit=skips.skip)
+    found = whole_of(steps)
     training, unseen = skips.left_of(training), skips.left_of(unseen)
     kept = found.pays or keep
     if kept:
-        save_extension(found, target, parent=path, training=training, validation=unseen, force=force)
-    left, next_ = _left(found, (target if kept else path), known, runs, validate, mapping, kept=kept)
-    written = target if kept else None
+        save_steps(steps, targets, path, (training, unseen), force=force)
+    model = targets[-1] if kept else path
+    left, next_ = _left(found, model, known, runs, validate, kept=kept)
     return Extended(
         gain=found.gain,
         axis=known.axis,
@@ -137,7 +138,7 @@ def _extended(
         pays=found.pays,
         kept=kept,
         kept_by=kept_by(found) if kept else None,
-        model=str(written or path),
+        model=str(model),
         effects=found.model.effects if kept else known.effects,
         parent=MadeFrom(str(path), sha256_of(path)),
         coefficients=_coefficients(found),
@@ -146,6 +147,16 @@ def _extended(
         next=next_,
         skipped_runs=tuple(skips.records),
     )
+
+
+def step_files(parent: Path, effects: Sequence[str], last: Path | None = None, *, force: bool = False) -> list[Path]:
+    """Return the file of the model after each of some effects, beside the last or the parent; refuses those that exist."""
+    stems = [f"{parent.stem}+{'+'.join(effects[: i + 1])}" for i in range(len(effects))]
+    files = [(last or parent).with_name(f"{stem}.yaml") for stem in stems]
+    files[-1] = last or files[-1]
+    for file in files:
+        refuse_existing(file, force=force)
+    return files
 
 
 def _check(path: Path, model: Model, names: Sequence[str]) -> None:
@@ -157,14 +168,7 @@ def _check(path: Path, model: Model, names: Sequence[str]) -> None:
 
 
 def _left(
-    found: Extension,
-    model: Path,
-    parent: Model,
-    runs: Sequence[Path],
-    validate: Sequence[Path],
-    mapping: Path | None,
-    *,
-    kept: bool,
+    found: Extension, model: Path, parent: Model, runs: Sequence[Path], validate: Sequence[Path], *, kept: bool
 ) -> tuple[LeftOver, str]:
     """Return what the model as it now is leaves, over the noise floor, and the command that goes on from there."""
     from fieldsid.results.extensions import LeftOver
@@ -173,11 +177,9 @@ def _left(
     left = LeftOver(fitted, unseen, not all(is_noise(error) for error in (fitted, unseen)))
     if not left.more_than_noise:
         return left, used(parent.axis.value, str(model))
-    reading = ("--mapping", mapping) if mapping is not None else ()
     judged = repeated("--validate", validate)
     longer = () if kept else ("--thorough",)  # what was named by the usual search has not paid
-    command = pasted("diagnose", runs, "--axis", parent.axis.value, "--model", str(model), *judged, *reading, *longer)
-    return left, command
+    return left, pasted("diagnose", runs, "--axis", parent.axis.value, "--model", str(model), *judged, *longer)
 
 
 def _coefficients(found: Extension) -> dict[str, AddedCoefficient]:

@@ -42,6 +42,7 @@ def command(
     Example: sysid fit models/*.yaml -o law.yaml
     """
     from fieldsid.cli.headlines.gains import of_fit
+    from fieldsid.cli.inputs import models_among
     from fieldsid.errors import UsageError
     from fieldsid.plant.laws.axis_laws import law_notes, save_laws
     from fieldsid.plant.parameter_source import load_parameter_source
@@ -49,6 +50,7 @@ def command(
     from fieldsid.results.turning import FittedLaws
 
     refuse_existing(output, output.with_suffix(".png") if output is not None and figures else None, force=force)
+    models = models_among(models)
     source = load_parameter_source(models)
     if source.is_fit_file:
         raise UsageError("this is a fit file already", found=str(models[0]), hint="give models or a table")

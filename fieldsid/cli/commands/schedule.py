@@ -168,6 +168,7 @@ def design(
     Example: sysid schedule design law.yaml --fin-max 15deg -o gains.yaml
     """
     from fieldsid.angles import FASTEST_FIN, FIN, FIN_RATE, HEADING, TILT, parse_angle, parse_margin
+    from fieldsid.cli.inputs import models_among
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import fins_of, length_of, runs_behind
     from fieldsid.face.quantities import BANDWIDTH, parse_quantity, parse_share
@@ -184,6 +185,7 @@ def design(
     given = None if fin_limit is None else parse_angle(fin_limit, "--fin-max", FIN)
     fastest = None if fin_rate is None else parse_angle(fin_rate, "--fin-rate", FIN_RATE, FASTEST_FIN)
     margin = parse_margin(phase_margin, "--phase-margin")
+    models = models_among(models)
     source = load_parameter_source(models, laws=law or ())
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     limit, rate = _limits(given, fastest, vehicle, source)

@@ -81,7 +81,7 @@ def command(
     """
     from fieldsid.angles import FIN, parse_angle
     from fieldsid.cli.headlines.gains import caveat, of_turn
-    from fieldsid.cli.inputs import read_runs
+    from fieldsid.cli.inputs import models_among, read_runs
     from fieldsid.cli.user_effects import check_effects
     from fieldsid.face.arguments import length_of
     from fieldsid.face.speeds import speeds_of
@@ -92,11 +92,12 @@ def command(
 
     refuse_closed(output)
     given = None if rudder_max is None else parse_angle(rudder_max, "--fin-max", FIN)
+    models = models_among(models)
     source, skips = load_parameter_source(models, laws=law or ()), Skips()
     check_effects(zip(source.paths, source.models, strict=False))  # a table has no models
     prediction = turn_radius(
         source,
-        speeds_of(speeds) or [float(s) for s in dict.fromkeys(source.speeds)],
+        speeds_of(speeds) or source.knots,
         _rudder(given, vehicle, source),
         runs=_runs(runs, source, mapping, skips),
         measured=read_runs(measured, mapping=mapping, refused=skips.skip) if measured else (),
