@@ -50,7 +50,7 @@ def refuse_unsettled(now: OnlineEstimate, progress: Progress) -> None:
     """Raise DataError while an estimate is none that gains can be designed for."""
     if progress.contradiction:
         raise DataError("angle and rate contradict each other", found=progress.contradiction, hint="turn the sign of one")
-    moving = [p.name for p in progress.parameters if isfinite(p.goal) and not p.is_settled]
+    moving = [p.name for p in progress.parameters if p.name != NAMES[now.axis].trim and not p.is_settled]
     if moving or not now.covariance:
         hint = f"go on for {LOOK_BACK_S:.0f} s, with the fin moved"
         raise DataError("no gains yet: the estimate has not settled", found=", ".join(moving) or "no estimate", hint=hint)
