@@ -117,13 +117,20 @@ class AuthorityJump:
         self._before.count += one.count
 
     def _found(self) -> Jump | None:
-        """Return the jump at the place that explains all rows best, of those where there is one."""
-        seconds = list(self._seconds)
-        tried = [self._at(seconds, len(seconds) - k) for k in range(LEAST_S, min(MOST_S, len(seconds)) + 1)]
-        return min((t for t in tried if t is not None), key=lambda t: t[0], default=(0.0, None))[1]
+        """Return the jump at the place that explains all rows best, if there is one.
 
-    def _at(self, seconds: Sequence[_Sums], place: int) -> tuple[float, Jump] | None:
-        """Return the squared errors left and the jump before the second at a place, None where there is none.
+        Where that is the latest place looked at, it may have begun later yet: the next second tells.
+        """
+        seconds = list(self._seconds)
+        places = range(max(len(seconds) - MOST_S, 0), len(seconds) - LEAST_S + 1)
+        tried = [(found, place) for place in places if (found := self._at(seconds, place)) is not None]
+        (_, jump), place = min(tried, key=lambda t: t[0][0], default=((0.0, None), 0))
+        return jump if place < len(seconds) - LEAST_S else None
+
+    def _at(self, seconds: Sequence[_Sums], place: int) -> tuple[float, Jump | None] | None:
+        """Return the squared errors left with a jump before the second at a place, and that jump where it is one.
+
+        None where what came before or since does not tell.
 
         What has come last is fitted with the damping, drag and stiffness from before: its authority and trim alone are free.
         """
@@ -153,7 +160,7 @@ class AuthorityJump:
         error = sqrt(self._noise * float(moved @ inverse @ moved + noisier * solved[0, 0]))
         known_to = sqrt(self._noise * float(inverse[size, size]))
         if known_to > KNOWN_SHARE * abs(was) or abs(is_now - was) <= OTHER_MOTION * abs(was) + SURE * error:
-            return None
+            return left + left_now, None
         return left + left_now, Jump(recent[0].begin, is_now / was, error / abs(was))
 
     def _noise_of(self, seconds: Sequence[_Sums], theta: FloatArray) -> float:
