@@ -12,7 +12,8 @@ from fieldsid.models.axis import NAMES, Axis
 from fieldsid.online import OnlineIdentifier
 from fieldsid.online.authority_jump import MOST_S
 
-BEFORE_S = 60.0
+BEFORE_S = 65.0
+"""Where the second flight begins: a while after the end of the first, as a swap takes."""
 AUTHORITY = {"yaw": "b2", "pitch": "d2"}
 
 
