@@ -4,22 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite, pi
+from types import MappingProxyType
 from typing import Any
 
 from fieldsid.artifacts import plain
 from fieldsid.models.axis import NAMES, Axis
-from fieldsid.online.identifier import OnlineEstimate
+from fieldsid.online.estimate import OnlineEstimate
 from fieldsid.online.progress import LOOK_BACK_S, ParameterProgress, Progress
 
 SCHEMA = "fieldsid/live/1"
+NOTHING_BESIDE: Mapping[str, Any] = MappingProxyType({"gains": None, "diagnosed": None})
 LONGEST_GUESS_S = 3600.0
 """A time to the goal beyond which it is not told: the pace of a few seconds says nothing of hours."""
 
 
 def look_body(
-    now: OnlineEstimate, progress: Progress, *, source: str, goals_from: str, unreadable: int, then: str
+    now: OnlineEstimate,
+    progress: Progress,
+    *,
+    source: str,
+    goals_from: str,
+    unreadable: int,
+    then: str,
+    beside: Mapping[str, Any] = NOTHING_BESIDE,
 ) -> dict[str, Any]:
-    """Return a look as nested plain values; NaN as None."""
+    """Return a look as nested plain values, with what was worked out `beside` the estimate; NaN as None."""
     bands, units = now.intervals95, units_of(now.axis)
     body = {
         "schema": SCHEMA,
@@ -47,8 +56,12 @@ def look_body(
             }
             for p in progress.parameters
         },
+        "authority_jump": None
+        if now.jump is None
+        else {"since_s": now.jump.time, "factor": now.jump.factor, "std_error": now.jump.std_error},
         "counts": {**now.counts, "unreadable": unreadable},
         "next": then,
+        **beside,
     }
     out: dict[str, Any] = plain(body)
     return out
