@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from fieldsid.errors import FieldsidError
+from fieldsid.runtime.pickling import dumps, loads
 from fieldsid.runtime.worker_pool import IS_WORKER
 
 
@@ -32,7 +33,7 @@ class SecondProcess:
             self._process = context.Process(target=_work, args=(theirs,), daemon=True)
             self._process.start()
             theirs.close()
-        self._ours.send((function, arguments))
+        self._ours.send_bytes(dumps((function, arguments)))
         self.is_busy = True
 
     def answer(self, *, wait: bool = False) -> Any:
@@ -44,7 +45,7 @@ class SecondProcess:
             return None
         self.is_busy = False
         try:
-            return self._ours.recv()
+            return loads(self._ours.recv_bytes())
         except EOFError as error:
             self.close()
             raise FieldsidError("the process beside this one has ended", found="no answer", hint="try it alone") from error
@@ -64,11 +65,11 @@ def _work(theirs: Connection) -> None:
     os.environ[IS_WORKER] = "1"
     while True:
         try:
-            function, arguments = theirs.recv()
+            function, arguments = loads(theirs.recv_bytes())
         except EOFError:
             return
         try:
             answer = function(*arguments)
         except FieldsidError as error:
             answer = error
-        theirs.send(answer)
+        theirs.send_bytes(dumps(answer))

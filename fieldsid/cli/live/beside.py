@@ -30,7 +30,7 @@ from fieldsid.schedule import FinLimits, load_schedule
 from fieldsid.schedule.search.of_one_model import Wanted, usual, wanted_of
 
 STILL_S = 5.0
-"""Time for which the fin has stayed near its trim when a maneuver has ended: no pause within one is longer."""
+"""Time for which the fin has stayed near its trim when a maneuver has ended."""
 MOVED = 0.5
 """Standard errors by which a parameter moves before gains are designed again."""
 Flown = Callable[[float], "Run | Mapping[str, Any]"]
@@ -56,7 +56,7 @@ class Beside:
 
     def look(self, now: OnlineEstimate, progress: Progress, *, ended: bool = False) -> None:
         """Take answers up and give what is due; `ended` waits for all of them."""
-        self._take(wait=False)
+        self._take(wait=ended)  # what a process is at is of less than was flown by the end
         if self._wanted is not None and not self._designing.is_busy and (ended or self._is_new(now)):
             self._design(now, progress, self._wanted)
         if self._flown is not None and not self._diagnosing.is_busy:
