@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from fieldsid.fitting.fin_offset import offset_of
 from fieldsid.models.model import Model
-from fieldsid.rounding import TWO_SIDED_95
+
+TWO_SIDED_95 = 1.96
+"""Quantile 0.975 of the normal distribution."""
 
 
 @dataclass(frozen=True, slots=True)

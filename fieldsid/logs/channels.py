@@ -8,7 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
-from fieldsid.logs.convert.clock import GAP_FACTOR
 from fieldsid.logs.convert.frames import Frame
 
 Stamp = Literal["header", "receive"]
@@ -108,7 +107,7 @@ class ChannelMap:
     frame: Frame = field(default_factory=Frame)
     stamp: Stamp | None = None
     clock: str | None = None
-    gap_factor: float = GAP_FACTOR
+    gap_factor: float = 2.5
     pressure: Pressure = field(default_factory=Pressure)
     table: TableForm = field(default_factory=TableForm)
     origin: Path | None = None

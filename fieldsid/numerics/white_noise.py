@@ -8,12 +8,11 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
-from scipy.special import ndtri
 
 from fieldsid.numerics.arrays import BoolArray, FloatArray
 
 DIFFERENCE_ORDER = 3
-MEDIAN_OF_NORMAL = float(ndtri(0.75))
+MEDIAN_OF_NORMAL = 0.6745
 """Median of |x| of a standard normal x."""
 
 MAX_FLOOR_SAMPLES, BLOCK_SAMPLES = 50_000, 1_000
